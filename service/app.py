@@ -85,7 +85,7 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
     for router in ROUTERS:
         app.include_router(router)
     add_pages(app)
-    app.state.tools = add_tools(app, settings)
+    app.state.tools = add_tools(app, settings, ROUTERS)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
     app.add_middleware(Gate, settings=settings, posts=posts_of(ROUTERS), metrics=app.state.metrics)

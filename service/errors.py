@@ -53,6 +53,7 @@ SERVICE_STATUS: Final[dict[str, int]] = {
     "bad_request": 400,
     "missing_key": 401,
     "wrong_key": 403,
+    "wrong_origin": 403,
     "not_found": 404,
     "unknown_solid": 404,
     "unknown_scene": 404,

@@ -13,6 +13,8 @@ import asyncio
 import logging
 import re
 from collections.abc import Callable, Coroutine, Iterable
+from contextlib import suppress
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -27,8 +29,10 @@ from engine import EngineError
 from service import body, traces, wire
 from service.body import JSON
 from service.convert.questions import existing, is_light
+from service.decoding import pieces
 from service.decoding.pieces import Body
 from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
+from service.schemas.arrays import Fault
 from service.work import Call, Pool
 
 log = logging.getLogger("service")
@@ -49,12 +53,35 @@ def state_of(app: Any) -> Any:
 class GeometryRoute(APIRoute):
     """A route whose endpoint takes ``question`` (the body's model, if any), path parameters, and ``call``."""
 
+    @cached_property
+    def adapter(self) -> TypeAdapter[Any]:
+        """Return what makes the endpoint's model of a JSON body."""
+        body_field: Any = self.body_field
+        return TypeAdapter(body_field.field_info.annotation)
+
+    async def ask(
+        self, document: Any, arguments: dict[str, Any], call: Call, state: Any, finish: Callable[[Any], bytes]
+    ) -> bytes | list[Fault]:
+        """Answer a question that was decoded elsewhere; return what `finish` makes of the answer, or what is wrong."""
+        found: bytes | list[Fault]
+        try:
+            job = _Job(self.endpoint, self.adapter, arguments, call, True)
+            job.document, job.finish = document, lambda answer: [finish(answer)]
+            (found,) = await state.pool.run(call, job.answer, False)
+        except Exception as error:
+            found = _faults_in(error, f"{self.name} as a tool")
+        status = self.status_code or 200 if isinstance(found, bytes) else STATUS[found[0].code]
+        operation = self.operation_id or self.name
+        state.metrics.count(operation, status, call.seconds)
+        traces.note(operation, call.seconds)
+        return found
+
     def get_route_handler(self) -> Answer:
         """Return the coroutine that answers a request."""
         endpoint, status = self.endpoint, self.status_code or 200
         body_field: Any = None if self.body_field is None else self.body_field.field_info
         media_type = None if body_field is None else getattr(body_field, "media_type", JSON)
-        adapter = TypeAdapter(body_field.annotation) if body_field is not None and media_type == JSON else None
+        adapter = self.adapter if body_field is not None and media_type == JSON else None
         query: Query = {
             item.name: (TypeAdapter[Any](item.field_info.annotation or Any), item.field_info.is_required())
             for item in self.dependant.query_params
@@ -162,6 +189,9 @@ class _Job:
         self.arguments = arguments
         self.call = call
         self.question: Any = None
+        self.document: Any = None
+        """A body that was decoded elsewhere, or is long: it is let go of in steps."""
+        self.finish: Callable[[Any], Iterable[Part]] = self._encoded
 
     def decode(self) -> None:
         """Turn the body into the endpoint's model, and let go of it."""
@@ -174,43 +204,58 @@ class _Job:
             if self.adapter is None:
                 self.question = text
                 return
-            document = wire.decode_fast(text, self.call.take)
-            if document is not None:
-                try:
-                    self.question = self.adapter.validate_python(document, context=self.call)
-                    return
-                except ValidationError:  # the other decoder keeps what pointers need
-                    del document
-            self.call.remaining()
-            self.call.take(wire.cost_of(text))
-            document = wire.decode(text, self.call.remaining)
+            if self.document is None:
+                self.document = wire.decode_fast(text, self.call.take, self.call.remaining)
+                if self.document is not None:
+                    with suppress(ValidationError):  # the other decoder keeps what pointers need
+                        self.question = self.adapter.validate_python(self.document, context=self.call)
+                        return
+                    pieces.let_go(self.document)
+                self.call.remaining()
+                self.call.take(wire.cost_of(text))
+                self.document = wire.decode(text, self.call.remaining)
             try:
-                self.question = self.adapter.validate_python(document, context=self.call)
+                self.question = self.adapter.validate_python(self.document, context=self.call)
             except ValidationError as error:
-                raise _InvalidBody(error, document) from None
+                raise _InvalidBody(error, self.document) from None
 
     def answer(self) -> list[Part]:
         """Return the encoded answer, nothing if it has no body."""
         call = self.call
         call.remaining()  # it may have waited past its deadline
-        if self.takes_body:
-            self.decode()
-            self.arguments["question"] = self.question
         try:
+            if self.takes_body:
+                self.decode()
+                self.arguments["question"] = self.question
             answer = self.endpoint(**self.arguments, call=call)
+            if answer is None:
+                return []
+            with call.phase("encode"):
+                return self._gathered(self.finish(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
+            _without_frames(error)
             raise
-        if answer is None:
-            return []
-        with call.phase("encode"):
-            parts: Iterable[Part]
-            if isinstance(answer, np.ndarray):
-                call.media_type = body.OCTETS
-                parts = wire.cut(wire.octets(answer))
-            else:
-                parts = wire.encoded(answer)
-            return self._gathered(parts)
+        finally:
+            document, self.document, self.question, self.arguments = self.document, None, None, {}
+            if not call.is_light:
+                pieces.let_go(document)
+
+    def _encoded(self, answer: Any) -> Iterable[Part]:
+        if isinstance(answer, np.ndarray):
+            self.call.media_type = body.OCTETS
+            return wire.cut(wire.octets(answer))
+        self._check_least(wire.least_of(answer))
+        return wire.encoded(answer, self.call.remaining)
+
+    def _check_least(self, n_bytes: int) -> None:
+        """Raise `answer_too_large` or `out_of_memory` at once where an answer of so many bytes would be refused."""
+        limit = self.call.settings.max_answer_bytes
+        if n_bytes > limit:
+            detail = f"the answer would need more than {limit} bytes; {self.call.instead}, or raise "
+            raise ServiceError("answer_too_large", detail + "GEOMETRY_MAX_ANSWER_BYTES")
+        self.call.take(n_bytes)
+        self.call.take(-n_bytes)
 
     def _gathered(self, parts: Iterable[Part]) -> list[Part]:
         """Return the parts of an answer, within its limits, compressed if that was asked for and is worth it."""
@@ -266,15 +311,26 @@ class _InvalidBody(Exception):
 
 
 def _failed(error: Exception, request: Request) -> Response:
-    """Return the problem for `error`; what nobody expected is logged in full."""
+    """Return the problem for `error`."""
+    faults = _faults_in(error, f"{request.method} {request.url.path}")
+    return problem(faults, getattr(error, "headers", None) or {})
+
+
+def _faults_in(error: Exception, what: str) -> list[Fault]:
+    """Return what is wrong; what nobody expected is logged in full."""
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
-        log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        log.error("%s failed", what, exc_info=error)
+    _without_frames(error)
+    return faults
+
+
+def _without_frames(error: Exception) -> None:
+    """Forget the frames of an error and of those before it: they hold the body, and lead back to it."""
     known: BaseException | None = error
     while known is not None:  # bound: each is raised while the next was handled
-        known.with_traceback(None)  # its frames hold the body, and lead back to it
+        known.with_traceback(None)
         known = known.__context__
-    return problem(faults, getattr(error, "headers", None) or {})
 
 
 def _coding_wanted(header: bytes) -> str | None:
@@ -310,14 +366,15 @@ def _queried(request: Request, query: Query) -> dict[str, Any]:
 
 async def _run(pool: Pool, call: Call, job: Callable[[], list[Part]], receive: Receive, is_small: bool) -> list[Part]:
     """Run `job` in the pool and throw the call's cancel switch if the client goes away meanwhile."""
-    watcher = asyncio.create_task(_watch(call, receive))
+    watcher = asyncio.create_task(watch(call, receive))
     try:
         return await pool.run(call, job, is_small)
     finally:
         watcher.cancel()
 
 
-async def _watch(call: Call, receive: Receive) -> None:
+async def watch(call: Call, receive: Receive) -> None:
+    """Throw the call's switch when the client has gone away."""
     while (await receive())["type"] != "http.disconnect":
         pass
     call.set()

@@ -8,26 +8,41 @@ is small: of each list how long it is and its first items, more by `show` and `s
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+import json
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager, suppress
 from importlib.util import find_spec
+from ipaddress import ip_address
 from typing import Any, Final
-from urllib.parse import quote
+from urllib.parse import urlsplit
 
 import orjson
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
+from starlette.requests import ClientDisconnect
 from starlette.routing import Route
 from starlette.types import Message, Receive, Scope, Send
 
-from service.body import JSON
+from engine import EngineError
+from service import wire
+from service.body import JSON, declared_length, read
+from service.convert.summaries import summary
+from service.decoding.pieces import Body
 from service.errors import ServiceError, faults_of, problem
+from service.route import GeometryRoute, watch
 from service.settings import Settings
+from service.work import Call
 
 PATH: Final = "/mcp"
 SHOWN: Final = 10
 """Items of a list that are shown unless more are asked for."""
 _MOST: Final = 2**20
-"""Bytes of a request: it is read on the event loop. Solids that are larger go to /v1/solids."""
+"""Bytes of a request. Solids that are larger go to /v1/solids."""
+_MOST_BESIDE: Final = 2**16
+"""Bytes of a request beside a tool's arguments: the library reads them on the event loop."""
+_MOST_SHOWN: Final = 1000
+"""Items of a list shown at once, far more than a model reads."""
+_ASKED: Final = "geometry.asked"
+"""The name, in the scope of a request, of its call and a tool's arguments."""
 _SCHEMAS: Final = "#/components/schemas/"
 _WORDS: Final = frozenset(
     ("type", "properties", "required", "items", "enum", "const", "oneOf", "$ref", "minItems", "description", "pattern")
@@ -36,7 +51,7 @@ _WORDS: Final = frozenset(
 _PAGE: Final = {
     "show": {
         "type": "integer",
-        "description": f"Items of each list to show, {SHOWN} if left out; the count is always told.",
+        "description": f"Items of each list to show, {SHOWN} if left out, {_MOST_SHOWN} at most; all are counted.",
     },
     "start": {"type": "integer", "description": "The first item to show, 0 if left out."},
 }
@@ -47,26 +62,54 @@ _INSTRUCTIONS: Final = (
 
 
 class Tools:
-    """An ASGI application that answers MCP; `running` ends what it started."""
+    """An ASGI application that answers MCP; `running` ends what it started.
 
-    def __init__(self, app: FastAPI, settings: Settings) -> None:
+    The library is handed a request without the arguments of its call, which are decoded here, as bodies are; and of an
+    answer no more than is shown is ever written.
+    """
+
+    def __init__(self, app: FastAPI, settings: Settings, routers: Iterable[APIRouter]) -> None:
         self._app = app
-        self._most = min(_MOST, settings.max_body_bytes)
+        self._settings = settings.model_copy(update={"max_body_bytes": min(_MOST, settings.max_body_bytes)})
+        self._routes = {
+            route.path: route for each in routers for route in each.routes if isinstance(route, GeometryRoute)
+        }
         self._manager: asyncio.Future[Any] | None = None
         self._ended = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
-        if find_spec("mcp") is None:
-            error = ServiceError("not_installed", "this service offers no tools; use its HTTP calls, /docs lists them")
+        state = self._app.state
+        call = Call(self._settings, state.store, state.memory)
+        try:
+            if find_spec("mcp") is None:
+                detail = "this service offers no tools; use its HTTP calls, /docs lists them"
+                raise ServiceError("not_installed", detail)
+            headers = dict(scope["headers"])
+            check_origin(headers, self._settings)
+            declared = declared_length(headers, self._settings.max_body_bytes)
+            text = await read(receive, declared, call)
+            call.start_clock()
+            text, arguments = await state.pool.run(call, lambda: _parted(text, call), is_small=True)
+            if self._manager is None or (self._manager.done() and self._manager.exception()):  # the last start failed
+                self._manager = asyncio.get_running_loop().create_future()
+                self._task = asyncio.create_task(self._hold(self._manager))
+            manager = await asyncio.shield(self._manager)  # who goes away takes it from nobody
+            own = [header for header in scope["headers"] if header[0] not in (b"content-length", b"transfer-encoding")]
+            own.append((b"content-length", str(len(text)).encode()))
+            passed = {**scope, "headers": own, _ASKED: (call, arguments)}
+            gone = asyncio.create_task(watch(call, receive))
+            try:
+                await manager.handle_request(passed, _replayed(text, gone), send)
+            finally:
+                gone.cancel()
+        except (ServiceError, EngineError) as error:
             await problem(faults_of(error))(scope, receive, send)
-            return
-        if self._manager is None or (self._manager.done() and self._manager.exception()):  # the last start failed
-            self._manager = asyncio.get_running_loop().create_future()
-            self._task = asyncio.create_task(self._hold(self._manager))
-        manager = await asyncio.shield(self._manager)  # who goes away takes it from nobody
-        await manager.handle_request(scope, receive, send)
+        except ClientDisconnect:
+            pass
+        finally:
+            call.free()
 
     async def _hold(self, began: asyncio.Future[Any]) -> None:
         """Run the library's manager, which must be entered and left by one task; hand it, or why not, to `began`."""
@@ -107,7 +150,8 @@ class Tools:
             if params.name not in calls:
                 text, is_error = f"there is no tool {params.name[:100]!r}; the tools are {', '.join(calls)}", True
             else:
-                text, is_error = await self._call(calls[params.name][0], params.arguments or {})
+                call, arguments = context.request.scope[_ASKED]
+                text, is_error = await self._call(calls[params.name][0], arguments, call)
             return types.CallToolResult(content=[types.TextContent(type="text", text=text)], is_error=is_error)
 
         server = Server(
@@ -117,55 +161,98 @@ class Tools:
             on_list_tools=list_tools,
             on_call_tool=call_tool,
         )
-        return StreamableHTTPSessionManager(
-            server, json_response=True, stateless=True, max_request_body_size=self._most
-        )
+        return StreamableHTTPSessionManager(server, json_response=True, stateless=True, max_request_body_size=_MOST)
 
-    async def _call(self, path: str, arguments: dict[str, Any]) -> tuple[str, bool]:
+    async def _call(self, path: str, given: dict[str, Any], call: Call) -> tuple[str, bool]:
         """Return what a call answers, in short, and whether it is an error."""
-        given = dict(arguments)
         show, start = (_count(given.pop(name, default)) for name, default in (("show", SHOWN), ("start", 0)))
-        if show is None or start is None:
-            return "show and start are whole numbers, 0 or more", True
+        if show is None or start is None or show > _MOST_SHOWN:
+            return f"show and start are whole numbers, 0 or more, show at most {_MOST_SHOWN}", True
+        arguments: dict[str, Any] = {}
         for name in _parameters(path):
             found = given.pop(name, None)
             if not isinstance(found, str) or not found:
                 return f"{name} is missing: it is the id that the call which stored it answered with", True
-            path = path.replace(f"{{{name}}}", quote(found, safe=""))
+            arguments[name] = found
         if path == "/v1/solids":
             given = given.get("solid", given)
-        status, answer = await self._asked(path, orjson.dumps(given))
-        if status >= 400:
-            places = [f"{item['pointer']}: {item['detail']}" for item in answer["errors"] if item["pointer"]]
-            return "\n".join([f"{answer['code']}: {answer['detail']}", *places[:5]]), True
-        return orjson.dumps(summary(answer, show, start)).decode(), False
 
-    async def _asked(self, path: str, body: bytes) -> tuple[int, Any]:
-        """Ask this very service, without a socket."""
-        status, parts = 0, []
-        headers = [(b"content-type", JSON.encode()), (b"content-length", str(len(body)).encode())]
-        scope: Scope = {"type": "http", "method": "POST", "path": path, "raw_path": path.encode(), "root_path": ""}
-        scope.update(query_string=b"", headers=headers, app=self._app, scheme="http", http_version="1.1")
-        waiting: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
+        def shown(answer: Any) -> bytes:
+            return wire.encode(summary(answer, show, start, call.remaining))
 
-        async def receive() -> Message:
-            if waiting:
-                return waiting.pop()
-            await asyncio.Event().wait()
-            raise AssertionError("nobody sets it")
-
-        async def send(message: Message) -> None:
-            nonlocal status
-            status = message.get("status", status)
-            parts.append(message.get("body", b""))
-
-        await self._app.router(scope, receive, send)
-        return status, orjson.loads(b"".join(parts))
+        answer = await self._routes[path].ask(given, arguments, call, self._app.state, shown)
+        if isinstance(answer, bytes):
+            return answer.decode(), False
+        refused = orjson.loads(problem(answer).body)
+        places = [f"{item['pointer']}: {item['detail']}" for item in refused["errors"] if item["pointer"]]
+        return "\n".join([f"{refused['code']}: {refused['detail']}", *places[:5]]), True
 
 
-def add_tools(app: FastAPI, settings: Settings) -> Tools:
-    """Offer the tools at /mcp."""
-    tools = Tools(app, settings)
+def check_origin(headers: dict[bytes, bytes], settings: Settings) -> None:
+    """Raise `wrong_origin` if another site's page asks, through a browser of somebody who may.
+
+    A page's site stands in Origin. Where no key is asked for and only this machine may ask, Host must name it: a page
+    may have its site's name lead here, and then is of one origin with the service.
+    """
+    host, origin = (headers.get(name, b"").decode("latin-1").lower() for name in (b"host", b"origin"))
+    known = [each.lower() for each in settings.cors_origins]
+    name = _name_in(f"//{host}")
+    own = {settings.host.lower(), *map(_name_in, known)}
+    if not settings.api_keys and _is_loopback(settings.host) and not _is_loopback(name) and name not in own:
+        detail = f"the service does not know itself as {host[:100]!r}; ask it as localhost, or set GEOMETRY_API_KEYS, "
+        raise ServiceError("wrong_origin", detail + f"or https://{host[:100]} in GEOMETRY_CORS_ORIGINS")
+    if origin and "*" not in known and origin not in known and origin.partition("://")[2] != host:
+        detail = f"pages of {origin[:100]!r} may not ask; whoever runs the service may name it in GEOMETRY_CORS_ORIGINS"
+        raise ServiceError("wrong_origin", detail)
+
+
+def _name_in(address: str) -> str:
+    with suppress(ValueError):
+        return urlsplit(address).hostname or ""
+    return ""
+
+
+def _is_loopback(name: str) -> bool:
+    with suppress(ValueError):
+        return ip_address(name).is_loopback
+    return name == "localhost"
+
+
+def _parted(text: Body, call: Call) -> tuple[bytes, dict[str, Any]]:
+    """Return a request of the protocol as the library reads it, without the arguments of a tool, and these."""
+    call.remaining()  # it may have waited past its deadline
+    call.take(wire.cost_of(text))
+    message = wire.decode(text, call.remaining)
+    arguments: Any = {}
+    params = message.get("params") if isinstance(message, dict) else None
+    if isinstance(params, dict) and message.get("method") == "tools/call":
+        arguments = params.pop("arguments", None) or {}
+        if isinstance(arguments, dict):
+            params["arguments"] = {}
+            text = json.dumps(message).encode()
+        else:
+            params["arguments"], arguments = arguments, {}  # the library refuses it
+    if len(text) > _MOST_BESIDE:
+        raise ServiceError("body_too_large", f"a request holds {_MOST_BESIDE} bytes at most beside a tool's arguments")
+    return bytes(memoryview(text)), arguments
+
+
+def _replayed(text: bytes, gone: asyncio.Task[None]) -> Receive:
+    """Return what hands a body on, and then waits for the client to go away."""
+    waiting: list[Message] = [{"type": "http.request", "body": text, "more_body": False}]
+
+    async def receive() -> Message:
+        if waiting:
+            return waiting.pop()
+        await asyncio.wait([gone])
+        return {"type": "http.disconnect"}
+
+    return receive
+
+
+def add_tools(app: FastAPI, settings: Settings, routers: Iterable[APIRouter]) -> Tools:
+    """Offer the calls of these routers as tools at /mcp."""
+    tools = Tools(app, settings, routers)
     app.router.routes.append(Route(PATH, tools, methods=["POST"], include_in_schema=False))
     return tools
 
@@ -178,33 +265,6 @@ async def running(tools: Tools) -> AsyncIterator[None]:
     finally:
         with suppress(asyncio.CancelledError):
             await tools.close()
-
-
-def summary(answer: dict[str, Any], show: int, start: int) -> dict[str, Any]:
-    """Return an answer with each list as its length and some of its items.
-
-    >>> summary({"contained": [True, False, True], "accuracy": {"items": 3}}, 1, 0)
-    {'contained': {'count': 3, 'true': 2, 'items': [True]}, 'accuracy': {'items': 3}}
-    """
-    found = {}
-    for name, value in answer.items():
-        if isinstance(value, list):
-            told: dict[str, Any] = {"count": len(value)}
-            if value and all(isinstance(item, bool) for item in value):
-                told["true"] = sum(value)
-            value = {**told, "items": [_cut(item, max(show, 3)) for item in value[start : start + show]]}
-        found[name] = value
-    return found
-
-
-def _cut(value: Any, show: int) -> Any:
-    """Return a value of a list with its own lists cut short."""
-    if isinstance(value, dict):
-        return {name: _cut(item, show) for name, item in value.items()}
-    if isinstance(value, list):
-        items = [_cut(item, show) for item in value[:show]]
-        return items if len(value) <= show else {"count": len(value), "first": items}
-    return value
 
 
 def _count(value: Any) -> int | None:

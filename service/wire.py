@@ -12,7 +12,6 @@ whole in memory.
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
@@ -30,52 +29,82 @@ PART: Final = 20_000
 """Numbers encoded at once: half a millisecond."""
 SENT: Final = 2**17
 """Bytes sent at once, about: parts are put together up to that."""
-_COSTS: Final = {b"{": 1000, b"[": 100, b",": 32}
-"""Bytes that Python holds for an object and the model of it, a list, a number."""
+_REMEDIES: Final = {
+    "Detected duplicate key": "leave one of the two out",
+    "a name, text or number": "shorten it",
+    "the name": "shorten it",
+    "an object has": "send fewer",
+}
+Poll = Callable[[], object]
 _BOM: Final = b"\xef\xbb\xbf"
+
+
+def no_poll() -> None:
+    """Let the work go on."""
 
 
 class Series(NamedTuple):
     """A list of an answer whose items are made when they are written.
 
     make: returns the items from one index up to another. n: how many there are. weight: numbers in one, about; where
-    they differ, offsets (n + 1,) says how many stand before each.
+    they differ, offsets (n + 1,) says how many stand before each. least: bytes that all together take, at least.
     """
 
     n: int
-    make: Callable[[int, int], list[Any]]
+    make: Callable[[int, int], Any]
     weight: int = 1
     offsets: Any = None
+    least: int = 0
 
-    def cuts(self) -> Iterator[tuple[int, int]]:
-        """Yield where parts begin and end."""
-        start = 0
-        while start < self.n:  # bound: each turn takes an item at least
+    def cuts(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, int]]:
+        """Yield where parts of the items from one up to another begin and end."""
+        end = self.n if stop is None else min(stop, self.n)
+        while start < end:  # bound: each turn takes an item at least
             stop = start + max(1, PART // self.weight)
             if self.offsets is not None:
                 most = np.searchsorted(self.offsets, self.offsets[start] + PART, "right") - 1
                 stop = min(stop, max(start + 1, int(most)))
-            yield start, min(stop, self.n)
+            yield start, min(stop, end)
             start = stop
 
     @property
     def is_long(self) -> bool:
         """Whether it is made in parts."""
-        n_numbers = self.n * self.weight if self.offsets is None else self.offsets[-1]
+        n_numbers = self.n * self.weight if self.offsets is None else self.offsets[-1] - self.offsets[0]
         return bool(max(self.n, n_numbers) > PART)
 
 
-def decode_fast(body: pieces.Body, take: Callable[[int], object] = lambda n: None) -> Any:
+class Raw(NamedTuple):
+    """A part of an answer that is JSON already."""
+
+    text: bytes
+
+
+def series_of(array: Any) -> Any:
+    """Return rows of numbers as they are written: in parts where they are many."""
+    return array if array.size <= PART else Series(len(array), lambda start, stop: array[start:stop], len(array[0]))
+
+
+def decode_fast(body: pieces.Body, take: Callable[[int], object] = lambda n: None, poll: Poll = no_poll) -> Any:
     """Return what `decode` returns, with ndarrays in the place of long arrays of numbers; None if there are none, or
     if anything about the body is not as it should be: then `decode` finds out what.
 
-    take: told how many bytes more that holds; what it raises ends the work.
+    take: told how many bytes more that holds, fewer again where it returns None; poll: called now and then. What they
+    raise ends the work.
     """
     if len(body) < arrays.LEAST:
         return None
+    taken = 0
+
+    def take_noted(n_bytes: int) -> None:
+        nonlocal taken
+        take(n_bytes)
+        taken += n_bytes
+
     try:
-        return arrays.decode(body, take)
+        return arrays.decode(body, take_noted, poll)
     except rings.Unfit:
+        take(-taken)
         return None
 
 
@@ -91,16 +120,8 @@ def decode(body: pieces.Body, poll: Callable[[], object] = lambda: None) -> Any:
 
 
 def cost_of(body: pieces.Body) -> int:
-    """Return how many bytes decoding holds at most beyond what is counted for each byte: short lists and objects take
-    far more than their text."""
-    if len(body) < arrays.LEAST:
-        return 0
-    counts = dict.fromkeys(_COSTS, 0)
-    for start in range(0, len(body), arrays.STEP):
-        part = body[start : start + arrays.STEP]
-        for mark in counts:
-            counts[mark] += part.count(mark)
-    return max(0, sum(cost * counts[mark] for mark, cost in _COSTS.items()) - 2 * len(body))
+    """Return how many bytes `decode` holds at most beyond what is counted for each byte; little is not counted."""
+    return 0 if len(body) < arrays.LEAST else pieces.cost_of(body)
 
 
 def _refusal(body: pieces.Body, found: str) -> str:
@@ -111,35 +132,35 @@ def _refusal(body: pieces.Body, found: str) -> str:
         return "the body begins with a byte order mark; send it as UTF-8 without one"
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "the body is UTF-16; send it as UTF-8"
-    what = "correct it there"
-    if found.startswith(("Detected duplicate key", "a name, text or number")):
-        what = "leave one of the two out" if found.startswith("D") else "shorten it"
+    what = next((what for begun, what in _REMEDIES.items() if found.startswith(begun)), "correct it there")
     return f"the body is no JSON that is taken here: {found:.200}; {what}"
 
 
-def encode(answer: Any) -> bytes:
+def encode(answer: Any, poll: Poll = no_poll) -> bytes:
     """Return an answer model as JSON; arrays may stand wherever the schema has lists."""
-    return b"".join(encoded(answer))
+    return b"".join(encoded(answer, poll))
 
 
-def encoded(answer: Any) -> Iterator[bytes]:
-    """Yield the JSON of an answer in parts, one where it is short."""
+def encoded(answer: Any, poll: Poll = no_poll) -> Iterator[bytes]:
+    """Yield the JSON of an answer in parts, one where it is short; poll: called between parts, also those of one item
+    that is long by itself."""
     if isinstance(answer, BaseModel) and any(map(_is_long, vars(answer).values())):
-        yield from _together(_pieces(answer))
+        yield from _together(_pieces(answer, poll))
+    elif isinstance(answer, Series):
+        yield from _together(_parts(answer, poll))
     else:
-        yield _dumps(answer)
+        yield _dumps(answer, poll)
 
 
-def _dumps(value: Any) -> bytes:
-    try:
-        return orjson.dumps(value, default=_plain, option=orjson.OPT_SERIALIZE_NUMPY)
-    except orjson.JSONEncodeError as error:
-        if "64-bit" not in str(error):
-            raise
-        plain = partial(
-            json.dumps, default=lambda item: item.tolist() if isinstance(item, np.ndarray) else _plain(item)
-        )
-        return str(plain(value)).encode()  # case: integers of any size, which layers pass through
+def least_of(answer: Any) -> int:
+    """Return how many bytes an answer takes at least, as far as that is known before it is made."""
+    items = vars(answer).values() if isinstance(answer, BaseModel) else ()
+    return sum(item.least for item in items if isinstance(item, Series))
+
+
+def _dumps(value: Any, poll: Poll = no_poll) -> bytes:
+    default = _plain if poll is no_poll else partial(_plain, poll=poll)
+    return orjson.dumps(value, default=default, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def _is_long(value: Any) -> bool:
@@ -162,17 +183,17 @@ def _together(pieces: Iterable[bytes | memoryview]) -> Iterator[bytes]:
         yield b"".join(kept)
 
 
-def _pieces(answer: BaseModel) -> Iterator[bytes | memoryview]:
+def _pieces(answer: BaseModel, poll: Poll) -> Iterator[bytes | memoryview]:
     lead = b"{"
     for name, item in vars(answer).items():
         if item is not None:
             yield lead + orjson.dumps(name) + b":"
-            yield from _parts(item) if _is_long(item) else (_dumps(item),)
+            yield from _parts(item, poll) if _is_long(item) else (_dumps(item, poll),)
             lead = b","
     yield b"}"
 
 
-def _parts(items: Any) -> Iterator[bytes | memoryview]:
+def _parts(items: Any, poll: Poll) -> Iterator[bytes | memoryview]:
     cuts: Iterable[tuple[int, int]]
     if isinstance(items, Series):
         cuts, make = items.cuts(), items.make
@@ -181,10 +202,11 @@ def _parts(items: Any) -> Iterator[bytes | memoryview]:
         make = lambda start, stop: items[start:stop]  # noqa: E731
     lead = b"["
     for start, stop in cuts:
+        poll()
         yield lead
-        yield memoryview(_dumps(make(start, stop)))[1:-1]
+        yield memoryview(_dumps(make(start, stop), poll))[1:-1]
         lead = b","
-    yield b"]"
+    yield b"]" if lead == b"," else b"[]"
 
 
 def octets(array: Any) -> memoryview:
@@ -209,17 +231,17 @@ def compressed(parts: Iterable[Any], coding: str) -> Iterator[bytes]:
     yield deflater.flush()
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, poll: Poll = no_poll) -> Any:
     if isinstance(value, BaseModel):
-        return {name: _in_parts(item) for name, item in vars(value).items() if item is not None}
+        return {name: _in_parts(item, poll) for name, item in vars(value).items() if item is not None}
     if isinstance(value, Series):
-        return value.make(0, value.n)
+        return _in_parts(value, poll) if value.is_long else value.make(0, value.n)
+    if isinstance(value, Raw):
+        return orjson.Fragment(value.text)
     if isinstance(value, np.ndarray):
         return np.ascontiguousarray(value) if value.size else value.tolist()
     raise TypeError(f"{type(value).__name__} has no place in an answer")
 
 
-def _in_parts(value: Any) -> Any:
-    if _is_long(value):
-        return orjson.Fragment(b"".join(_parts(value)))
-    return _plain(value) if isinstance(value, Series) else value
+def _in_parts(value: Any, poll: Poll) -> Any:
+    return orjson.Fragment(b"".join(_parts(value, poll))) if _is_long(value) else value

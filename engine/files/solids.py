@@ -11,7 +11,7 @@ import numpy as np
 
 from engine.errors import InvalidInputError
 from engine.files.meshes import FORMATS, read_mesh
-from engine.layers.features import polygon_of
+from engine.layers.geojson import polygon_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex

@@ -1,7 +1,8 @@
 """Layers: polygons with attributes, as maps have them; GeoDataFrames in and out, and GeoJSON for HTTP and files."""
 
-from engine.layers.features import FeatureRows, dissolve_features, locate_features, overlay_features, polygon_of
+from engine.layers.features import FeatureRows, dissolve_features, locate_features, overlay_features
 from engine.layers.frames import dissolve, overlay, sjoin
+from engine.layers.geojson import polygon_of
 
 __all__ = [
     "FeatureRows",

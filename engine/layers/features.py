@@ -1,8 +1,9 @@
 """Layers as GeoJSON (RFC 7946): FeatureCollections in, features out; what HTTP and the command line speak.
 
-What a feature holds beside its geometry goes through untouched: properties, id, the `crs`. A row that comes
-from features of both layers has the properties of both, names that both layers have with _1 and _2, as geopandas names
-them; `left` and `right` say which features these were.
+What a feature holds beside its geometry goes through untouched: properties, id, the `crs`. It is written as JSON once a
+feature (json_text.py), and rows are put together of these texts: how long an answer gets is known before it is made.
+A row that comes from features of both layers has the properties of both, names that both layers have with _1 and _2,
+as geopandas names them; `left` and `right` say which features these were.
 """
 
 from __future__ import annotations
@@ -10,45 +11,47 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
-from engine.budget import Cancel
-from engine.errors import (
-    EngineError,
-    InvalidArrayError,
-    InvalidInputError,
-    NotFiniteError,
-    RingTooShortError,
-    UnsupportedSolidError,
-    WrongDimensionError,
-)
-from engine.layers.rows import NONE, Layer, LayerRows, Limits, dissolved, held, layer_of, overlay_rows, with_alone
+from engine.arrays import FloatArray, IntArray, read_only
+from engine.budget import Cancel, polled
+from engine.errors import CancelledError, DeadlineExceededError, EngineError, InvalidInputError
+from engine.layers.geojson import checked_each, collection_of, polygons_of
+from engine.layers.json_text import text_of
+from engine.layers.members import crs_of, groups_of, members_of, texts_of
+from engine.layers.rows import NONE, LayerRows, Limits, dissolved, held, overlay_rows, with_alone
 from engine.parallel import check_options
-from engine.polygon_overlay.polygon_arrays import arrays_of
-from engine.polygon_overlay.union_all import union_all
-from engine.solids.checks import Where, as_points, shown
-from engine.solids.polygon import Polygon
+from engine.solids.checks import as_points, shown
+from engine.solids.ragged import summed
 from engine.types import Accuracy
 
-AREAS: Final = ("Polygon", "MultiPolygon")
 _CHECKED: Final = 1000
-"""Features read between two looks at the clock."""
+"""Features made at once."""
+_ROW: Final = 55
+"""Bytes of JSON of a row at least, without what is copied into it and its positions."""
+_POSITION: Final = 10
+"""Bytes of JSON of a position at least."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeatureRows:
-    """Features of an answer, made when asked for: ``len``, ``some(start, stop)``; and the collection's `crs`, if any.
+    """Features of an answer, made when asked for: ``len``, ``make(start, stop)``; and the collection's `crs`, if any.
 
     offsets: (n + 1,) how many vertices stand before each feature. collapsed: rows that rounding left nothing of.
+    As JSON: members(row) are those beside type and geometry, crs_text the `crs`, geometry(row) one that is passed
+    through; n_bytes: (n + 1,) bytes before each feature, at least.
+    areas: positions, and offsets of rings, of polygons and of rows, where the geometries are made; else None.
     """
 
-    make: Callable[[int, int], list[dict[str, Any]]]
+    members: Callable[[int], bytes]
     offsets: IntArray
-    crs: Any
+    n_bytes: IntArray
+    crs_text: bytes | None
+    areas: tuple[FloatArray, tuple[IntArray, IntArray, IntArray]] | None = None
+    geometry: Callable[[int], bytes] = lambda row: b"null"
     collapsed: int = 0
 
     def __len__(self) -> int:
@@ -58,17 +61,33 @@ class FeatureRows:
         for start in range(0, len(self), _CHECKED):
             yield from self.make(start, min(len(self), start + _CHECKED))
 
+    @property
+    def crs(self) -> Any:
+        """Return the member `crs` of the question."""
+        return None if self.crs_text is None else json.loads(self.crs_text)
+
+    def make(self, start: int, stop: int) -> list[dict[str, Any]]:
+        """Return the features from one up to another."""
+        return [
+            {"type": "Feature", **json.loads(b"{%b}" % self.members(row)), "geometry": self._geometry(row)}
+            for row in range(start, stop)
+        ]
+
+    def _geometry(self, row: int) -> Any:
+        if self.areas is None:
+            return json.loads(self.geometry(row))
+        positions, (rings, pieces, ends) = self.areas
+        parts = [
+            [positions[i:j] for i, j in pairwise(rings[first : last + 1].tolist())]
+            for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
+        ]
+        if not parts:
+            return None
+        kind, coordinates = ("Polygon", parts[0]) if len(parts) == 1 else ("MultiPolygon", parts)
+        return {"type": kind, "coordinates": coordinates}
+
 
 Answer = FeatureRows | tuple[FeatureRows, Accuracy]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Collection:
-    """A FeatureCollection whose features are of one kind: the features, their properties (empty for null)."""
-
-    features: list[dict[str, Any]]
-    properties: list[dict[str, Any]]
-    crs: Any
 
 
 def overlay_features(
@@ -87,14 +106,14 @@ def overlay_features(
     """
     check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
-    sides = [_collection(value, (name,)) for value, name in ((left, "left"), (right, "right"))]
-    crs = [side.crs for side in sides if side.crs is not None]
-    if len(crs) == 2 and _key(crs[0], "crs") != _key(crs[1], "crs"):
-        raise InvalidInputError("the crs of left and right differ; bring both layers into one", ("right", "crs"))
-    layers = [_layer(side, (name,), limits) for side, name in zip(sides, ("left", "right"))]
+    sides = [collection_of(value, (name,), limits) for value, name in ((left, "left"), (right, "right"))]
+    crs = crs_of(sides, limits)
+    told, n_bytes = members_of(sides, ("left", "right"), limits)
+    layers = [polygons_of(side, limits) for side in sides]
     rows = overlay_rows(layers[0], layers[1], how, limits)
-    told = _told(sides[0], sides[1], ("left", "right"))
-    made = _with_geometry(rows, lambda row: told(int(rows.left[row]), int(rows.right[row])), crs[0] if crs else None)
+    made = _with_areas(
+        rows, lambda row: told(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
+    )
     return (made, limits.accuracy) if report else made
 
 
@@ -112,19 +131,25 @@ def dissolve_features(
     """
     check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
-    side = _collection(layer, ("layer",))
+    side = collection_of(layer, ("layer",), limits)
+    crs = crs_of([side], limits)
     names = _checked_names(by)
-    keys = [_key([each.get(name) for name in names], "by") for each in side.properties]
-    order = {key: k for k, key in enumerate(dict.fromkeys(keys if names else ["[]"]))}
-    groups = np.array([order[key] for key in keys], np.int64)
-    rows = dissolved(_layer(side, ("layer",), limits), groups, len(order), limits)
+    checked = texts_of(side, side.properties, "properties", limits)  # none may be what JSON cannot hold
+    limits.budget().take(-sum(map(len, checked)))
+    del checked
+    groups, values = groups_of(side, names, limits)
+    rows = dissolved(polygons_of(side, limits), groups, len(values), limits)
     counts = np.bincount(groups, minlength=len(rows)).tolist()
-    values = [json.loads(key) for key in order]
+    texts = [b"%b:null" % text_of(name) for name in names]
 
-    def told(row: int) -> dict[str, Any]:
-        return {"properties": {**dict(zip(names, values[row])), "count": counts[row]}}
+    def told(row: int) -> bytes:
+        own = texts.copy()
+        for place, value in values[row].items():
+            own[place] = own[place][:-4] + value
+        return b'"properties":{%b}' % b",".join([*own, b'"count":%d' % counts[row]])
 
-    made = _with_geometry(rows, told, side.crs)
+    lengths = [sum(len(value) - 4 for value in each.values()) for each in polled(values)]
+    made = _with_areas(rows, told, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
     return (made, limits.accuracy) if report else made
 
 
@@ -134,7 +159,7 @@ def _checked_names(by: Any) -> list[str]:
         raise InvalidInputError(f"by must be a list of names of properties, got {shown(by)}", ("by",))
     if "count" in names:
         raise InvalidInputError("count is how many features were united; give that property another name", ("by",))
-    return list(names)
+    return list(dict.fromkeys(names))
 
 
 def locate_features(
@@ -150,224 +175,39 @@ def locate_features(
     both; outside: also a row for a point that nothing holds."""
     check_options(None, None, report=report, outside=outside)
     limits = Limits(deadline, cancel)
-    sides = _collection(points, ("points",), ("Point",)), _collection(polygons, ("polygons",))
+    sides = [collection_of(points, ("points",), limits, ("Point",)), collection_of(polygons, ("polygons",), limits)]
+    crs = crs_of(sides[:1], limits)
     there = [k for k, each in enumerate(sides[0].features) if each.get("geometry") is not None]
     places = [sides[0].features[k]["geometry"].get("coordinates") for k in there]
-    try:
-        positions = as_points(places, 2, ("points",))
-    except EngineError:
-        positions = _named(there, sides[0], ("points",), lambda each: as_points([each["coordinates"]], 2)[0])
-    layer = _layer(sides[1], ("polygons",), limits)
+    with limits.budget():
+        try:
+            positions = as_points(places, 2, ("points",))
+        except (DeadlineExceededError, CancelledError):
+            raise
+        except EngineError:
+            positions = checked_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
+    geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
+    told, n_bytes = members_of(sides, ("point", "polygon"), limits)
+    layer = polygons_of(sides[1], limits)
     first, second, on_boundary = held(positions, layer, limits)
     first = np.array(there, np.int64)[first]
     if outside:
         first, second, on_boundary = with_alone(len(sides[0].features), first, second, on_boundary)
-    told = _told(*sides, ("point", "polygon"))
 
-    def some(start: int, stop: int) -> list[dict[str, Any]]:
-        found = []
-        for one, other, boundary in zip(*(each[start:stop].tolist() for each in (first, second, on_boundary))):
-            more = {"boundary": bool(boundary)} if other != NONE else {}
-            row = {"type": "Feature", **told(one, other), **more, "geometry": sides[0].features[one].get("geometry")}
-            found.append(row)
-        return found
+    def members(row: int) -> bytes:
+        more = (b',"boundary":false', b',"boundary":true')[int(on_boundary[row])] if second[row] != NONE else b""
+        return told(int(first[row]), int(second[row])) + more
 
-    made = FeatureRows(some, 10 * np.arange(len(first) + 1), sides[0].crs)
+    sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
+    offsets, n_bytes_before = read_only(np.arange(len(first) + 1)), summed(_ROW + sizes)
+    made = FeatureRows(members, offsets, n_bytes_before, crs, geometry=lambda row: geometries[first[row]])
     return (made, limits.accuracy) if report else made
 
 
-def _told(left: _Collection, right: _Collection, names: tuple[str, str]) -> Callable[[int, int], dict[str, Any]]:
-    """Return what makes the members beside type and geometry of a row from both features' numbers, -1 for none."""
-    columns = [{*chain.from_iterable(side.properties)} for side in (left, right)]
-    shared = columns[0] & columns[1]
-    made = [name + end * (name in shared) for column, end in zip(columns, ("_1", "_2")) for name in column]
-    if len({*made}) < len(made):
-        twice = min(name for name in made if made.count(name) > 1)
-        raise InvalidInputError(
-            f"two properties would be named {twice!r}, as names that both layers have get _1 and _2; rename one", ()
-        )
-
-    def renamed(side: _Collection, suffix: str) -> list[dict[str, Any]]:
-        if not shared:
-            return side.properties
-        return [{name + suffix * (name in shared): value for name, value in each.items()} for each in side.properties]
-
-    sides = (left, renamed(left, "_1")), (right, renamed(right, "_2"))
-
-    def told(*numbers: int) -> dict[str, Any]:
-        properties: dict[str, Any] = {}
-        sources: dict[str, Any] = {}
-        for name, number, (side, texts) in zip(names, numbers, sides):
-            if number != NONE:
-                properties |= texts[number]
-                sources[name] = {"index": number, **_id_of(side.features[number])}
-        alone = next(iter(sources.values())) if len(sources) == 1 else {}
-        return {**_id_of(alone), "properties": properties, **sources}
-
-    return told
-
-
-def _id_of(feature: dict[str, Any]) -> dict[str, Any]:
-    return {"id": feature["id"]} if "id" in feature else {}
-
-
-def _with_geometry(rows: LayerRows, told: Callable[[int], dict[str, Any]], crs: Any) -> FeatureRows:
-    """Return features of rows: told gives their other members."""
+def _with_areas(rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None) -> FeatureRows:
+    """Return features of rows: n_bytes says of each how long its members beside the geometry are at least."""
     positions, (rings, pieces, ends) = rows.ragged
-
-    def some(start: int, stop: int) -> list[dict[str, Any]]:
-        found = []
-        for row in range(start, stop):
-            parts = [
-                [positions[i:j] for i, j in pairwise(rings[first : last + 1].tolist())]
-                for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
-            ]
-            geometry: dict[str, Any] | None = None
-            if parts:
-                kind, coordinates = ("Polygon", parts[0]) if len(parts) == 1 else ("MultiPolygon", parts)
-                geometry = {"type": kind, "coordinates": coordinates}
-            found.append({"type": "Feature", **told(row), "geometry": geometry})
-        return found
-
-    return FeatureRows(some, rings[pieces[ends]], crs, rows.n_collapsed)
-
-
-def _collection(value: Any, where: Where, kinds: tuple[str, ...] = AREAS) -> _Collection:
-    """Return a FeatureCollection whose features are of these kinds, or have null as geometry; coordinates unchecked."""
-    features = value.get("features") if _type_of(value) == "FeatureCollection" else None
-    if not isinstance(features, list):
-        raise InvalidInputError(f"{where[0]} must be a GeoJSON FeatureCollection, got {shown(value)}", where)
-    for number, feature in enumerate(features):
-        if _type_of(feature) != "Feature":
-            raise InvalidInputError(f"{where[0]}.features[{number}] is no Feature", (*where, "features", number))
-        geometry, properties = feature.get("geometry"), feature.get("properties")
-        if geometry is not None and (kind := _type_of(geometry)) not in kinds:
-            got = kind or shown(geometry)
-            raise _refused(UnsupportedSolidError, feature, number, where, f"is {got:.60}, not {' or '.join(kinds)}")
-        if properties is not None and not (
-            isinstance(properties, dict) and all(isinstance(name, str) for name in properties)
-        ):
-            what = "has properties that are no object whose names are text"
-            raise _refused(InvalidInputError, feature, number, where, what)
-    properties_of = [feature.get("properties") or {} for feature in features]
-    try:
-        json.dumps(properties_of, allow_nan=False, default=_listed)
-    except (ValueError, TypeError):
-        for number, each in enumerate(properties_of):
-            try:
-                json.dumps(each, allow_nan=False, default=_listed)
-            except ValueError:
-                what = "has a property that is infinite or NaN, which JSON cannot hold"
-                raise _refused(NotFiniteError, features[number], number, where, what) from None
-            except TypeError as error:
-                what = f"has a property that JSON cannot hold: {error}"
-                raise _refused(InvalidInputError, features[number], number, where, what) from None
-    return _Collection(features, properties_of, value.get("crs"))
-
-
-def _type_of(value: Any) -> str:
-    """Return the member `type` of a GeoJSON object; nothing if it has none."""
-    kind = value.get("type") if isinstance(value, dict) else None
-    return kind if isinstance(kind, str) else ""
-
-
-def _key(value: Any, name: str) -> str:
-    """Return a text that is one for equal JSON values."""
-    try:
-        return json.dumps(value, sort_keys=True, default=_listed)
-    except TypeError as error:
-        raise InvalidInputError(f"{name} compares a value that JSON cannot hold: {error}", (name,)) from None
-
-
-def _listed(value: Any) -> Any:
-    """Return a list of numbers that was read as an array."""
-    if not isinstance(value, (np.ndarray, np.generic)):
-        raise TypeError(f"it is of type {type(value).__name__}")
-    return value.tolist()
-
-
-def _refused(
-    kind: Callable[[str, Where], EngineError], feature: dict[str, Any], number: int, where: Where, what: str
-) -> EngineError:
-    """Return an error that names a feature by its number and id."""
-    named = f" (id {shown(feature['id'])})" if "id" in feature else ""
-    return kind(f"{where[0]}.features[{number}]{named} {what}", (*where, "features", number))
-
-
-def _layer(side: _Collection, where: Where, limits: Limits) -> Layer:
-    """Return the polygons of a collection."""
-    rings: list[Any] = []
-    part_sizes: list[int] = []
-    there = [k for k, feature in enumerate(side.features) if feature.get("geometry") is not None]
-    is_missing = np.ones(len(side.features), np.bool_)
-    is_missing[there] = False
-    try:
-        counts = np.zeros(len(side.features), np.int64)
-        with limits.budget() as budget:
-            for place, number in enumerate(there):
-                if place % _CHECKED == 0:
-                    budget.check()
-                geometry = side.features[number]["geometry"]
-                parts = geometry["coordinates"]
-                parts = [parts] if geometry["type"] == "Polygon" and len(parts) else parts
-                counts[number] = len(parts)
-                for part in parts:
-                    part_sizes.append(len(part))
-                    rings.extend(part)
-            budget.check()
-        positions = _positions(rings)
-        offsets = (np.cumsum([0, *each]) for each in (map(len, rings), part_sizes))
-        arrays = arrays_of(positions, *offsets)
-    except (EngineError, TypeError, ValueError, KeyError) as error:
-        if isinstance(error, EngineError) and error.code in ("deadline_exceeded", "cancelled"):
-            raise
-        _named(there, side, where, _check_rings)
-        raise
-    return layer_of(arrays, np.append(0, np.cumsum(counts)), is_missing, limits)
-
-
-def _positions(rings: list[Any]) -> FloatArray:
-    """Return the positions of rings, lists or arrays, one after another."""
-    if not any(isinstance(ring, np.ndarray) for ring in rings):
-        return as_points(list(chain.from_iterable(rings)), 2)
-    return np.concatenate([as_points(ring, 2) for ring in rings])
-
-
-def _check_rings(geometry: dict[str, Any]) -> None:
-    """Raise for the first fault of the coordinates of a Polygon or MultiPolygon."""
-    coordinates = geometry["coordinates"]
-    for part in [coordinates] if geometry["type"] == "Polygon" else coordinates:
-        for ring in part:
-            if len(as_points(ring, 2, ("its ring",))) == 1:
-                raise RingTooShortError("a ring of one position; a ring needs 3", ())
-
-
-def _named(there: list[int], side: _Collection, where: Where, check: Callable[[dict[str, Any]], Any]) -> Any:
-    """Check geometries one by one; raise for the first at fault, naming its feature; else return all made."""
-    made = []
-    for number in there:
-        feature = side.features[number]
-        try:
-            made.append(check(feature["geometry"]))
-            continue
-        except WrongDimensionError:
-            kind, what = (
-                WrongDimensionError,
-                "has positions of other than two numbers; layers are plane: leave the z out",
-            )
-        except EngineError as error:
-            kind, what = type(error), f"is wrong: {error.message}"  # type: ignore[assignment]
-        except (KeyError, TypeError, ValueError):
-            kind, what = InvalidArrayError, "has coordinates that are no lists of positions"  # type: ignore[assignment]
-        raise _refused(kind, feature, number, where, what)
-    return np.array(made)
-
-
-def polygon_of(geometry: Any) -> Polygon:
-    """Return a GeoJSON Polygon or MultiPolygon as one polygon, parts that overlap united."""
-    feature = {"type": "Feature", "geometry": geometry}
-    side = _collection({"type": "FeatureCollection", "features": [feature]}, ("geometry",))
-    return _layer(side, ("geometry",), Limits(None, None)).arrays.polygon(0)
-
-
-Polygon.geojson = polygon_of, lambda polygon: union_all([polygon]).__geo_interface__
+    offsets = rings[pieces[ends]]
+    n_bytes = summed(_ROW + n_bytes) + _POSITION * offsets
+    areas = positions, (rings, pieces, ends)
+    return FeatureRows(members, offsets, n_bytes, crs, areas, collapsed=rows.n_collapsed)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.budget import poll
+from engine.budget import poll, polled
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
 
 Where = tuple[str | int, ...]
@@ -188,7 +188,7 @@ def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -
     for level in range(1, depth):
         rows = [item.tolist() if isinstance(item, np.ndarray) else item for item in items]
         n_columns = len(rows[0]) if rows and isinstance(rows[0], (list, tuple)) else 0
-        for i_row, row in enumerate(rows):
+        for i_row, row in enumerate(polled(rows)):
             if not isinstance(row, (list, tuple)):
                 path = _path(i_row, shape, where)
                 raise InvalidArrayError(f"{spell(path)} must be a list, got {_kind(row)}", path)
@@ -198,10 +198,13 @@ def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -
                 kind = WrongDimensionError if mixed else InvalidArrayError
                 raise kind(f"{spell(path)} has {len(row)} items where those before it have {n_columns}", path)
         shape.append(n_columns)
-        items = [item for row in rows for item in row]
-    if not set(map(type, items)) <= {float}:
-        items = [as_number(item, _path(i_item, shape, where)) for i_item, item in enumerate(items)]
-    result = np.array(items, np.float64).reshape(shape)
+        items = [item for row in polled(rows) for item in row]
+    for i_item, item in enumerate(polled(items)):
+        is_plain = math.isfinite(item) if type(item) is float else type(item) is int and abs(item) <= _FLOAT_INTEGERS
+        if not is_plain:  # to name its place takes a thousand times as long
+            items[i_item] = as_number(item, _path(i_item, shape, where))
+    starts = range(0, max(1, len(items)), _AT_ONCE)
+    result = np.concatenate([np.array(items[first : first + _AT_ONCE], np.float64) for first in starts]).reshape(shape)
     check_finite(result, where)
     return result
 

@@ -10,6 +10,7 @@ import numpy as np
 
 import engine
 from engine import Solid
+from service import wire
 from service.schemas import (
     bounds,
     clearance,
@@ -23,26 +24,62 @@ from service.schemas import (
     solids,
 )
 from service.schemas.problem import Accuracy
-from service.wire import Series
+from service.wire import PART, Series, series_of
 from service.work import Call
 
 _FREE_AREA: Final = 100
 """Vertices of an overlay up to which its area takes no longer than the rest of the answer."""
 _SHORT: Final = 12
-"""Vertices of a ring up to which lists are written faster than an array."""
+"""Vertices of a ring up to which lists are written faster than an array, and rings that are made at once."""
+_NUMBER_BYTES: Final = 10
+"""Bytes of text that are made and written about as fast as a number."""
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
 
 
 def from_features(found: Any, accuracy: engine.Accuracy, call: Call) -> layers.LayersResponse:
     """Return an answer about layers, as GeoJSON."""
     call.media_type = "application/geo+json"
+    call.instead = "send fewer features at once, or fewer or shorter properties"
+
+    def features(start: int, stop: int) -> list[Any]:
+        return [
+            wire.Raw(b'{"type":"Feature",%b,"geometry":%b}' % (found.members(row), _geometry(found, row, call)))
+            for row in range(start, stop)
+        ]
+
+    n_bytes = found.n_bytes
     return layers.LayersResponse.made(
         type="FeatureCollection",
-        crs=found.crs,
-        features=Series(len(found), found.make, weight=10, offsets=found.offsets),
+        crs=None if found.crs_text is None else wire.Raw(found.crs_text),
+        features=Series(len(found), features, weight=10, offsets=n_bytes // _NUMBER_BYTES, least=int(n_bytes[-1])),
         collapsed=found.collapsed,
         accuracy=from_accuracy(accuracy),
     )
+
+
+def _geometry(found: Any, row: int, call: Call) -> bytes:
+    """Return the geometry of a feature, however many parts and rings it has."""
+    if found.areas is None:
+        return bytes(found.geometry(row))
+    positions, (rings, pieces, ends) = found.areas
+    first, last = ends[row : row + 2].tolist()
+
+    def some_rings(start: int, stop: int) -> list[Any]:
+        return _rings(positions, rings[start : stop + 1])
+
+    def polygon(piece: int) -> Any:
+        start, stop = pieces[piece : piece + 2].tolist()
+        if stop - start <= _SHORT:
+            return some_rings(start, stop)
+        return Series(stop - start, lambda i, j: some_rings(start + i, start + j), 10, rings[start : stop + 1])
+
+    if first == last:
+        return b"null"
+    if last == first + 1:
+        return b'{"type":"Polygon","coordinates":%b}' % wire.encode(polygon(first), call.remaining)
+    offsets = rings[pieces[first : last + 1]]
+    parts = Series(last - first, lambda i, j: [polygon(piece) for piece in range(first + i, first + j)], 10, offsets)
+    return b'{"type":"MultiPolygon","coordinates":%b}' % wire.encode(parts, call.remaining)
 
 
 def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
@@ -213,10 +250,21 @@ def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> over
 
 
 def _overlay_pieces(result: engine.Overlay | engine.OverlayBatch, start: int, stop: int) -> list[Any]:
-    """Return some pieces of an overlay, or of many, as they are written."""
+    """Return some pieces of an overlay, or of many, as they are written; many holes of one are made in parts."""
     ends = result.piece_offsets[start : stop + 1].tolist()
-    rings = _rings(result.vertices, result.ring_offsets[ends[0] : ends[-1] + 1], is_closed=True)
-    return [{"shell": rings[i], "holes": rings[i + 1 : j]} for i, j in pairwise(end - ends[0] for end in ends)]
+    if ends[-1] - ends[0] <= PART:
+        rings = _rings(result.vertices, result.ring_offsets[ends[0] : ends[-1] + 1], is_closed=True)
+        return [{"shell": rings[i], "holes": rings[i + 1 : j]} for i, j in pairwise(end - ends[0] for end in ends)]
+
+    def some(first: int, last: int) -> list[Any]:
+        return _rings(result.vertices, result.ring_offsets[first : last + 1], is_closed=True)
+
+    def piece(first: int, last: int) -> dict[str, Any]:
+        holes = Series(last - first - 1, lambda i, j: some(first + 1 + i, first + 1 + j), 10)
+        holes = holes._replace(offsets=result.ring_offsets[first + 1 : last + 1])
+        return {"shell": some(first, first + 1)[0], "holes": holes}
+
+    return [piece(first, last) for first, last in pairwise(ends)]
 
 
 def _rings(vertices: Any, offsets: Any, is_closed: bool = False) -> list[Any]:
@@ -229,8 +277,8 @@ def _rings(vertices: Any, offsets: Any, is_closed: bool = False) -> list[Any]:
         positions = vertices.tolist()
         return [positions[i:j] + positions[i : i + is_closed] for i, j in pairwise(ends)]
     if is_closed:
-        return [np.concatenate([vertices[i:j], vertices[i : i + 1]]) for i, j in pairwise(ends)]
-    return [vertices[i:j] for i, j in pairwise(ends)]
+        return [series_of(np.concatenate([vertices[i:j], vertices[i : i + 1]])) for i, j in pairwise(ends)]
+    return [series_of(vertices[i:j]) for i, j in pairwise(ends)]
 
 
 def _area(nearest: Callable[[], float]) -> float | None:

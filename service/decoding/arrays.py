@@ -27,21 +27,26 @@ _MARK: Final = -(10**18)
 """Stands for the first array in the rest of the text; the others follow downwards."""
 
 
-def decode(body: Body, take: Callable[[int], object] = lambda n: None) -> Any:
+def decode(
+    body: Body, take: Callable[[int], object] = lambda n: None, poll: Callable[[], object] = lambda: None
+) -> Any:
     """Return the value of the JSON text `body`, its long arrays of numbers as ndarrays (int64 or float64).
 
-    take: told how many bytes are held beyond what is counted for each byte of the body; what it raises ends the work.
+    take: told how many bytes are held beyond what is counted for each byte of the body. poll: called now and then.
+    What they raise ends the work.
     """
     rest, arrays, end = [], [], 0
-    for start, stop in _sections(body):
-        with memoryview(body)[start:stop] as text:
-            arrays.append(Decoder(take).array(text))
+    for start, stop in _sections(body, poll):
+        with memoryview(body)[start:stop] as part:
+            arrays.append(Decoder(take, poll).array(part))
         rest += [body[end:start], str(_MARK - len(arrays)).encode()]
         end = stop
     if not arrays:
         raise Unfit
+    text = b"".join([*rest, body[end:]])
+    take(pieces.cost_of(text))
     try:
-        document = pieces.decode(b"".join([*rest, body[end:]]))
+        document = pieces.decode(text, poll)
     except pieces.NotJson:
         raise Unfit from None
     waiting = {_MARK - i_array: array for i_array, array in enumerate(arrays, 1)}
@@ -51,12 +56,14 @@ def decode(body: Body, take: Callable[[int], object] = lambda n: None) -> Any:
     return document
 
 
-def _sections(body: Body) -> list[tuple[int, int]]:
+def _sections(body: Body, poll: Callable[[], object]) -> list[tuple[int, int]]:
     """Return start and stop of what is likely to be the value of a member and a long array of numbers."""
     found, n_quotes, most = [], 0, 8 * len(body) // LEAST
     quote = _find(body, b'"', 0, len(body))
     while quote >= 0:  # bound: each turn goes on to the next quote
         n_quotes += 1
+        if n_quotes % 1000 == 0:
+            poll()
         if n_quotes > most:
             return []  # mostly strings
         start, quote = quote + 1, _find(body, b'"', quote + 1, len(body))

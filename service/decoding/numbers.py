@@ -39,8 +39,8 @@ _NO_TOKENS: Final = bytes(set(range(256)) - set(b"[],"))
 class Decoder:
     """Turns the text of one array into an ndarray, or lists of them."""
 
-    def __init__(self, take: Callable[[int], object]) -> None:
-        self._take = take
+    def __init__(self, take: Callable[[int], object], poll: Callable[[], object]) -> None:
+        self._take, self._poll = take, poll
         self._parser = simdjson.Parser()
         self._numbers: Any = np.empty(0, np.int64)
         self._n_numbers = 0
@@ -59,27 +59,31 @@ class Decoder:
                 item = self.array(text[1:stop])
                 return [item] if isinstance(item, list) else item[None]
         try:
-            return Decoder(self._take)._uniform(text, depth, stop)
+            return Decoder(self._take, self._poll)._uniform(text, depth, stop)
         except Unfit:
             if depth < 3:
                 raise
-            return Decoder(self._take)._rings(text, depth, stop)
+            return Decoder(self._take, self._poll)._rings(text, depth, stop)
 
     def _uniform(self, text: memoryview, depth: int, stop: int) -> Any:
         shape: tuple[int, ...] = ()
         for start, end in _pieces(text, depth, stop):
+            self._poll()
             length, *rest = self._piece(b"".join((b"[", text[start:end], b"]")), depth, (stop - start) / (end - start))
             if shape and [*shape[1:]] != rest:
                 raise Unfit
             shape = (shape[0] + length if shape else length, *rest)
             self._ends.append((end, self._n_numbers))
-        if not shape or self._n_numbers != prod(shape):  # case: brackets and commas of [] are those of [1]
+        if (
+            0 in shape or not shape or self._n_numbers != prod(shape)
+        ):  # case: brackets and commas of [] are those of [1]
             raise Unfit
         return self._checked(text, depth).reshape(shape)
 
     def _rings(self, text: memoryview, depth: int, stop: int) -> Any:
         dimensions, groups = set(), []
         for start, end in _pieces(text, depth, stop):
+            self._poll()
             piece, n_before = b"".join((b"[", text[start:end], b"]")), self._n_numbers
             dimension, lengths = rings.lengths_of(piece.translate(None, _NO_TOKENS), depth)
             try:

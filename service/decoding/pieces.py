@@ -5,7 +5,8 @@ before commas that stand outside strings. A piece is made whole by the brackets 
 and parsed; what it adds goes into the lists and objects that are open still. So ``{"a":[1,2],"b":[3,4]}``, cut before
 its second comma, is read as ``{"a":[1,2]}`` and ``{MARK:0,"b":[3,4]}``.
 
-One name, text or number is never cut, and refused beyond `LONGEST`.
+One name, text or number is never cut, and refused beyond `LONGEST`; so are objects of more than `NAMES` names, and
+names of more than `LONGEST_NAME` characters.
 """
 
 from __future__ import annotations
@@ -26,6 +27,19 @@ PIECE: Final = 2**16
 LONGEST: Final = 2**20
 """Bytes that may follow each other without a comma outside strings."""
 
+NAMES: Final = 4096
+"""Names in one object: more than a table has columns (PostgreSQL takes 1,600, SQLite 2,000), and so few that whatever
+looks at all of them at once is done in a millisecond."""
+LONGEST_NAME: Final = 1024
+"""Characters of a name: databases take 64 to 128, and each feature of an answer repeats the names of its properties."""
+_COSTS: Final = {b"{": 800, b"[": 100, b":": 64, b",": 32, b'"': 16}
+"""Bytes that Python holds for an object and the model of it, a list, a name's place, a number; for a text, of two
+quotes, beside its letters."""
+_STEP: Final = 2**20
+"""Bytes searched at once: some milliseconds."""
+_FREED: Final = 2**12
+"""Items freed at once: some tenths of a millisecond."""
+_FLAT: Final = frozenset({str, int, float, bool, type(None)})
 _PLACE: Final = re.compile(r"(.*) at line (\d+) column (\d+)", re.DOTALL)
 _MARK: Final = secrets.token_hex(16)
 """The name, within a piece, of what an earlier piece began: none that a body could have by intent."""
@@ -54,6 +68,37 @@ def decode(text: Body, poll: Callable[[], object] = lambda: None) -> Any:
         poll()
 
 
+def cost_of(text: Body) -> int:
+    """Return how many bytes decoding holds at most beyond what is counted for each byte: short lists and objects take
+    far more than their text."""
+    counts = dict.fromkeys(_COSTS, 0)
+    for start in range(0, len(text), _STEP):
+        part = text[start : start + _STEP]
+        for mark in counts:
+            counts[mark] += part.count(mark)
+    return max(0, sum(cost * counts[mark] for mark, cost in _COSTS.items()) - 2 * len(text))
+
+
+def let_go(value: Any) -> None:
+    """Empty a decoded value in steps: to free millions of lists or texts at once holds up all other threads."""
+    waiting = [value]
+    while waiting:  # bound: each container is emptied once
+        container = waiting.pop()
+        if isinstance(container, dict):
+            waiting += filter(_is_deep, container.values())
+            container.clear()
+        while isinstance(container, list) and container:  # bound: each turn takes an item at least
+            waiting += filter(_is_deep, container[-_FREED:])
+            del container[-_FREED:]
+
+
+def _is_deep(value: Any) -> bool:
+    """Tell whether there may be too much in a value to free it at once."""
+    if type(value) is list:
+        return len(value) > _FREED or not _FLAT.issuperset(map(type, value))
+    return type(value) is dict and not _FLAT.issuperset(map(type, value.values()))
+
+
 def _cut(text: Body, start: int) -> tuple[int, bytes]:
     """Return where a piece may end, before a comma or with the text, and the brackets in it outside strings."""
     size = PIECE
@@ -75,6 +120,24 @@ def _without_strings(piece: bytes) -> bytes:
     codes = np.frombuffer(piece.replace(rb"\\", b"__").replace(rb"\"", b"__"), np.uint8)
     inside = np.add.accumulate(codes == ord('"'), dtype=np.uint8) & 1  # 256 quotes are as even as none
     return (codes * (1 - inside)).tobytes()
+
+
+def _may_have_long_name(piece: bytes) -> bool:
+    """Tell whether more than `LONGEST_NAME` bytes follow each other without a quote; false only if no name is longer.
+
+    An escaped quote is none; nor is one after an escaped backslash, which makes this true more often.
+    """
+    if len(piece) <= LONGEST_NAME or b'"' not in piece:
+        return False
+    if b"\\" in piece:
+        piece = piece.replace(rb"\"", b"__")
+    start = 0
+    while start + LONGEST_NAME < len(piece):  # bound: each turn goes on by a byte at least
+        quote = piece.rfind(b'"', start, start + LONGEST_NAME + 1)
+        if quote < 0:
+            return True
+        start = quote + 1
+    return False
 
 
 class _Pieces:
@@ -113,9 +176,26 @@ class _Pieces:
         begun = b"".join(b"[" if bracket == ord("[") else b'{"%b":' % _MARK.encode() for bracket in self._brackets)
         begun += b"0" if begun else b""
         try:
-            return jiter.from_json(begun + piece + closing, cache_mode="keys", catch_duplicate_keys=True)
+            value = jiter.from_json(begun + piece + closing, cache_mode="keys", catch_duplicate_keys=True)
         except ValueError as error:
             raise self._wrong(str(error), piece, len(begun)) from None
+        if piece.count(b":") > NAMES or _may_have_long_name(piece):
+            self._check_names([value], piece)
+        return value
+
+    def _check_names(self, value: Any, piece: bytes) -> None:
+        """Raise if an object within a piece has too many names, or one that is too long; depth: at most 200."""
+        if isinstance(value, dict):
+            if len(value) > NAMES:
+                raise self._wrong(f"an object has more than {NAMES} names at line 1 column 1", piece, 0)
+            for name in value:
+                if len(name) > LONGEST_NAME:
+                    found = f"the name {name:.20}... has more than {LONGEST_NAME} letters at line 1 column 1"
+                    raise self._wrong(found, piece, 0)
+            value = value.values()
+        for item in value:
+            if isinstance(item, (dict, list)):
+                self._check_names(item, piece)
 
     def _joined(self, value: Any, piece: bytes) -> Any:
         """Put what a piece adds into what is open, and return the outermost; value: what the piece stands for."""
@@ -133,6 +213,8 @@ class _Pieces:
                     found = f"Detected duplicate key {min(twice)!r:.100} at line 1 column 1"
                     raise self._wrong(found, piece, 0)
                 container |= part
+                if len(container) > NAMES:
+                    raise self._wrong(f"an object has more than {NAMES} names at line 1 column 1", piece, 0)
             part = inner
         return self._open[0]
 

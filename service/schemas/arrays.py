@@ -29,6 +29,8 @@ MAX_ERRORS: Final = 20
 """Entries of `errors` in one answer: enough to see the pattern."""
 EXACT_INTEGERS: Final = 2**53
 """All integers up to this are float64 values; of those beyond only some are."""
+STEP: Final = 2**13
+"""Items of a list that are looked at at once."""
 SHORT: Final = 64
 """Numbers that Python checks sooner than numpy."""
 LIMIT: Final = "x-limit"
@@ -100,7 +102,26 @@ class Numbers:
         raise PydanticCustomError("numbers", "{detail}", {"detail": faults[0].detail, "faults": faults})
 
     def _decode(self, value: Any, call: Any) -> Any:
-        """Return `value` as an array, or None if anything about it is wrong; at C speed."""
+        """Return `value` as an array, or None if anything about it is wrong; a long list in steps, of which each holds
+        up other threads for a millisecond."""
+        if type(value) is not list or len(value) <= STEP or not self.axes or isinstance(value[0], np.ndarray):
+            return self._decode_few(value, call)
+        high = _limit(self.axes[0], call)
+        if high is not None and len(value) > high:
+            return None
+        parts = []
+        for start in range(0, len(value), STEP):
+            if call is not None:
+                call.remaining()
+            parts.append(self._decode_few(value[start : start + STEP], call, is_part=True))
+            if parts[-1] is None:
+                return None
+        if all(isinstance(part, np.ndarray) and part.shape[1:] == parts[0].shape[1:] for part in parts):
+            return np.concatenate(parts)
+        return value if self.ragged else None
+
+    def _decode_few(self, value: Any, call: Any, is_part: bool = False) -> Any:
+        """Do so at C speed; is_part: the list is a part of one that is long enough."""
         if not self.axes and type(value) is float and isfinite(value) and self.kind == "number":
             return value
         if isinstance(value, np.ndarray):
@@ -115,7 +136,7 @@ class Numbers:
             if not set(map(type, level)) <= {list}:
                 return None
             lengths = set(map(len, level))
-            low, high = axis.low, _limit(axis, call)
+            low, high = 0 if is_part and not shape else axis.low, _limit(axis, call)
             if any(length < low or (high is not None and length > high) for length in lengths):
                 return None
             is_ragged_axis = self.ragged and len(shape) == 1

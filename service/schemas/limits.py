@@ -39,9 +39,7 @@ class AtMost:
     def _validate(
         self, value: Any, handler: core_schema.ValidatorFunctionWrapHandler, info: core_schema.ValidationInfo
     ) -> Any:
-        if isinstance(value, np.ndarray):
-            value = list(value)
-        if not isinstance(value, list):
+        if not isinstance(value, (list, np.ndarray)):
             return handler(value)
         limit = None if info.context is None else getattr(info.context.settings, self.name)
         if limit is not None and len(value) > limit:
@@ -49,7 +47,7 @@ class AtMost:
         elif len(value) < self.low:
             fault = Fault((), "empty_geometry", f"the list holds {len(value)} items; at least {self.low} are needed")
         else:
-            return self._checked(value, handler)
+            return self._checked(list(value) if isinstance(value, np.ndarray) else value, handler)
         raise PydanticCustomError("numbers", "{detail}", {"detail": fault.detail, "faults": [fault]})
 
     def _checked(self, items: list[Any], handler: core_schema.ValidatorFunctionWrapHandler) -> list[Any]:

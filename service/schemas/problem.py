@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from service.schemas.arrays import Numbers
+from service.schemas.arrays import Fault, Numbers
 from service.schemas.limits import left_out
 
+_MOST_FIELDS: Final = 64
+"""Fields that are looked at one by one; no model has half as many."""
 Count = Annotated[int, Numbers(kind="integer", minimum=0)]
 
 
@@ -16,6 +19,17 @@ class Schema(BaseModel):
     """Base of all models: nothing is converted (``"1.5"`` and ``true`` are no numbers), unknown fields are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_few_fields(cls, value: Any) -> Any:
+        """Refuse a body of thousands of unknown fields at once: pydantic makes an error of each."""
+        if isinstance(value, dict) and len(value) > _MOST_FIELDS:
+            detail = f"the object has {len(value)} fields, most are not known here; /docs has an example"
+            raise PydanticCustomError(
+                "numbers", "{detail}", {"detail": detail, "faults": [Fault((), "unknown_field", detail)]}
+            )
+        return value
 
     @classmethod
     def made(cls, **fields: Any) -> Self:

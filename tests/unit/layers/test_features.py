@@ -267,3 +267,67 @@ def test_deadline_and_arrays() -> None:
         return json.dumps([*rows], default=lambda array: array.tolist())
 
     assert text(found) == text(expected)
+
+
+def test_groups_are_of_equal_values() -> None:
+    values: list[Any] = [1, 1.0, True, "1", 0.0, -0.0, None, 2**70, float(2**70), {"a": 1, "b": 2}, {"b": 2.0, "a": 1}]
+    given = collection([None] * (len(values) + 1))
+    for feature, value in zip(given["features"], values):  # the last has no such property, which is as null
+        feature["properties"] = {"k": value}
+    found: Any = dissolve_features(given, ["k", "absent"])
+    assert [row["properties"]["count"] for row in found] == [2, 1, 1, 2, 2, 2, 2]
+    assert {row["properties"]["absent"] for row in found} == {None}
+
+
+def test_many_names_take_no_longer_than_they_are_many() -> None:
+    """Each was looked for among all others: 30,000 took 25 s, and absent names were looked for in each feature."""
+    cells = [frozenset({(0, 0)})]
+    left, right = collection(cells), collection(cells)
+    left["features"][0]["properties"] = {**{f"n{k}": 0 for k in range(200_000)}, "a": 1, "a_1": 2}
+    right["features"][0]["properties"] = {"a": 1}
+    with pytest.raises(InvalidInputError, match="'a_1'"):
+        overlay_features(left, right, deadline=20.0)
+    whole: Any = dissolve_features(collection([None] * 20_000), [f"n{k}" for k in range(5_000)], deadline=20.0)
+    assert (len(whole), len(whole.make(0, 1)[0]["properties"])) == (1, 5_001)
+
+
+@pytest.mark.parametrize(
+    ("change", "path"),
+    [
+        (lambda f: f.update(id=math.nan), ("id",)),
+        (lambda f: f.update(id={"a": [1, -math.inf]}), ("id", "a", 1)),
+        (lambda f: f["properties"].update(a=[{}, {"b": math.inf}]), ("properties", "a", 1, "b")),
+    ],
+)
+def test_what_is_not_finite_is_named_where_it_stands(change: Any, path: tuple[Any, ...]) -> None:
+    with pytest.raises(NotFiniteError) as caught:
+        overlay_features(faulty(change), collection([]))
+    assert caught.value.where == ("left", "features", 1, *path)
+    for call in (lambda layer: overlay_features(layer, collection([])), dissolve_features):
+        with pytest.raises(NotFiniteError) as caught:
+            call({**collection([]), "crs": {"a": [math.nan]}})
+        assert caught.value.where[1:] == ("crs", "a", 0)
+
+
+def test_how_long_an_answer_is_is_known_before_it_is_made() -> None:
+    rng = np.random.default_rng(3)
+    left, right = collection(layer(rng, 12, SIZE), text="x" * 1000), collection(layer(rng, 9, SIZE), ä="é" * 99)
+    points = {
+        "type": "FeatureCollection",
+        "features": [
+            {"type": "Feature", "id": k, "geometry": {"type": "Point", "coordinates": [k, k], "more": "x" * 500}}
+            for k in range(9)
+        ],
+    }
+    answers: list[Any] = [overlay_features(left, right, how) for how in HOWS]
+    answers += [dissolve_features(left, ["n", "absent"]), dissolve_features(left)]
+    answers += [locate_features(points, right, outside=True)]
+    for answer in answers:
+        texts = [
+            len(json.dumps(row, separators=(",", ":"), ensure_ascii=False, default=lambda a: a.tolist()).encode())
+            for row in answer
+        ]
+        least = np.diff(answer.n_bytes)
+        assert len(least) == len(texts) > 0
+        assert (least <= texts).all()
+        assert sum(texts) < 3 * answer.n_bytes[-1]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 
+import httpx
 import pytest
 
 import engine
 from service.errors import ENGINE_STATUS, STATUS, ServiceError, faults_of, pointer, problem
+from tests.unit.service.asking import SPHERE, check_problem
 
 
 def tree(kind: type[engine.EngineError]) -> set[type[engine.EngineError]]:
@@ -44,3 +46,19 @@ def test_a_message_with_half_a_surrogate_pair_is_still_sent() -> None:
     assert (
         json.loads(problem([*faults_of(ServiceError("invalid_request", "\ud800", ("\ud800",)))]).body)["detail"] == "?"
     )
+
+
+@pytest.mark.anyio
+async def test_thousands_of_unknown_fields_are_one_fault(client: httpx.AsyncClient) -> None:
+    """An error was made of each, 60 MB of them held up everybody for 3.8 s and took 2 GB."""
+    for body in (
+        {"solid": SPHERE, "points": [], **{str(k): 0 for k in range(4000)}},
+        {"solid": {**SPHERE, **{str(k): 0 for k in range(4000)}}, "points": []},
+    ):
+        problem = check_problem(await client.post("/v1/contains", json=body), 422, "unknown_field")
+        assert len(problem["errors"]) == 1
+        assert "400" in problem["detail"]
+    few = {"solid": SPHERE, "points": [], **{str(k): 0 for k in range(30)}}
+    assert len(check_problem(await client.post("/v1/contains", json=few), 422, "unknown_field")["errors"]) == 20
+    more = {"solid": SPHERE, "points": [], **{str(k): 0 for k in range(5000)}}
+    assert "names" in check_problem(await client.post("/v1/contains", json=more), 400, "not_json")["detail"]

@@ -8,11 +8,13 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from fastapi import FastAPI
 
+from service.convert import answers
 from service.schemas.layers import LayersResponse
 from tests.unit.layers.cells import collection, layer, rows
 from tests.unit.layers.test_features import cells_of
-from tests.unit.service.asking import check_problem
+from tests.unit.service.asking import check_problem, client_of
 
 pytestmark = pytest.mark.anyio
 RNG = np.random.default_rng(1)
@@ -111,3 +113,100 @@ async def test_the_feature_at_fault_is_named(client: httpx.AsyncClient) -> None:
     problem = check_problem(answer, 422, "wrong_dimension")
     assert "layer.features[1] (id 'f1') has positions" in problem["detail"]
     assert problem["errors"][0]["pointer"] == "/layer/features/1"
+
+
+def small_squares(n: int) -> dict[str, Any]:
+    return collection([frozenset({(x % 50, x // 50)}) for x in range(n)])
+
+
+COPIED: dict[str, tuple[str, dict[str, Any]]] = {
+    "properties": (
+        "overlay",
+        {"left": collection([frozenset({(0, 0)})] * 2, t=["x" * 100_000] * 4), "right": small_squares(1)},
+    ),
+    "names": ("overlay", {"left": collection([None] * 3, **{"n" * 1000: 1}), "right": collection([])}),
+    "id": ("overlay", {"left": collection([None] * 3), "right": collection([])}),
+    "geometry": ("contains", {"polygons": small_squares(9)}),
+    "by": ("union", {"layer": collection([None] * 2000), "by": ["n"] + ["m" * 1000 + str(k) for k in range(30)]}),
+}
+COPIED["id"][1]["left"]["features"][1]["id"] = "x" * 90_000
+COPIED["geometry"][1]["points"] = {
+    "type": "FeatureCollection",
+    "features": [{"type": "Feature", "geometry": {"type": "Point", "coordinates": [1, 1], "bbox": "x" * 90_000}}] * 2,
+}
+
+
+@pytest.mark.parametrize("name", COPIED)
+async def test_what_rows_copy_is_counted_before_it_is_copied(
+    app: FastAPI, anyio_backend: str, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    path, question = COPIED[name]
+    question = {"operation": "union", **question} if path == "overlay" else question
+    async with client_of(app) as client:
+        whole = await client.post(f"/v1/layers/{path}", json=question)
+        assert whole.status_code == 200, whole.text
+        most = 9 * len(whole.content) // 10
+        if name == "names":
+            most = len(whole.content) // 2
+        app.state.settings = app.state.settings.model_copy(update={"max_answer_bytes": most})
+        monkeypatch.setattr(answers, "_geometry", None)  # no row may be made
+        detail = check_problem(await client.post(f"/v1/layers/{path}", json=question), 422, "answer_too_large")[
+            "detail"
+        ]
+        assert "fewer features" in detail
+        assert "shorter properties" in detail
+
+
+@pytest.mark.parametrize("big", [1, 2**70])
+@pytest.mark.parametrize(
+    ("path", "place", "member"),
+    [
+        ("overlay", "/left/features/0/id", "NaN"),
+        ("overlay", "/left/crs/a", "-Infinity"),
+        ("union", "/layer/features/0/properties/a/0", "1e400"),
+        ("contains", "/points/features/0/id", "Infinity"),
+    ],
+)
+async def test_what_is_no_json_does_not_leave(
+    client: httpx.AsyncClient, path: str, place: str, member: str, big: int
+) -> None:
+    base: dict[str, Any] = {
+        "overlay": {"left": small_squares(2), "right": small_squares(1), "operation": "union"},
+        "union": {"layer": small_squares(2)},
+        "contains": {"points": collection([]), "polygons": small_squares(1)},
+    }[path]
+    value: Any = base
+    for part in place.split("/")[1:2]:
+        value = value[part]
+    if path == "contains":
+        value["features"] = [{"type": "Feature", "geometry": {"type": "Point", "coordinates": [0, 0]}}]
+    value["features"][0]["properties"] = {"a": [0], "big": big}
+    value["crs"] = {"a": 0}
+    value["features"][0]["id"] = 0
+    inner = value
+    *parts, last = place.split("/")[2:]
+    for part in parts:
+        inner = inner[int(part) if isinstance(inner, list) else part]
+    inner[int(last) if isinstance(inner, list) else last] = "HERE"
+    text = json.dumps(base).replace('"HERE"', member)
+    answer = await client.post(f"/v1/layers/{path}", content=text, headers={"Content-Type": "application/json"})
+    assert check_problem(answer, 422, "not_finite")["errors"][0]["pointer"] == place
+
+
+async def test_one_feature_of_many_parts_and_rings(client: httpx.AsyncClient) -> None:
+    """It is written in parts, and reads as one."""
+    apart = collection([frozenset((3 * x, 3 * y) for x in range(90) for y in range(90))])
+    (feature,) = (await client.post("/v1/layers/union", json={"layer": apart})).json()["features"]
+    assert len(feature["geometry"]["coordinates"]) == 8100
+    assert cells_of({**feature["geometry"], "coordinates": feature["geometry"]["coordinates"][:3]})
+    ring = [[0, 0], [400, 0], [400, 400], [0, 400], [0, 0]]
+    holes = [[[x, y], [x, y + 1], [x + 1, y + 1], [x, y]] for x in range(1, 399, 4) for y in range(1, 399, 4)]
+    area = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring, *holes]}}
+    layer = {"type": "FeatureCollection", "features": [area]}
+    (feature,) = (await client.post("/v1/layers/union", json={"layer": layer})).json()["features"]
+    assert len(feature["geometry"]["coordinates"]) == 1 + len(holes)
+    assert [len(hole) for hole in feature["geometry"]["coordinates"][1:]] == [4] * len(holes)
+    region = {"type": "polygon", "rings": [ring[:-1], *holes]}
+    overlaid = await client.post("/v1/overlay", json={"subject": region, "clip": region, "operation": "union"})
+    (piece,) = overlaid.json()["pieces"]
+    assert len(piece["holes"]) == len(holes)

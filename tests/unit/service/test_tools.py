@@ -9,13 +9,19 @@ from typing import Any
 
 import anyio
 import httpx
+import numpy as np
 import pytest
 from fastapi import FastAPI
 
 from service import tools
 from service.app import create_app
+from service.convert.summaries import summary
+from service.errors import ServiceError
+from service.schemas.layers import LayersResponse
+from service.schemas.problem import Schema
 from service.settings import Settings
-from tests.unit.service.asking import SPHERE, check_problem, examples
+from service.wire import Raw, Series
+from tests.unit.service.asking import SPHERE, check_problem, client_of, examples
 from tests.unit.service.test_live import Service
 
 needs_mcp = pytest.mark.skipif(importlib.util.find_spec("mcp") is None, reason="the extra `mcp` is not installed")
@@ -102,7 +108,7 @@ def test_a_model_asks_about_a_stored_scene(service: Service) -> None:
 @pytest.mark.anyio
 async def test_tools_that_cannot_be_made_hold_nobody(client: httpx.AsyncClient, app: FastAPI) -> None:
     """Everybody who waits is answered, and the next one tries again."""
-    head = {"Accept": "application/json", "Content-Type": "application/json"}
+    head = {"Accept": "application/json", "Content-Type": "application/json", "Host": "localhost"}
     question = {"jsonrpc": "2.0", "id": 1, "method": "tools/list"}
     made = app.state.tools._made
     app.state.tools._made = lambda: {}["no such thing"]
@@ -158,9 +164,119 @@ async def test_where_the_library_is_absent(client: httpx.AsyncClient, monkeypatc
     assert (await client.get("/mcp")).status_code == 405
 
 
+LIST = {"jsonrpc": "2.0", "id": 1, "method": "tools/list"}
+HEAD = {"Accept": "application/json", "Content-Type": "application/json", "Host": "localhost"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "host", "origin", "may"),
+    [
+        ({}, "localhost:8000", None, True),
+        ({}, "127.0.0.1:8000", None, True),
+        ({}, "127.0.0.2", None, True),
+        ({}, "[::1]:8000", "http://[::1]:8000", True),
+        ({}, "LOCALHOST:8000", "http://localhost:8000", True),
+        ({}, "evil.example:8000", None, False),  # a name that was led to this machine
+        ({}, "evil.example:8000", "http://evil.example:8000", False),
+        ({}, "127.0.0.1.evil.example", None, False),
+        ({}, "localhost@evil.example", None, False),
+        ({}, "evil.example:bad", None, False),
+        ({}, "", None, False),
+        ({}, "localhost:8000", "http://evil.example", False),
+        ({}, "localhost:8000", "http://localhost:3000", False),
+        ({}, "localhost:8000", "null", False),
+        ({"cors_origins": ("https://maps.example",)}, "localhost:8000", "https://maps.example", True),
+        ({"cors_origins": ("https://maps.example",)}, "maps.example", "https://maps.example", True),
+        ({"cors_origins": ("https://maps.example",)}, "evil.example", None, False),
+        ({"host": "0.0.0.0"}, "geometry.example", None, True),  # open on purpose, under whatever name
+        ({"host": "0.0.0.0"}, "geometry.example", "https://evil.example", False),
+        ({"api_keys": ("k",)}, "geometry.example", None, True),
+    ],
+)
+def test_a_page_of_another_site_may_not_ask(settings: dict[str, Any], host: str, origin: str | None, may: bool) -> None:
+    headers = {b"host": host.encode(), **({} if origin is None else {b"origin": origin.encode()})}
+    if may:
+        tools.check_origin(headers, Settings(**settings))
+    else:
+        with pytest.raises(ServiceError) as caught:
+            tools.check_origin(headers, Settings(**settings))
+        assert caught.value.code == "wrong_origin"
+
+
+@needs_mcp
+@pytest.mark.anyio
+async def test_origin_and_host_of_a_request_are_looked_at(client: httpx.AsyncClient) -> None:
+    for more, status in (({}, 200), ({"Host": "evil.example"}, 403), ({"Origin": "https://evil.example"}, 403)):
+        answer = await client.post("/mcp", json=LIST, headers={**HEAD, **more})
+        assert answer.status_code == status, more
+
+
+@needs_mcp
+@pytest.mark.anyio
+async def test_requests_are_read_as_bodies_are(client: httpx.AsyncClient) -> None:
+    sphere = json.dumps(SPHERE)
+
+    async def ask(arguments: str, more: str = "") -> httpx.Response:
+        call = f'"params": {{"name": "contains", "arguments": {arguments}}}'
+        text = f'{{"jsonrpc": "2.0", "id": 1, "method": "tools/call", {call}{more}}}'
+        return await client.post("/mcp", content=text, headers=HEAD)
+
+    right = await ask(f'{{"solid": {sphere}, "points": [[0, 0, 0]]}}')
+    assert json.loads(right.json()["result"]["content"][0]["text"])["contained"]["items"] == [True]
+    twice = await ask(f'{{"solid": {sphere}, "points": [[0, 0, 0]], "points": []}}')
+    assert "duplicate" in check_problem(twice, 400, "not_json")["detail"]
+    names = ",".join(f'"{k}": 0' for k in range(5000))
+    check_problem(await ask(f"{{{names}}}"), 400, "not_json")
+    check_problem(await ask("{}", f', "x": {json.dumps(["y" * 90_000])}'), 413, "body_too_large")
+    check_problem(await ask(json.dumps(["y" * 2**21])), 413, "body_too_large")
+    (text,) = (await ask('{"solid": {"type": "x"}, "points": []}')).json()["result"]["content"]
+    assert text["text"].startswith("unknown_type: ")
+    for odd in ("[]", "7", "null"):
+        assert "jsonrpc" in (await ask(odd)).json()
+
+
+@needs_mcp
+@pytest.mark.anyio
+async def test_who_asks_too_much_of_a_tool_is_told_in_time(app: FastAPI, anyio_backend: str) -> None:
+    async with client_of(app) as client:
+        app.state.tools._settings = app.state.settings.model_copy(update={"deadline_seconds": 1e-6})
+        answer = await client.post("/mcp", json=LIST, headers=HEAD)
+        check_problem(answer, 504, "deadline_exceeded")
+        with app.state.memory.lock:
+            assert app.state.memory.taken == app.state.memory.leaving
+
+
+def test_no_more_of_an_answer_is_made_than_is_shown() -> None:
+    made: list[int] = []
+
+    def rows(start: int, stop: int) -> list[Any]:
+        made.extend(range(start, stop))
+        return [Raw(b'{"n":%d,"t":"%b"}' % (k, b"x" * 5000)) for k in range(start, stop)]
+
+    class Nested(Schema):
+        inner: Any
+
+    answer = LayersResponse.made(
+        crs=None,
+        features=Series(10**9, rows),
+        collapsed=np.arange(10**6) % 2 == 0,
+        accuracy=Nested.made(inner=Series(10**7, lambda start, stop: np.arange(start, stop))),
+    )
+    found = summary(answer, 4, 10**8)
+    assert made == [*range(10**8, 10**8 + 4)]
+    text = {"count": 5000, "first": "x" * 1000}
+    assert found["features"] == {"count": 10**9, "items": [{"n": k, "t": text} for k in made]}
+    assert found["collapsed"] == {"count": 10**6, "true": 500_000, "items": []}
+    assert found["accuracy"] == {"inner": {"count": 10**7, "first": [0, 1, 2, 3]}}
+    assert "crs" not in found
+    names = {f"n{k}": "x" * 900 for k in range(2000)}
+    with pytest.raises(ServiceError, match="show fewer"):
+        summary({"features": [names]}, 1, 0)
+
+
 def test_long_lists_are_cut_at_every_depth() -> None:
     rings = [[[float(i), 0.0] for i in range(100)]]
-    found = tools.summary({"pieces": [{"shell": rings[0], "holes": []}] * 7, "area": 1.0}, 2, 5)
+    found = summary({"pieces": [{"shell": rings[0], "holes": []}] * 7, "area": 1.0}, 2, 5)
     assert found["pieces"]["count"] == 7
     assert len(found["pieces"]["items"]) == 2
     assert found["pieces"]["items"][0]["shell"] == {"count": 100, "first": rings[0][:3]}

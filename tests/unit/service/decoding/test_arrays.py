@@ -262,3 +262,28 @@ async def test_answers_are_those_to_short_texts(
     answers = [{**answer.json(), "request_id": "", "instance": ""} for answer in (taken, plainly)]
     assert answers[0] == answers[1]
     assert taken.status_code == plainly.status_code != 500
+
+
+def test_what_is_held_beside_arrays_is_counted() -> None:
+    numbers_ = ",".join(["0"] * 40)
+    small = ",".join(f'{{"{k}": []}}' for k in range(1000))
+    taken: list[int] = []
+    assert wire.decode_fast(f'{{"a": [{numbers_}], "b": [{small}]}}'.encode(), taken.append) is not None
+    assert sum(taken) > 1000 * (800 + 100)
+    taken.clear()
+    assert wire.decode_fast(f'{{"a": [{numbers_}], "b": [{small}, nil]}}'.encode(), taken.append) is None
+    assert sum(taken) == 0
+    assert len(taken) > 0
+
+
+def test_rows_without_numbers_are_no_array() -> None:
+    """Twenty million of them, in 60 MB, became as many arrays."""
+    for item in ("[]", "[[]]", "[[],[]]"):
+        assert wire.decode_fast(f'{{"a": [{",".join([item] * 100)}]}}'.encode()) is None
+
+
+def test_the_deadline_is_seen_between_pieces() -> None:
+    body = f'{{"a": [{",".join(["[1,2]"] * 1000)}]}}'.encode()
+    polled: list[int] = []
+    wire.decode_fast(body, poll=lambda: polled.append(1))
+    assert len(polled) > 50

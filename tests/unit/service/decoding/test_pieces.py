@@ -124,3 +124,44 @@ def test_it_ends_where_it_is_told_to() -> None:
 
     with pytest.raises(TimeoutError):
         pieces.decode(b"[" + b"1," * 1000 + b"1]", poll)
+
+
+def many(n: int, value: str = "0", first: int = 0) -> str:
+    return ",".join(f'"{k}": {value}' for k in range(first, first + n))
+
+
+@pytest.mark.parametrize("size", [2**4, 2**16])
+def test_objects_of_too_many_names_are_refused(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pieces, "PIECE", size)
+    monkeypatch.setattr(pieces, "LONGEST", 2**20)
+    monkeypatch.setattr(pieces, "NAMES", 100)
+    few, more = many(100), many(101)
+    for text in (f"{{{few}}}", f'[{{{few}}}, {{"a": {{{few}}}}}]', f'{{"x": [{{{few}}}], {many(99, "{}")}}}'):
+        assert in_pieces(text.encode()) == whole(text.encode())
+    for text in (f"{{{more}}}", f'[1, {{"a": [{{{more}}}]}}]', f'{{"x": {{{few}}}, {many(100, "[1]")}}}'):
+        assert re.match(r"an object has more than 100 names at line 1 column \d+", str(in_pieces(text.encode())))
+
+
+@pytest.mark.parametrize("size", [2**4, 2**16])
+@pytest.mark.parametrize("letter", ["a", "é", '\\"', "\\\\", "\\u0041", "😀"])
+def test_names_that_are_too_long_are_refused(size: int, letter: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pieces, "PIECE", size)
+    monkeypatch.setattr(pieces, "LONGEST", 2**20)
+    for before in ("", '"x": ["', '"x": "y", '):
+        after = '"]' * before.endswith('["')
+        before = before.replace('["', '["' + "z" * 3000) + after + ", " * before.endswith('["')
+        text = f'[{{{before}"{letter * 1024}": 0}}]'.encode()
+        assert in_pieces(text) == whole(text)
+        text = f'[{{{before}"{letter * 1025}": [1,2]}}]'.encode()
+        assert "has more than 1024 letters at line 1" in str(in_pieces(text))
+    text = f'{{"a": "{letter * 5000}", "b": ["{letter * 5000}"]}}'.encode()
+    assert in_pieces(text) == whole(text)
+
+
+def test_a_long_value_is_emptied() -> None:
+    inner: dict[str, Any] = {"b": [[1, [{}]]] * 3}
+    value: Any = {"a": [inner, [[0, 0]] * 20_000, "text"], "c": 1}
+    listed = value["a"]
+    pieces.let_go(value)
+    assert (value, listed, inner) == ({}, [], {})
+    pieces.let_go(None)

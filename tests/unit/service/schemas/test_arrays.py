@@ -9,6 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from engine import DeadlineExceededError
+from service.schemas import arrays
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
 from service.schemas.solids import Faces
 from service.settings import Settings
@@ -110,3 +111,31 @@ def test_the_search_for_what_is_wrong_ends_at_the_deadline() -> None:
 
     with pytest.raises(DeadlineExceededError):
         POSITIONS.validate_python([[0, 0]] * 200 + [[0, None]], context=Ending())
+
+
+STEPPED: list[Any] = [
+    [[1, 2]] * 7, [[1.5, 2]] * 5, [[1, 2, 3], *[[1, 2]] * 6], [*[[1, 2]] * 6, [1, 2, 3]], [*[[1, 2]] * 6, [1, True]],
+    [*[[1, 2]] * 3, 7, [1, 2]], [[1, 2], *[[1, "2"]] * 4], [[0, 2**53 + 1]] * 5, [[0, 1e400]] * 5, [[]] * 5, [[1, 2]] * 9,
+    [[1, 2, 3]] * 3 + [[4, 5, 6, 7]] * 3, [[1, 2, 3]] * 3 + [[4, 5]] * 3, [[1, 2, 3]] * 4 + [[-1, 0, 1]],
+    [[1, 2, 3]] * 5 + [[1.5, 0, 1]], list(range(7)), [1] * 6 + [[1]],
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("adapter", [POSITIONS, FACES, TypeAdapter(Annotated[Array, Numbers(Axis(3, 8))])])
+def test_a_long_list_becomes_in_steps_what_it_becomes_at_once(
+    adapter: TypeAdapter[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    call = Call(Settings(max_points=8, max_faces=8, deadline_seconds=86_400), Store(1), Memory(1))
+
+    def made(value: Any) -> Any:
+        try:
+            found = adapter.validate_python(value, context=call)
+        except ValidationError as error:
+            return error.errors()[0]["ctx"]["faults"]
+        return (found.dtype, found.tolist()) if isinstance(found, np.ndarray) else found
+
+    for value in STEPPED:
+        monkeypatch.setattr(arrays, "STEP", 2**13)
+        whole = made(value)
+        monkeypatch.setattr(arrays, "STEP", 2)
+        assert made(value) == whole

@@ -1,0 +1,185 @@
+"""JSON values that layers pass through untouched: their text, written in short steps, and keys to compare them by.
+
+`json` holds the interpreter's lock while it writes: a third of a second for 20 MB. Here it is given at most `_FEW`
+values at a time, and the deadline is polled in between.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Iterable
+from typing import Any, Final
+
+import numpy as np
+
+from engine.budget import poll
+
+_FEW: Final = 256
+"""Values written at once: some 30 us."""
+_LETTERS: Final = 1000
+"""Letters of texts that take as long as a value."""
+_SCALARS: Final = frozenset({str, int, float, bool, type(None)})
+Path = tuple[str | int, ...]
+
+
+class NotJsonError(ValueError):
+    """A value has no JSON; says why, and where in it. is_number: it is infinite or NaN."""
+
+    def __init__(self, error: Exception, path: Path, is_number: bool) -> None:
+        super().__init__(str(error))
+        self.path = path
+        self.is_number = is_number
+
+
+def text_of(value: Any) -> bytes:
+    """Return a value's JSON, numbers exactly as they are; arrays are written as lists.
+
+    Raises: NotJsonError; what `poll` raises.
+    """
+    try:
+        if _count(value, _FEW) <= _FEW:
+            return _encoded(value)
+        writer = _Writer()
+        writer.write(value)
+        return bytes(writer.text)
+    except RecursionError:
+        raise NotJsonError(ValueError("it is nested too deeply, or within itself"), (), False) from None
+
+
+def key_of(value: Any) -> Hashable:
+    """Return what is equal for equal JSON values: numbers by their exact value (1 is 1.0 but not true), objects
+    whatever the order of their names.
+
+    Texts stand for numbers, since others can choose many numbers of one hash. Raises: TypeError where JSON has no such
+    value.
+    """
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, str):
+        return f'"{value}'
+    if isinstance(value, (int, float)):
+        return str(int(value)) if value % 1 == 0 else repr(value)
+    poll()
+    if isinstance(value, (list, tuple)):
+        return tuple(map(key_of, value))
+    if not isinstance(value, dict):
+        raise TypeError(f"it is of type {type(value).__name__}")
+    if not all(isinstance(name, str) for name in value):
+        raise TypeError("not all names in it are text")
+    return frozenset((name, key_of(item)) for name, item in value.items())
+
+
+class _Writer:
+    """Writes one value of many parts."""
+
+    def __init__(self) -> None:
+        self.text = bytearray()
+        self._path: list[str | int] = []
+
+    def write(self, value: Any) -> None:
+        """Write a list, an array or an object of more than `_FEW` values; depth: that of the value."""
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        names = list(value) if isinstance(value, dict) else None
+        items = list(value.values()) if isinstance(value, dict) else value
+        self.text += b"[" if names is None else b"{"
+        start, weight = 0, 0
+        for place, item in enumerate(items):
+            size = _count(item, _FEW)
+            if weight + size > _FEW:
+                self._write_few(names, items, start, place)
+                start, weight = place, 0
+            weight += size
+            if size > _FEW and not isinstance(item, str):
+                name = place if names is None else names[place]
+                self.text += b"" if names is None else _encoded({name: None})[1:-5]
+                self._path.append(name)
+                self.write(item)
+                self._path.pop()
+                self.text += b","
+                start, weight = place + 1, 0
+        self._write_few(names, items, start, len(items))
+        if self.text[-1:] == b",":
+            del self.text[-1]
+        self.text += b"]" if names is None else b"}"
+
+    def _write_few(self, names: list[Any] | None, items: Any, start: int, stop: int) -> None:
+        """Write the items from one place up to another, and a comma."""
+        poll()
+        if start == stop:
+            return
+        some = items[start:stop]
+        try:
+            self.text += _encoded(some if names is None else dict(zip(names[start:stop], some)))[1:-1] + b","
+        except NotJsonError as error:
+            first, *rest = error.path
+            error.path = (*self._path, start + int(first) if names is None else first, *rest)
+            raise
+
+
+def _encoded(value: Any) -> bytes:
+    """Return the JSON of a value of few parts."""
+    try:
+        try:
+            return _encode(value).encode()
+        except UnicodeEncodeError:  # half a surrogate pair, which only an escape can write
+            return _encode_ascii(value).encode()
+    except (ValueError, TypeError, RecursionError) as error:
+        path, is_number = _place(value)
+        raise NotJsonError(error, path, is_number) from None
+
+
+def _listed(value: Any) -> Any:
+    """Return a list of numbers that was read as an array."""
+    if not isinstance(value, (np.ndarray, np.generic)):
+        raise TypeError(f"it is of type {type(value).__name__}")
+    return value.tolist()
+
+
+_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=_listed).encode
+_encode_ascii = json.JSONEncoder(allow_nan=False, separators=(",", ":"), default=_listed).encode
+
+
+def _count(value: Any, most: int) -> int:
+    """Return how many values there are in a value, itself included, or more where texts are long; where they are more
+    than `most`, some such number.
+
+    depth: at most `most`.
+    """
+    if isinstance(value, str):
+        return 1 + len(value) // _LETTERS
+    if type(value) in _SCALARS or not isinstance(value, (dict, list, tuple, np.ndarray)):
+        return 1
+    if isinstance(value, np.ndarray):
+        return 1 + value.size
+    items: Iterable[Any] = value.values() if isinstance(value, dict) else value
+    n = 1 + len(value)
+    if n > most:
+        return n
+    kinds = set(map(type, items))
+    if kinds <= _SCALARS:
+        n += sum([len(item) for item in items if type(item) is str]) // _LETTERS if str in kinds else 0
+    else:
+        for item in items:
+            n += _count(item, most - n + 1) - 1
+            if n > most:
+                break
+    return n
+
+
+def _place(value: Any) -> tuple[Path, bool]:
+    """Return where in a value of few parts the first stands that has no JSON, and whether that is a float."""
+    items: Iterable[tuple[Any, Any]] = ()
+    if isinstance(value, dict):
+        items = value.items()
+    elif isinstance(value, (list, tuple, np.ndarray)):
+        items = enumerate(value)
+    for name, item in items:
+        try:
+            _encode({name: item})
+        except (ValueError, TypeError, RecursionError):
+            path, is_number = _place(item)
+            return (name if isinstance(name, (str, int)) else str(name), *path), is_number
+    return (), isinstance(value, (float, np.floating))
