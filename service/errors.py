@@ -149,6 +149,14 @@ def faults_of(error: Exception) -> list[Fault]:
     return [Fault((), "internal", "the service failed on this request; it is logged, please report it")]
 
 
+def forget_frames(error: BaseException) -> None:
+    """Forget the frames of an error and of those before it: they hold the body, and lead back to it."""
+    known: BaseException | None = error
+    while known is not None:  # bound: each is raised while the next was handled
+        known.with_traceback(None)
+        known = known.__context__
+
+
 def problem(faults: list[Fault], headers: Mapping[str, str] = {}) -> Response:
     """Return the answer for `faults`; its code and status are those of the first."""
     first = faults[0]

@@ -31,7 +31,7 @@ from service.body import JSON
 from service.convert.questions import existing, is_light
 from service.decoding import pieces
 from service.decoding.pieces import Body
-from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, problem
+from service.errors import STATUS, ServiceError, faults_of, faults_of_validation, forget_frames, problem
 from service.schemas.arrays import Fault
 from service.work import Call, Pool
 
@@ -234,7 +234,7 @@ class _Job:
                 return self._gathered(self.finish(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
-            _without_frames(error)
+            forget_frames(error)
             raise
         finally:
             document, self.document, self.question, self.arguments = self.document, None, None, {}
@@ -321,16 +321,8 @@ def _faults_in(error: Exception, what: str) -> list[Fault]:
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
         log.error("%s failed", what, exc_info=error)
-    _without_frames(error)
+    forget_frames(error)
     return faults
-
-
-def _without_frames(error: Exception) -> None:
-    """Forget the frames of an error and of those before it: they hold the body, and lead back to it."""
-    known: BaseException | None = error
-    while known is not None:  # bound: each is raised while the next was handled
-        known.with_traceback(None)
-        known = known.__context__
 
 
 def _coding_wanted(header: bytes) -> str | None:

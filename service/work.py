@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, TypeVar
 from fastapi import Depends
 
 from engine import Accuracy, Cancel, CancelledError, DeadlineExceededError, EngineError
-from service.errors import ServiceError
+from service.errors import ServiceError, forget_frames
 from service.memory import LATER, SMALL, Memory
 from service.metrics import Metrics
 from service.settings import Settings
@@ -149,6 +149,10 @@ class Call(Cancel):
         self.may_wait = self._is_running = True
         try:
             return job()
+        except BaseException as error:
+            if self._is_over:  # nobody asks what was wrong: what it holds goes before it is counted as free
+                forget_frames(error)
+            raise
         finally:
             with self._memory.lock:
                 self._is_running = False
