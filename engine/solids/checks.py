@@ -25,6 +25,8 @@ Where = tuple[str | int, ...]
 DIMENSIONS: Final = (2, 3)
 _FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
 DOUBLE: Final = np.dtype(np.float64)
+_LISTED: Final = 1 << 10
+"""Items of a list that are looked at at once: half a millisecond, in which no other thread runs."""
 _AT_ONCE: Final = 1 << 15
 """Numbers looked at together: what is noted of them stays in the first-level cache."""
 
@@ -168,12 +170,12 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
 
 def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray | None:
     """Do as `plain_floats` does, part by part."""
-    if len(values) <= _AT_ONCE:
+    if len(values) <= _LISTED:
         return plain_floats(values, depth)
     parts: list[FloatArray] = []
-    for first in range(0, len(values), _AT_ONCE):
+    for first in range(0, len(values), _LISTED):
         poll()
-        part = plain_floats(values[first : first + _AT_ONCE], depth)
+        part = plain_floats(values[first : first + _LISTED], depth)
         if part is None or (parts and part.shape[1:] != parts[0].shape[1:]):
             return None
         parts.append(part)
@@ -203,8 +205,8 @@ def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -
         is_plain = math.isfinite(item) if type(item) is float else type(item) is int and abs(item) <= _FLOAT_INTEGERS
         if not is_plain:  # to name its place takes a thousand times as long
             items[i_item] = as_number(item, _path(i_item, shape, where))
-    starts = range(0, max(1, len(items)), _AT_ONCE)
-    result = np.concatenate([np.array(items[first : first + _AT_ONCE], np.float64) for first in starts]).reshape(shape)
+    starts = range(0, max(1, len(items)), _LISTED)
+    result = np.concatenate([np.array(items[first : first + _LISTED], np.float64) for first in starts]).reshape(shape)
     check_finite(result, where)
     return result
 

@@ -29,7 +29,7 @@ MAX_ERRORS: Final = 20
 """Entries of `errors` in one answer: enough to see the pattern."""
 EXACT_INTEGERS: Final = 2**53
 """All integers up to this are float64 values; of those beyond only some are."""
-STEP: Final = 2**13
+STEP: Final = 2**11
 """Items of a list that are looked at at once."""
 SHORT: Final = 64
 """Numbers that Python checks sooner than numpy."""
