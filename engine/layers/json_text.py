@@ -6,8 +6,9 @@ values at a time, and the deadline is polled in between.
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Hashable, Iterable
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
@@ -46,29 +47,41 @@ def text_of(value: Any) -> bytes:
         raise NotJsonError(ValueError("it is nested too deeply, or within itself"), (), False) from None
 
 
-def key_of(value: Any) -> Hashable:
+def key_of(value: Any) -> bytes:
     """Return what is equal for equal JSON values: numbers by their exact value (1 is 1.0 but not true), objects
     whatever the order of their names.
 
-    Texts stand for numbers, since others can choose many numbers of one hash. Raises: TypeError where JSON has no such
-    value.
+    Of a list or an object it is a SHA-256, so that a key is short however long the value. Raises: TypeError where JSON
+    has no such value; what `poll` raises.
     """
-    if isinstance(value, (np.ndarray, np.generic)):
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and not value.ndim):
         value = value.tolist()
     if value is None or isinstance(value, bool):
-        return value
+        return {None: b"null", True: b"true", False: b"false"}[value]
     if isinstance(value, str):
-        return f'"{value}'
+        return b'"' + value.encode("utf-8", "surrogatepass")
     if isinstance(value, (int, float)):
-        return str(int(value)) if value % 1 == 0 else repr(value)
+        return (str(int(value)) if value % 1 == 0 else repr(value)).encode()
     poll()
-    if isinstance(value, (list, tuple)):
-        return tuple(map(key_of, value))
+    digest = hashlib.sha256()
+
+    def add(keys: Iterable[bytes]) -> None:
+        for key in keys:
+            digest.update(b"%d:%b" % (len(key), key))
+
+    if isinstance(value, (list, tuple, np.ndarray)):
+        for start in range(0, len(value), _FEW):
+            poll()
+            some = value[start : start + _FEW]
+            add(map(key_of, some.tolist() if isinstance(some, np.ndarray) and some.ndim == 1 else some))
+        return b"[" + digest.digest()
     if not isinstance(value, dict):
         raise TypeError(f"it is of type {type(value).__name__}")
     if not all(isinstance(name, str) for name in value):
         raise TypeError("not all names in it are text")
-    return frozenset((name, key_of(item)) for name, item in value.items())
+    for name in sorted(value):
+        add((key_of(name), key_of(value[name])))
+    return b"{" + digest.digest()
 
 
 class _Writer:
@@ -80,12 +93,14 @@ class _Writer:
 
     def write(self, value: Any) -> None:
         """Write a list, an array or an object of more than `_FEW` values; depth: that of the value."""
-        if isinstance(value, np.ndarray):
-            value = value.tolist()
         names = list(value) if isinstance(value, dict) else None
         items = list(value.values()) if isinstance(value, dict) else value
         self.text += b"[" if names is None else b"{"
         start, weight = 0, 0
+        if isinstance(items, np.ndarray) and items.ndim == 1:
+            for start in range(0, len(items), _FEW):
+                self._write_few(names, items, start, start + _FEW)
+            items = ()
         for place, item in enumerate(items):
             size = _count(item, _FEW)
             if weight + size > _FEW:
@@ -100,7 +115,8 @@ class _Writer:
                 self._path.pop()
                 self.text += b","
                 start, weight = place + 1, 0
-        self._write_few(names, items, start, len(items))
+        if len(items):
+            self._write_few(names, items, start, len(items))
         if self.text[-1:] == b",":
             del self.text[-1]
         self.text += b"]" if names is None else b"}"
