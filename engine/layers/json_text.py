@@ -169,7 +169,7 @@ def _count(value: Any, most: int) -> int:
     if type(value) in _SCALARS or not isinstance(value, (dict, list, tuple, np.ndarray)):
         return 1
     if isinstance(value, np.ndarray):
-        return 1 + value.size
+        return 1 + value.size if value.ndim else 1
     items: Iterable[Any] = value.values() if isinstance(value, dict) else value
     n = 1 + len(value)
     if n > most:

@@ -32,6 +32,9 @@ def test_the_text_is_that_of_json(few: int, monkeypatch: pytest.MonkeyPatch) -> 
         value = some_value(source, 5)
         assert text_of(value) == json.dumps(value, separators=(",", ":"), ensure_ascii=False).encode()
     assert text_of({"a": np.arange(3), "b": np.float64(0.5)}) == b'{"a":[0,1,2],"b":0.5}'
+    for array in (np.arange(1000), np.arange(1000.0).reshape(2, 500), np.arange(600).reshape(300, 2), np.array(2.5)):
+        assert json.loads(text_of({"a": array})) == {"a": array.tolist()}
+        assert key_of({"a": array}) == key_of({"a": array.tolist()}) != key_of({"a": [array.tolist()]})
     assert text_of("\ud800") == b'"\\ud800"'
 
 
@@ -53,6 +56,9 @@ def test_what_json_cannot_hold_is_found(few: int, monkeypatch: pytest.MonkeyPatc
         assert caught.value.is_number == isinstance(wrong, float)
         n_found += 1
     assert n_found == 1000
+    with pytest.raises(NotJsonError) as caught:
+        text_of([np.zeros(3), np.where(np.arange(1200) == 700, np.inf, 0.0).reshape(2, 600)])
+    assert caught.value.path == (1, 1, 100)
 
 
 def test_what_has_no_end_is_refused() -> None:
