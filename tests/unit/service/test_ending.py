@@ -56,8 +56,10 @@ def is_running(pid: int) -> bool:
 def check_end(service: Service) -> None:
     children, begin = children_of(service), time.monotonic()
     assert service.stop() == 0, "".join(service.log)
-    assert time.monotonic() - begin < DRAIN + 2
-    assert not any(map(is_running, children))
+    assert time.monotonic() - begin < DRAIN + 4  # 2 where nothing else runs
+    while any(map(is_running, children)):  # killed a moment ago
+        assert time.monotonic() - begin < DRAIN + 6
+        time.sleep(0.01)
     assert not any("Traceback" in line for line in service.log), "".join(service.log)
 
 

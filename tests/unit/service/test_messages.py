@@ -75,5 +75,5 @@ async def test_a_long_text_does_not_come_back(client: httpx.AsyncClient, place: 
         "id": {"solid": {"type": "stored", "id": long}},
     }
     answer = await client.post("/v1/contains", content=json.dumps(body[place]), headers=JSON)
-    assert answer.status_code == 422
+    assert answer.status_code == (400 if place == "field" else 422)  # the decoder takes no such name
     assert len(answer.content) < 3_000
