@@ -20,9 +20,16 @@ from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget, polled
 from engine.errors import TooComplexError
+from engine.polygon_overlay.compiled.boundary.ring_nesting import (
+    FIRST_ALONE,
+    NEGATIVE,
+    NON_ZERO,
+    PAIR,
+    POSITIVE,
+    Nesting,
+)
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import FIRST_ALONE, NEGATIVE, NON_ZERO, PAIR, POSITIVE, Nesting
 from engine.polygon_overlay.found import Found, one_pair, ring_sizes
 from engine.polygon_overlay.grid import snapped_to_units
 from engine.polygon_overlay.result import Output, Overlay

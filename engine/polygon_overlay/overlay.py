@@ -21,8 +21,8 @@ import numpy as np
 from engine.budget import UNLIMITED, Budget, Cancel
 from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.parallel import Progress, check_options, is_unlimited
+from engine.polygon_overlay.compiled.boundary.ring_nesting import Nesting
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import Nesting
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.result import Output, Overlay, OverlayOptions

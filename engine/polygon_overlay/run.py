@@ -11,9 +11,9 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray, IntArray, read_only
 from engine.budget import Budget
 from engine.direct import entry_of
+from engine.polygon_overlay.compiled.boundary.ring_nesting import AGAIN, Nesting
 from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import AGAIN, Nesting
 from engine.polygon_overlay.compiled.workspace import Outcomes, first_contacts, keep, more_contacts, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes
 from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units

@@ -16,10 +16,10 @@ import numpy.typing as npt
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.budget import UNLIMITED, Budget
 from engine.direct import entry_of
+from engine.polygon_overlay.compiled.boundary.ring_nesting import PAIR, Nesting
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
-from engine.polygon_overlay.compiled.ring_nesting import PAIR, Nesting
 from engine.polygon_overlay.compiled.ring_order import Output as Written
 from engine.polygon_overlay.compiled.workspace import (
     FEW_VERTICES,

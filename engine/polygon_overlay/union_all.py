@@ -16,8 +16,15 @@ from engine.arrays import IntArray
 from engine.budget import Budget, Cancel
 from engine.errors import InvalidArrayError, InvalidOperationError
 from engine.parallel import Progress, check_options
+from engine.polygon_overlay.compiled.boundary.ring_nesting import (
+    ANY,
+    FIRST_ALONE,
+    NEGATIVE,
+    NON_ZERO,
+    POSITIVE,
+    Nesting,
+)
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import ANY, FIRST_ALONE, NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import gathered

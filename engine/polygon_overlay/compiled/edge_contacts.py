@@ -86,8 +86,6 @@ RIGHT: Final = 2
 """How the second edge of a crossing leaves, seen along the first; NOT_SIMPLE where floating point is not sure of that,
 or the crossing is not alone."""
 
-BEGINS: Final = 2
-
 Events = namedtuple("Events", "edge point other t slack reach first second turn")
 """Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex; t,
 slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer than the
@@ -95,8 +93,8 @@ margin of clearance.py, where that is not in doubt already, and the slack. By cr
 turn: LEFT or RIGHT as the second leaves to that side of the first, or NOT_SIMPLE."""
 
 Unions = namedtuple("Unions", "points is_node rings")
-"""points: forest of points that are one; is_node: by vertex, uint8, BEGINS where a ring begins and
-nothing meets it; rings: forest of rings that hang together."""
+"""points: forest of points that are one; is_node: by vertex, uint8, whether something meets it or a ring begins there;
+rings: forest of rings that hang together."""
 
 
 @merged

@@ -30,10 +30,17 @@ from engine.polygon_overlay.compiled.boundary.chain_rings import join_regions, m
 from engine.polygon_overlay.compiled.boundary.chains import build_chains, build_stars
 from engine.polygon_overlay.compiled.boundary.components import join_faces
 from engine.polygon_overlay.compiled.boundary.crossing_walk import do_nothing_but_cross, walk_crossings
-from engine.polygon_overlay.compiled.boundary.ring_labels import label_rings
+from engine.polygon_overlay.compiled.boundary.ring_nesting import (
+    AGAIN,
+    NO_ROOM,
+    PAIR,
+    Nesting,
+    gather_evidence,
+    spread_sources,
+)
 from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corners_are_clear, has_straight_point
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
-from engine.polygon_overlay.compiled.edge_contacts import BEGINS, Contacts, find_contacts
+from engine.polygon_overlay.compiled.edge_contacts import Contacts, find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
 from engine.polygon_overlay.compiled.edge_tree import FEW
 from engine.polygon_overlay.compiled.loading import (
@@ -52,14 +59,6 @@ from engine.polygon_overlay.compiled.loading import (
     mark_short,
 )
 from engine.polygon_overlay.compiled.reducing import count_left_out
-from engine.polygon_overlay.compiled.ring_nesting import (
-    AGAIN,
-    NO_ROOM,
-    PAIR,
-    Nesting,
-    gather_evidence,
-    spread_sources,
-)
 from engine.polygon_overlay.compiled.ring_order import (
     Filled,
     has_room,
@@ -157,8 +156,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
         return _Arranged(0, 0, 0, 0, False, room + 1)
     n_contacts = contacts.n_events  # chains and nodes: one for each event, and each vertex that is a node
     for ring in range(n_rings):
-        if w.unions.is_node[w.given.tops[ring]] == 0:
-            w.unions.is_node[w.given.tops[ring]] = BEGINS
+        w.unions.is_node[w.given.tops[ring]] = 1
     for i in range(n):
         n_contacts += int(w.unions.is_node[i] != 0)
     if n_contacts > room:
@@ -203,21 +201,18 @@ def _arrange_chains(
     join_faces(w, w.found.point, (n, n_rings, n_cycles, loaded.n_runs), stop)
     if stop[0]:
         return 0, 0
-    tells, n_entries = nesting.rule == AGAIN, 0
-    if nesting.rule == PAIR:
-        label_rings(w, kept, (n_rings, n_chains, n_crossings, n_nodes), stop)
-    else:
-        n_entries = spread_sources(w.given, w.chains, w.faces, nesting, w.holders, (n_chains, n_cycles), stop)
-        if n_entries == NO_ROOM:
-            return NO_ROOM, 0
-        mark_boundary(w.chains, w.faces, n_chains, stop)
+    tells = nesting.rule == AGAIN
+    n_entries = spread_sources(w.given, w.chains, w.faces, nesting, w.holders, kept, (n_chains, n_cycles), stop)
+    if n_entries == NO_ROOM:
+        return NO_ROOM, 0
+    mark_boundary(w.chains, w.faces, n_chains, stop)
     join_regions(w.chains, w.stars, w.faces, nesting.rule != PAIR, (n_chains, n_crossings, n_nodes), stop)
     if tells:
         gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
         return 0, 0
     return walk_rings(
-        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, tells, kept,
+        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, tells,
         (n_chains, n_nodes, n, n_crossings), stop,
     )  # fmt: skip
 

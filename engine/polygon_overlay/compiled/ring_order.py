@@ -15,10 +15,10 @@ import numpy as np
 
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings
+from engine.polygon_overlay.compiled.boundary.ring_nesting import NO_ROOM, write_evidence
 from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
 from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, RUN, box_holds
 from engine.polygon_overlay.compiled.loading import LEFT_OUT
-from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, write_evidence
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2

@@ -18,13 +18,12 @@ from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, Walk
 from engine.polygon_overlay.compiled.boundary.chains import Chains, Loose, Stars
 from engine.polygon_overlay.compiled.boundary.components import Components
-from engine.polygon_overlay.compiled.boundary.ring_labels import Labels
+from engine.polygon_overlay.compiled.boundary.ring_nesting import Holders
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION, BoxTree
 from engine.polygon_overlay.compiled.loading import Given
-from engine.polygon_overlay.compiled.ring_nesting import Holders
 from engine.polygon_overlay.compiled.ring_order import Output, Ranking
 from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
@@ -44,7 +43,7 @@ Buffers = namedtuple(
     "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
-_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 9, 5, 18
+_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 8, 5, 18
 _HALF_INTEGERS, _HALF_LABELS, _HALF_OCTETS = 11, 2, 4
 _POINT_FLOATS, _POINT_INTEGERS, _POINT_CODES, _POINT_OCTETS = 2, 6, 2, 4
 """How many rows there are of each."""
@@ -65,7 +64,6 @@ class Workspace(NamedTuple):
     loose: Loose
     faces: Faces
     components: Components
-    labels: Labels
     holders: Holders
     walk: Walk
     found: Rings
@@ -243,7 +241,6 @@ def rows_of(words: Any) -> Workspace:
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[4], h[5], hb[1], hb[2], c[16]),
         components=Components(r[3], r[4], r[5], r[6], r[7]),
-        labels=Labels(r[4], r[8]),
         holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[17]),
         walk=Walk(h[6], c[8]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),

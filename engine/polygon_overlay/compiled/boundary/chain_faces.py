@@ -33,7 +33,7 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 NOTHING: Final = -1
 
 Faces = namedtuple("Faces", "cycle joined regions inside state fan")
-"""By half-chain: cycle, or -1 where another half-chain stands for it; state: as ring_labels.py has it. By cycle, of
+"""By half-chain: cycle, or -1 where another half-chain stands for it; state: bits of chain_rings.py. By cycle, of
 which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one region of
 the result; inside: the part of the result that it is in, or 0. fan: by node that is not simple, how many chains bound
 a region."""

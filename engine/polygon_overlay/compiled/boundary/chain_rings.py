@@ -22,11 +22,16 @@ from engine.polygon_overlay.compiled.boundary.chains import (
     place_before,
     to_the_left,
 )
-from engine.polygon_overlay.compiled.boundary.ring_labels import BOUNDS, FORKED, INSIDE, LABELLED, SEEN, label_of
+from engine.polygon_overlay.compiled.boundary.ring_nesting import Holders, enter_beyond
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
-from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
 
+BOUNDS: Final = 1
+INSIDE: Final = 2
+SEEN: Final = 4
+FORKED: Final = 8
+"""Bits of the state of a half-chain: its chain bounds a region, its own face is in the result, it was walked, rings
+meet where it begins."""
 MEETS: Final = 1
 Rings = namedtuple("Rings", "point edge meets offset region")
 """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
@@ -158,7 +163,7 @@ def _emit(
 @inline
 def walk_rings(
     edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, holders: Holders,
-    is_named: bool, kept: Any, sizes: tuple[int, int, int, int], stop: Any,
+    is_named: bool, sizes: tuple[int, int, int, int], stop: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
 
@@ -188,10 +193,7 @@ def walk_rings(
                 )
                 if is_named:
                     enter_beyond(faces, holders, path, first, depth, n_rings)
-                region = root_of(faces.regions, faces.cycle[path[first]])
-                if state[path[first]] & LABELLED:
-                    faces.inside[region] = kept[label_of(state[path[first]])]
-                rings.region[n_rings] = region
+                rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
                 n_rings += 1
                 rings.offset[n_rings] = n_points
                 for k in range(first, depth):

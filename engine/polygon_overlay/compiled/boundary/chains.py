@@ -23,7 +23,7 @@ from typing import Any, Final
 from engine.arrangement.union_find import root_of
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import BEGINS, LEFT, NOT_SIMPLE, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
@@ -31,8 +31,6 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOT_YET: Final = -1
 """In the place of a chain that is not known yet."""
-ALONE: Final = -2
-"""In the place of a chain across a node where one ring begins, and no other passes."""
 
 Chains = namedtuple("Chains", "tail head first last mask stands twin at across")
 """By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that stands
@@ -138,8 +136,6 @@ def build_chains(
         loose[n_loose] = 2 * n_chains
         n_loose += 1
         _begin_chain(chains, n_chains, node, top, mask)
-        if unions.is_node[top] == BEGINS:
-            chains.across[n_chains] = ALONE
         e = top
         while True:  # bound: once around the ring
             if stop[0]:

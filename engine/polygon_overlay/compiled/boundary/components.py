@@ -215,10 +215,8 @@ def _join_one(w: Any, top: int, above: int, n_cycles: int) -> None:
     """Join the outer cycle at the last vertex of a component to the face below the edge above it."""
     faces, stars, points = w.faces, w.stars, w.unions.points
     node = stars.node_of[root_of(points, top)]
-    outer, half, beyond = faces.cycle[stars.half[stars.ends[node] - 1]], NOTHING, n_cycles
+    outer, beyond = faces.cycle[stars.half[stars.ends[node] - 1]], n_cycles
     if above != NOTHING:
-        half = half_below(w.given.edges, w.events, w.along, points, w.chains, above, top)
-        beyond = faces.cycle[half]
-    w.labels.beyond[root_of(w.unions.rings, w.given.edges.ring[top])] = half
+        beyond = faces.cycle[half_below(w.given.edges, w.events, w.along, points, w.chains, above, top)]
     unite(faces.joined, outer, beyond)
     unite(faces.regions, outer, beyond)

@@ -21,7 +21,6 @@ def test_rows_in_use_together_lie_apart() -> None:
         [w.given, w.tree, w.events, w.unions, w.along],
         [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.loose],
         [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.faces, w.components],
-        [w.given, w.unions, w.chains, w.stars, w.faces, w.components.highest, w.labels],
         [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.holders],
         [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.walk, w.found, *w.holders[:3], *w.holders[6:]],
         [w.given, w.events.first, w.events.second, w.found, w.rounded, w.ranking, *w.holders[:3], *w.holders[6:]],

@@ -1,4 +1,4 @@
-"""Labels carried along rings: through crossings, around nodes where rings touch or coincide, into nested components."""
+"""Faces of rings that cross, touch, coincide, nest or lie apart: labels against the overlay in Python integers."""
 
 from __future__ import annotations
 

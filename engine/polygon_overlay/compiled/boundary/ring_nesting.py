@@ -1,9 +1,9 @@
 """Which faces are inside, and for rounded rings that are arranged again which rings tell so.
 
 The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the sources that it
-crosses, however many there are (labels of two polygons are ring_labels.py's). What is inside is a rule: where any
-source is (even-odd within each), or the first alone; where all rings together have a winding number that is not zero,
-positive, or negative; or that of a round of rounding:
+crosses, however many there are; of two polygons, the bits of a label. What is inside is a rule: the table of an
+operation on two polygons; where any source is (even-odd within each), or the first alone; where all rings together have
+a winding number that is not zero, positive, or negative; or that of a round of rounding:
 
 A face is inside where it lies (even-odd) in a shell and in no hole of that shell. Its evidence names those shells; that
 of a face outside names the holes that it lies in, the innermost of them: those whose shell is smallest. Evidence tells,
@@ -40,8 +40,8 @@ POSITIVE: Final = 3
 NEGATIVE: Final = 4
 PAIR: Final = 5
 FIRST_ALONE: Final = 6
-"""Rules: shells and holes of a round, within any source, winding numbers, the table of two polygons, within source 0
-and no other."""
+"""Rules: shells and holes of a round, within any source, winding numbers, a table by label of two polygons (bit 0: in
+the subject, bit 1: in the clip), within source 0 and no other."""
 
 
 class Nesting(NamedTuple):
@@ -69,9 +69,11 @@ first entry. beyond: regions on the other side of the rings of the result, those
 def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int, n_held: int) -> int:
     """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held.
 
-    Of winding numbers: return the one beyond, ``n_held`` being the one here.
+    Of winding numbers and labels: return the one beyond, ``n_held`` being the one here.
     """
     chain = half >> 1
+    if nesting.rule == PAIR:
+        return n_held ^ chains.mask[chain]
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
         if NON_ZERO <= nesting.rule <= NEGATIVE:
@@ -91,8 +93,10 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
 
 
 @merged
-def _is_inside(rule: int, h: Holders, n_held: int) -> int:
-    """Tell whether a face is inside by a rule other than AGAIN."""
+def _part_of(rule: int, h: Holders, kept: Any, n_held: int) -> int:
+    """Return the part of the result that a face is in, 0 for none, by a rule other than AGAIN."""
+    if rule == PAIR:
+        return int(kept[n_held])
     if rule == FIRST_ALONE:
         return int(n_held == 1 and h.place[0] == 0)
     return int(n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0)
@@ -125,11 +129,13 @@ def _judge(nesting: Nesting, h: Holders, face: int, n_held: int, n: int) -> tupl
 
 @called
 def spread_sources(
-    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, sizes: tuple[int, int], stop: Any
-) -> int:
+    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, kept: Any, sizes: tuple[int, int],
+    stop: Any,
+) -> int:  # fmt: skip
     """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM.
 
-    sizes: the numbers of chains and cycles. ``faces.joined`` joins the cycles of one face.
+    kept: by label of two polygons the part of the result that such a face is in, or 0. sizes: the numbers of chains and
+    cycles. ``faces.joined`` joins the cycles of one face.
     """
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
@@ -155,7 +161,7 @@ def spread_sources(
             if h.entered[other] == _NOT_YET:
                 n_held = _cross(given, chains, nesting, h, half, n_held)
                 if nesting.rule != AGAIN:
-                    inside[other] = _is_inside(nesting.rule, h, n_held)
+                    inside[other] = _part_of(nesting.rule, h, kept, n_held)
                 else:
                     inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)
                     if n_entries == NO_ROOM:
