@@ -6,8 +6,9 @@ Decorators. `kernel`: an outer loop over arrays, called from Python, releases th
 handed, its caller keeps. `allocating_kernel` and `allocating` (a `called` one) are for what makes arrays. Arithmetic is
 strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless `fma` (error_free.py) is called by name.
 
-What is not in numba's documentation stands in compiling/. Where this numba lacks any of it, a warning says so, and
-kernels are compiled by what is documented: as right and as fast, but slower to compile, and anew in each process.
+What is not in numba's documentation stands in compiling/, in two parts that do not need each other: `compilers` makes
+compiling three times as fast, `caches` keeps kernels on disk. Where this numba lacks what one of them takes from it, a
+warning says so, and kernels are compiled, or cached, without that part: as right and as fast.
 """
 
 from __future__ import annotations
@@ -24,9 +25,12 @@ _caches: Any = None
 _compilers: Any = None
 try:
     import engine.compiling.caches as _caches
+except (ImportError, AttributeError) as error:
+    warnings.warn(f"kernels are compiled again in each process: {error}", RuntimeWarning, stacklevel=1)
+try:
     import engine.compiling.compilers as _compilers
 except (ImportError, AttributeError) as error:
-    warnings.warn(f"kernels are compiled anew in each process: {error}", RuntimeWarning, stacklevel=1)
+    warnings.warn(f"compiling takes three times as long: {error}", RuntimeWarning, stacklevel=1)
 
 KERNELS: list[Any] = []
 """Every kernel of the modules imported so far, for the tests of `engine.warm`."""
@@ -42,7 +46,7 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
 
 def complete_signs() -> list[str]:
     """Return the names of the files that say that all is compiled for a CPU, each CPU whose kernels can be run here."""
-    return [] if _compilers is None else _caches.signs()
+    return [] if _caches is None else _caches.signs()
 
 
 class _Kernel:
@@ -57,7 +61,7 @@ class _Kernel:
     def dispatcher(self) -> Any:
         """What numba makes of it."""
         compiled = _compiled(self.py_func, **self._options)
-        if _compilers is not None:
+        if _caches is not None:
             compiled._cache = _caches.KernelCache(self.py_func)
         return compiled
 

@@ -11,12 +11,22 @@ from typing import Any, Final
 import llvmlite.binding
 from numba import config as numba_config
 from numba.core.caching import NullCache
-from numba.core.codegen import get_host_cpu_features
+from numba.core.codegen import CPUCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompileResult, compile_result
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
+from engine.compiling import require
 from engine.kernel_cache import COMPLETE, cache_folder, is_of_its_source, keep, kept, source_digest
+
+require(
+    {
+        NullCache: ("load_overload", "save_overload"),
+        CompileResult: ("_reduce",),
+        CPUCodeLibrary: ("_set_compiled_object", "enable_object_caching", "_finalize_final_module"),
+        JITCPUCodegen: ("set_env", "create_library"),
+    }
+)
 
 _V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")

@@ -5,15 +5,22 @@ from __future__ import annotations
 import copy
 import functools
 import gc
+import threading
+import types
+import warnings
 from collections.abc import Callable
-from types import CodeType
 from typing import Any
 
 import llvmlite.binding
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+import numba
+import numpy as np
+from numba import njit
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.cpu import CPUContext
 from numba.core.environment import lookup_environment
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
@@ -22,12 +29,38 @@ from numba.core.types.misc import unliteral
 from numba.core.typing import Context
 from numba.core.untyped_passes import InlineClosureLikes
 
-from engine.compiling.lowering import CalledLower, InnerLower, PlainContext, PlainLower
-from engine.compiling.operations import FROM_THE_FIRST
-from engine.compiling.tidying import tidy
+from engine.compiling import require
+
+require(
+    {
+        JITCodeLibrary: ("_finalize_final_module", "_finalize_dynamic_globals", "add_linking_library", "finalize"),
+        CPUCodeLibrary: (
+            "enable_object_caching",
+            "_optimize_functions",
+            "_optimize_final_module",
+            "_get_module_for_linking",
+        ),
+        JITCPUCodegen: ("set_env", "create_library", "_library_class", "_module_pass_manager"),
+        CompilerBase: ("compile_extra", "define_pipelines"),
+        ConfigStack: ("top_or_none",),
+        Context: ("resolve_function_type", "resolve_getattr"),
+        CPUDispatcher: ("get_call_template",),
+        NativeLowering: ("run_pass", "lowering_class"),
+        CPUContext: ("codegen",),
+        Lower: ("setup_function",),
+    }
+)
 
 
-class _Library(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
+class _CalledLower(Lower):  # type: ignore[misc] # numba carries no types
+    """Writes a function that the compiler may not copy into its callers."""
+
+    def setup_function(self, descriptor: Any) -> None:
+        super().setup_function(descriptor)
+        self.function.attributes.add("noinline")
+
+
+class _Library(JITCodeLibrary):  # type: ignore[misc]
     """Code as it was written, that is optimised, with all that is below it, within the kernel.
 
     To optimise inner functions beforehand as well, again with each of their callers, was a quarter of all compiling.
@@ -36,11 +69,6 @@ class _Library(JITCodeLibrary):  # type: ignore[misc] # numba carries no types
     def __init__(self, codegen: JITCPUCodegen, name: str) -> None:
         super().__init__(codegen, name)
         self.below: dict[_InnerLibrary, None] = {}  # what is called, directly or not, before its callers
-
-    def add_ir_module(self, module: Any) -> None:
-        for function in module.functions:
-            tidy(function)
-        super().add_ir_module(module)
 
     def add_linking_library(self, library: JITCodeLibrary) -> None:
         if isinstance(library, _InnerLibrary):
@@ -117,14 +145,11 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
     """Writes a kernel; what numba itself compiles to be called from there becomes inner libraries."""
 
     _name = "engine_kernel_lowering"
-    lowering_class = PlainLower
 
     def run_pass(self, state: Any) -> bool:
         context, codegen = state.targetctx, state.targetctx.codegen()
         state.library = self._library(state.func_id.func_qualname, codegen)
         state.targetctx = copy.copy(context)
-        state.targetctx.__class__ = PlainContext
-        state.targetctx.counts_from_the_first = state.func_id.modname.startswith(FROM_THE_FIRST)
         state.targetctx._internal_codegen = _InnerCodegen(codegen)
         done: bool = super().run_pass(state)
         state.targetctx = context
@@ -146,7 +171,6 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _InnerLowering(_KernelLowering):
     _name = "engine_inner_lowering"
-    lowering_class = InnerLower
 
     def _library(self, name: str, codegen: JITCPUCodegen) -> JITCodeLibrary:
         return _InnerLibrary(_InnerCodegen(codegen), name)
@@ -158,7 +182,7 @@ class _InnerLowering(_KernelLowering):
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _CalledLowering(_InnerLowering):
     _name = "engine_called_lowering"
-    lowering_class = CalledLower
+    lowering_class = _CalledLower
 
 
 class _Typing(Context):  # type: ignore[misc]
@@ -200,7 +224,7 @@ def _check_result(context: Any, result: Any, name: str) -> None:
 
 
 class KernelCompiler(CompilerBase):  # type: ignore[misc]
-    """numba's own steps, but for how a function is written."""
+    """numba's own steps, but for the library that a function is written into."""
 
     lowering: type[NativeLowering] = _KernelLowering
 
@@ -225,8 +249,10 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
 
     def define_pipelines(self) -> list[Any]:
         """Leave out what joins operations on whole arrays, and what looks for functions in a function that has none."""
+        if not compiles_rightly():
+            return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        has_inner = any(isinstance(item, CodeType) for item in self.state.func_id.code.co_consts)
+        has_inner = any(isinstance(item, types.CodeType) for item in self.state.func_id.code.co_consts)
         without = {NopythonRewrites} if has_inner else {NopythonRewrites, InlineClosureLikes}
         kept = [item for item in steps.passes if item[0] not in without]
         steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in kept]
@@ -258,3 +284,54 @@ class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
             for made in self.overloads.values():
                 _check_result(self.targetctx, made.signature.return_type, self.py_func.__qualname__)
         return found
+
+
+_canary = threading.local()
+
+
+@functools.cache
+def compiles_rightly() -> bool:
+    """Return whether a small kernel, compiled as ours are, answers as Python does; a warning says that it does not.
+
+    It is asked before the first function is compiled. Where the answer is no, numba's own steps are taken.
+    """
+    if getattr(_canary, "is_asked", False):
+        return True
+    _canary.is_asked = True
+    try:
+        options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+        inner = InnerDispatcher(
+            _step,
+            targetoptions={"nopython": True, **options, "no_cpython_wrapper": True},
+            pipeline_class=CalledCompiler,
+        )
+        run = types.FunctionType(_sum_of_steps.__code__, {**globals(), "_step": inner}, _sum_of_steps.__name__)
+        rows, places = np.array([[1.0, -2.0], [0.1, 0.7], [1e300, 5e-324]]), np.arange(3)
+        given = rows.copy()
+        expected, made = _sum_of_steps(rows, places), njit(pipeline_class=KernelCompiler, **options)(run)(given, places)
+        if made == expected and given.tobytes() == rows.tobytes():
+            return True
+        reason = f"{made!r} instead of {expected!r}"
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+    finally:
+        _canary.is_asked = False
+    text = f"numba {numba.__version__} does not compile as expected ({reason}): its own, slower steps are taken"
+    warnings.warn(text, RuntimeWarning, stacklevel=1)
+    return False
+
+
+def _step(rows: Any, place: Any, scale: float) -> tuple[float, int]:
+    row = rows[place]
+    return scale * row[0] + abs(row[-1]), int(place) + 1
+
+
+def _sum_of_steps(rows: Any, places: Any) -> tuple[float, int]:
+    total, last = 0.0, -1
+    for place in places:
+        value, last = _step(rows, place, 0.5)
+        total = max(total, value) if last & 1 else total - value
+        rows[last - 1, 0] = total
+    for row in rows:
+        row[0] *= 0.5
+    return total, last
