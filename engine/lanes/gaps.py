@@ -99,13 +99,6 @@ def child_bounds(
 
 
 @traced
-def box_reaches(boxes: Rows, node: int, way: Triple, work: Rows) -> None:
-    """Write how far the eight boxes of a node reach along a direction, in the tree, to the first row of work."""
-    box = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
-    store(work, 0, dot(way, box[:3]) + dot(_sizes(way), box[3:]))
-
-
-@traced
 def triangle_reaches(blocks: Rows, node: int, way: Triple, work: Rows) -> None:
     """Write how far the eight triangles of a block reach along a direction, in the tree, to the first row of work."""
     store(work, 0, _ends(way, [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)])[1])

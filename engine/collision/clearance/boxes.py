@@ -22,8 +22,6 @@ from engine.lanes.tracing import LANES
 from engine.predicates.vectors import dot, largest_of, minus
 from engine.types import Point3
 
-MOST_LISTED: Final = 64
-"""Blocks of either body that are measured in all pairs."""
 ROOT: Final = -1
 """In place of a lane: the whole tree."""
 _ROUNDING: Final = 2.0**-44
@@ -47,13 +45,13 @@ Heap = namedtuple("Heap", "bounds lanes")
 Candidates = namedtuple("Candidates", "pairs bounds")
 """Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
 
-Room = namedtuple("Room", "heap found limits line kept waiting waiting_bounds listed points frames work fixed")
+Room = namedtuple("Room", "heap found limits line kept points frames work fixed")
 """Work space of searches, one at a time.
 
 limits (2,): of a search (traversal.py). line (12,): the direction of the nearest pair so far, not longer than 1, in
 the axes of both bodies and in space; where the two origins are along it; how often it turned. kept (n_nodes, 4): of
-either body the turn at which `block_reach` was found, and it. waiting, waiting_bounds (n_nodes,), listed (2,
-MOST_LISTED): nodes of one body. points (2, 3): the nearest. frames, work, fixed: of `lanes/gaps.py`.
+either body the turn at which `block_reach` was found, and it. points (2, 3): the nearest. frames, work, fixed: of
+`lanes/gaps.py`.
 """
 
 
@@ -62,7 +60,6 @@ def new_room(room: int, n_nodes: int) -> Room:
     heap, found = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
         heap, Candidates(found, np.empty(room)), np.empty(2), np.zeros(12), np.zeros((n_nodes, 4)),
-        np.empty(n_nodes + LANES, np.int32), np.empty(n_nodes + LANES), np.empty((2, MOST_LISTED), np.int32),
         np.empty((2, 3)), np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((GAP_ROWS, LANES), np.float32),
         np.empty((FIXED_ROWS, LANES), np.float32),
     )  # fmt: skip

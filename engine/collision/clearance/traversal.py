@@ -4,9 +4,8 @@ A pair of boxes, each with the disc of what it holds, is bounded from below by `
 nearest pair so far too. Pairs wait in a heap, the least bound first; the larger box of a pair is opened, its eight
 children are bounded at once. Of two blocks the pairs of triangles that may be near are told eight at once and bounded
 from both sides (near_triangles.py); the least upper bound so far ends the search once no pair that waits is below it.
-Now and then each body alone is asked what of it reaches far enough along that line to be nearer: where that is little,
-it is measured and nothing is left. What is returned are all pairs of triangles whose lower bound does not exceed the
-least upper bound: the distance of the bodies is that of one of them.
+What is returned are all pairs of triangles whose lower bound does not exceed the least upper bound: the distance of the
+bodies is that of one of them.
 
 limits (2,) of a search: pairs above the first are not looked for (it falls to the least upper bound found); a pair
 below the second ends it as CLOSER.
@@ -27,9 +26,7 @@ from engine.collision.clearance.blocks import (
     DONE,
     FULL,
     INTERRUPTED,
-    approach,
     block_reach,
-    finish_along_line,
     keep_below,
     measure_blocks,
 )
@@ -125,21 +122,12 @@ def _half_of(view: View, at: int) -> float:
 def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
     """Fill the candidates; return how the search ended, and their number. See `find_nearest`."""
     first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
-    how, n_found = approach(s, limits)
-    if how != DONE:
-        return how, 0
-    n, n_turns, next_try = 1, 0, 16
+    n, n_found = 1, 0
     s.room.heap.bounds[0], s.room.heap.lanes[0, 0], s.room.heap.lanes[0, 1] = 0.0, ROOT, ROOT
     while n > 0 and s.room.heap.bounds[0] <= limits[0]:  # bound: each pair of boxes enters once
         i, j = int(s.room.heap.lanes[0, 0]), int(s.room.heap.lanes[0, 1])
         drop_first(s.room.heap, n)
         n -= 1
-        n_turns += 1
-        if n_turns == next_try:
-            next_try *= 16
-            how, n_all = finish_along_line(s, limits)
-            if n_all >= 0:
-                return how, n_all
         if flag[0] != 0:
             return INTERRUPTED, 0
         if n + LANES > len(s.room.heap.bounds):

@@ -14,7 +14,6 @@ from engine.lanes.discs import DISC_ROWS, inverse_ratio
 from engine.lanes.gaps import (
     FIXED_ROWS,
     GAP_ROWS,
-    box_reaches,
     child_bounds,
     near_triangle,
     place_triangles,
@@ -94,16 +93,14 @@ def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
                         assert near_triangle(a.blocks, node, lane, frames, way, most, work) >> k & 1
 
 
-def test_reaches_are_those_of_what_is_below() -> None:
+def test_reaches_of_blocks_are_those_of_their_triangles() -> None:
     draw = np.random.default_rng(8)
     mesh, work = _soup(draw, 3.0), np.empty((GAP_ROWS, LANES), np.float32)
     d = draw.normal(size=3)
     d /= np.linalg.norm(d)
-    for node in range(len(mesh.child)):
-        is_block = bool(mesh.child[node, 0] < 0)
-        (triangle_reaches if is_block else box_reaches)(mesh.blocks if is_block else mesh.boxes, node, tuple(d), work)
+    for node in _children(mesh, are_blocks=True):
+        triangle_reaches(mesh.blocks, node, tuple(d), work)
         for lane in range(LANES):
             if mesh.child[node, lane] != EMPTY:
                 reach = ((_below(mesh, node, lane) - mesh.origin) / mesh.scale @ d).max()
-                assert reach <= float(work[0, lane]) + 2.0**-18
-                assert not is_block or abs(reach - float(work[0, lane])) <= 2.0**-18
+                assert abs(reach - float(work[0, lane])) <= 2.0**-18
