@@ -12,27 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_detail import mesh_parts
-from engine.collision.planar.outline import (
-    FIRST,
-    SECOND,
-    arrange_outlines,
-    boundaries_meet,
-    live_edges,
-    outline_of,
-    single_points,
-)
+from engine.collision.planar.outline import live_edges, outline_of
+from engine.collision.planar.outline_batch import outline_parts
 from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work
 from engine.collision.simple.against_ball import body_sphere_parts
 from engine.collision.simple.against_half_space import half_space_body_parts
 from engine.collision.simple.boundary import live_parts
-from engine.containment.rational_locate import rational_location
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.predicates.rational import largest_axis, minus, squared_length
 from engine.solids.aabb import Aabb
@@ -41,7 +32,7 @@ from engine.solids.checks import spell
 from engine.solids.half_space import HalfSpace
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
-from engine.types import Location, Rcc8, Relation
+from engine.types import Rcc8, Relation
 
 PartsFunction = Callable[[Any, Any, Poses, Work], Parts]
 
@@ -144,19 +135,9 @@ def _half_space_sphere(space: HalfSpace, ball: Sphere, poses: Poses, work: Work)
     return Parts(True, height < 0 or height**2 < Fraction(ball.radius) ** 2 * reach, True)
 
 
-def _outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
-    outlines = [outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)]
-    arrangement, _ = arrange_outlines(outlines, work.budget)
-    labels, meet = label_faces(subdivide(arrangement)), boundaries_meet(arrangement)
-    for outline, other, pose in ((outlines[0], second, poses[1]), (outlines[1], first, poses[0])):
-        for vertex in single_points(outline):
-            meet |= rational_location(outline.points[vertex], other, pose, work.budget.check) == Location.BOUNDARY
-    return Parts(FIRST in labels, SECOND in labels, meet)
-
-
 PARTS: dict[tuple[int, str, str], PartsFunction] = {
     **{(3, first, second): mesh_parts for first in MESHES for second in MESHES},
-    **{(2, first, second): _outlines for first in OUTLINES for second in OUTLINES},
+    **{(2, first, second): outline_parts for first in OUTLINES for second in OUTLINES},
     **{(d, "half_space", body): half_space_body_parts for d, body in BODIES},
     **{(d, body, "sphere"): body_sphere_parts for d, body in BODIES},
 }

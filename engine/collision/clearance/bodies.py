@@ -55,7 +55,7 @@ def outline_of(solid: Solid) -> Outline:
 def _outline(solid: Solid) -> Outline:
     if isinstance(solid, Sphere):
         return read_only(solid.center[None]), read_only(np.zeros(1, np.int64)), radius_of(solid), _Names(solid, ())
-    vertices, following = outline_arrays(solid)
+    vertices, following, _ = outline_arrays(solid)
     return vertices, following, 0.0, _Names(solid, following.tolist())
 
 

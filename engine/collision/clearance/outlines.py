@@ -42,7 +42,9 @@ def _are_parted(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
 
 @called
 def _related(a: Placed, b: Placed, error: float) -> int:
-    relation, _, _ = relate_placed(a.points, a.following, b.points, b.following, b.boxes, error)
+    relation, _, _, _, _ = relate_placed(
+        a.points, a.following, a.following[:0], b.points, b.following, b.following[:0], b.boxes, error
+    )
     return -1 if relation == UNSETTLED else (1 if relation == DISJOINT else 0)
 
 

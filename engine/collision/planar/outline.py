@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,17 @@ from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget
 from engine.collision.exact_images import image_point, rounded
-from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Kind, Poses, Witness, Work
+from engine.collision.result import (
+    FIRST_WITHIN,
+    NO_CONTACT,
+    SECOND_WITHIN,
+    Collision,
+    Kind,
+    Parts,
+    Poses,
+    Witness,
+    Work,
+)
 from engine.containment.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
 from engine.solids.aabb import Aabb
@@ -171,18 +182,7 @@ def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Wor
     a, b = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
         return NO_CONTACT
-    arrangement, _ = arrange_outlines([a, b], work.budget)
-    subdivision = subdivide(arrangement)
-    labels = label_faces(subdivision)
-    beside = [(labels[f], labels[g]) for f, g in zip(subdivision.faces[0::2], subdivision.faces[1::2])]
-    first_points = [rational_location(a.points[k], second, poses[1], work.budget.check) for k in single_points(a)]
-    second_points = [rational_location(b.points[k], first, poses[0], work.budget.check) for k in single_points(b)]
-    meets = boundaries_meet(arrangement) or Location.BOUNDARY in (*first_points, *second_points)
-    # Edges of one body, not of the other, with the other's open interior on both sides.
-    first_parts = [bool(left & right & SECOND) for c, (left, right) in zip(arrangement.cover, beside) if c == FIRST]
-    second_parts = [bool(left & right & FIRST) for c, (left, right) in zip(arrangement.cover, beside) if c == SECOND]
-    first_parts += [location == Location.INSIDE for location in first_points]
-    second_parts += [location == Location.INSIDE for location in second_points]
+    labels, meets, first_parts, second_parts = _lying(a, b, (first, second), poses, work.budget)
     if not meets:
         if not any(first_parts) and not any(second_parts):
             return NO_CONTACT
@@ -198,7 +198,41 @@ def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Wor
     return Collision(Relation.OVERLAPPING if overlapping else Relation.TOUCHING, witness)
 
 
-def boundaries_meet(arrangement: Arrangement) -> bool:
+class _Lying(NamedTuple):
+    """Of two outlines: the labels of the faces; whether the boundaries meet; of each body, of all pieces of edges off
+    the other's boundary and all points, whether they lie in the other's open interior."""
+
+    labels: list[int]
+    meet: bool
+    first: list[bool]
+    second: list[bool]
+
+
+def _lying(a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: Poses, budget: Budget) -> _Lying:
+    arrangement, _ = arrange_outlines([a, b], budget)
+    subdivision = subdivide(arrangement)
+    labels, meet = label_faces(subdivision), _boundaries_meet(arrangement)
+    sides = [labels[left] & labels[right] for left, right in zip(subdivision.faces[0::2], subdivision.faces[1::2])]
+    parts: list[list[bool]] = []
+    for outline, own, other, solid, pose in (
+        (a, FIRST, SECOND, solids[1], poses[1]),
+        (b, SECOND, FIRST, solids[0], poses[0]),
+    ):
+        points = [rational_location(outline.points[k], solid, pose, budget.check) for k in single_points(outline)]
+        meet |= Location.BOUNDARY in points
+        parts.append([bool(side & other) for cover, side in zip(arrangement.cover, sides) if cover == own])
+        parts[-1] += [location == Location.INSIDE for location in points]
+    return _Lying(labels, meet, *parts)
+
+
+def parts_by_arrangement(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+    """Return what of each of two overlapping bodies lies outside the other; exact."""
+    outlines = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
+    labels, meet, _, _ = _lying(*outlines, (first, second), poses, work.budget)
+    return Parts(FIRST in labels, SECOND in labels, meet)
+
+
+def _boundaries_meet(arrangement: Arrangement) -> bool:
     """Tell whether some edge belongs to both bodies, or some node has edges of both."""
     if BOTH in arrangement.cover:
         return True

@@ -2,8 +2,10 @@
 other.
 
 One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
-outside, for no other edge comes near. Where all edges are surely apart, a vertex of each ring tells whether it lies in
-the other body. Contacts, and what rounded poses leave open, stay UNSETTLED for the exact path.
+outside, for no other edge comes near. Where edges meet and none cross, every such place has a vertex: about it either
+interior is a sector, and three comparisons of sectors say whether the interiors meet there and which sticks out of the
+other. A ring that meets nothing lies where a vertex of it does. Together that is all: an edge that enters the other's
+interior does so at a contact, or its whole ring lies there. What rounded poses leave open stays UNSETTLED.
 """
 
 from __future__ import annotations
@@ -14,54 +16,115 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
+from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
-from engine.collision.planar.outline import collide_outline_outline, rings_of
-from engine.collision.result import FIRST_WITHIN, OUTLINES, SECOND_WITHIN, UNNAMED, Collision, Poses, Witness, Work
+from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement, rings_of
+from engine.collision.result import (
+    FIRST_WITHIN,
+    OUTLINES,
+    RELATIONS,
+    SECOND_WITHIN,
+    UNNAMED,
+    Collision,
+    Kind,
+    Parts,
+    Poses,
+    Witness,
+    Work,
+)
 from engine.direct import entry_of
-from engine.jit import allocating_kernel, inline, kernel
+from engine.jit import allocating_kernel, called, inline, kernel
+from engine.predicates.error_free import two_sum
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
 from engine.solids.base import Solid
 from engine.solids.pose import motion_of
 from engine.solids.ragged import next_in_rings
-from engine.types import UNDECIDED, Point2, Relation
+from engine.types import UNDECIDED, Point2
 
 MOST_EDGES = 1024
 """Beyond, pairs of edges are too many to look at all of them."""
 
-_NONE = np.empty((0, 2)), np.empty(0, np.int64)
-UNSURE = 2
+_NONE = np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int8)
+APART, CROSSING, UNSURE, _VERTEX_EDGE, _VERTEX_VERTEX = range(5)
+"""How two edges lie, of which the last two are contacts, and CROSSING a strict one."""
+_KINDS: dict[int, Kind] = {CROSSING: "edge_edge", _VERTEX_EDGE: "vertex_edge", _VERTEX_VERTEX: "vertex_vertex"}
+ON_EDGE = 3
+"""Of a point: neither inside, 1, nor outside, 0."""
+IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
+"""Bits: where the open interiors meet; where that of the first lies outside the second; that of the second outside the
+first."""
+_IN, _OUT, _MAYBE = 1, 2, 4
+"""Bits: of the rings of a body some inside another, some outside, some maybe."""
+_SMALLEST, _LARGEST = 2.0**-480, 2.0**480
+"""Of coordinates other than 0 for which orient2d always tells."""
 BLOCK: Final = 8
 """Edges that follow each other in number, in one box: what that box misses, they miss."""
 _POLL_EVERY = 64
 
 
-OutlineArrays = namedtuple("OutlineArrays", "vertices following firsts")
+OutlineArrays = namedtuple("OutlineArrays", "vertices following sides firsts")
 """Several bodies, one after another. vertices (n, 2); following (n,): the vertex at the end of each edge, counted
-within its body; firsts (n_bodies + 1,): of each body."""
+within its body; sides (n,): as `find_sides` does; firsts (n_bodies + 1,): of each body."""
 
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     """Return the bodies as arrays, and for each its number there, -1 for one that the batches do not take."""
     outlines = [outline_arrays(body) if body.type in OUTLINES else _NONE for body in bodies]
-    firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _ in outlines]))
-    vertices, following = map(np.concatenate, zip(_NONE, *outlines))
+    firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _, _ in outlines]))
+    vertices, following, sides = map(np.concatenate, zip(_NONE, *outlines))
     numbers = [
         number if 0 < len(points) <= MOST_EDGES and _is_simple(body) else -1
-        for number, (body, (points, _)) in enumerate(zip(bodies, outlines))
+        for number, (body, (points, _, _)) in enumerate(zip(bodies, outlines))
     ]
-    return OutlineArrays(vertices, following, firsts), np.array(numbers, np.int64)
+    return OutlineArrays(vertices, following, sides, firsts), np.array(numbers, np.int64)
 
 
-def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray]:
-    """Return the vertices (n, 2) of a polygon, triangle or box, and for each edge the vertex at its end."""
+def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray, Int8Array]:
+    """Return the vertices (n, 2) of a polygon, triangle or box, for each edge the vertex at its end, and its side."""
     return solid.prepared("outline", lambda: _arrays(*rings_of(solid)))
 
 
-def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray]:
-    return read_only(vertices), read_only(next_in_rings(offsets))
+def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray, Int8Array]:
+    vertices, following = read_only(vertices), read_only(next_in_rings(offsets))
+    sides = np.zeros(len(vertices), np.int8)
+    if len(vertices) <= MOST_EDGES:
+        entry_of(find_sides)(vertices, following, sides)
+    return vertices, following, read_only(sides)
+
+
+@kernel
+def find_sides(vertices: Any, following: Any, sides: Any) -> None:
+    """Fill sides (n,) int8 of edges that meet only in vertices: 1 where the interior is on the left, -1 on the right,
+    0 where some coordinate is too large or too small to tell.
+
+    At the lowest of the leftmost vertices of a ring the outside of that ring is on the left; other rings turn it over.
+    """
+    for vertex in range(len(vertices)):
+        for k in range(2):
+            size = abs(vertices[vertex, k])
+            if not (size == 0.0 or _SMALLEST < size < _LARGEST):
+                return
+    start = 0
+    for edge in range(len(following)):
+        if following[edge] > edge:  # not the last of its ring
+            continue
+        least, before, p = edge, edge, as_point2(vertices, edge)
+        for vertex in range(start, edge):
+            q = as_point2(vertices, vertex)
+            if q.x < p.x or (q.x == p.x and q.y < p.y):
+                least, p = vertex, q
+        before = edge if least == start else least - 1
+        side = orient2d(as_point2(vertices, before), p, as_point2(vertices, following[least]))
+        for other in range(len(following)):
+            a, b = as_point2(vertices, other), as_point2(vertices, following[other])
+            if (a.y <= p.y) != (b.y <= p.y) and not start <= other <= edge:
+                if (orient2d(a, b, p) > 0) == (b.y > a.y):
+                    side = -side
+        for own in range(start, edge + 1):
+            sides[own] = side
+        start = edge + 1
 
 
 @inline
@@ -72,25 +135,27 @@ def _is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
 
 @inline
 def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
-    """Return 1 if two open edges surely cross in one point, 0 if they are surely apart, else UNSURE."""
+    """Return CROSSING if two open edges surely cross in one point, APART, a contact, or UNSURE."""
     slack = 2.0 * error
     if max(a.x, b.x) + slack < min(c.x, d.x) or max(c.x, d.x) + slack < min(a.x, b.x):
-        return 0
+        return APART
     if max(a.y, b.y) + slack < min(c.y, d.y) or max(c.y, d.y) + slack < min(a.y, b.y):
-        return 0
+        return APART
     by_c, by_d = orient2d_near(a, b, c, error), orient2d_near(a, b, d, error)
     if by_c * by_d == 1:  # UNDECIDED is 2
-        return 0
+        return APART
     by_a, by_b = orient2d_near(c, d, a, error), orient2d_near(c, d, b, error)
     if by_a * by_b == 1:
-        return 0
+        return APART
     if by_c * by_d == -1 and by_a * by_b == -1:
-        return 1
+        return CROSSING
     if UNDECIDED in (by_a, by_b, by_c, by_d):
         return UNSURE
     is_met = (by_a == 0 and _is_in_box(a, c, d)) or (by_b == 0 and _is_in_box(b, c, d))
     is_met = is_met or (by_c == 0 and _is_in_box(c, a, b)) or (by_d == 0 and _is_in_box(d, a, b))
-    return UNSURE if is_met else 0
+    if not is_met:
+        return APART
+    return _VERTEX_VERTEX if a in (c, d) or b in (c, d) else _VERTEX_EDGE
 
 
 @kernel
@@ -107,7 +172,7 @@ def is_simple(vertices: Any, following: Any) -> bool:
         for j in range(i):
             if following[i] == j or following[j] == i:
                 continue
-            if _crossing(a, b, as_point2(vertices, j), as_point2(vertices, following[j]), 0.0) != 0:
+            if _crossing(a, b, as_point2(vertices, j), as_point2(vertices, following[j]), 0.0) != APART:
                 return False
     return True
 
@@ -115,16 +180,22 @@ def is_simple(vertices: Any, following: Any) -> bool:
 @inline
 def _place(vertices: Any, turn: Any, move: Any, is_posed: bool, placed: Any) -> float:
     """Write the rounded posed vertices of a body; return a bound on the error of each coordinate (`placement.py`)."""
-    reach = 0.0
+    reach, is_exact = 0.0, True
+    for axis in range(2):  # a turn by the lattice
+        x, y = turn[axis, 0], turn[axis, 1]
+        is_exact = is_exact and (not is_posed or (x * y == 0.0 and abs(x + y) == 1.0))
     for vertex in range(len(vertices)):
         x, y = vertices[vertex, 0], vertices[vertex, 1]
         reach = max(reach, abs(x), abs(y))
         for axis in range(2):
-            value = x if axis == 0 else y
+            value, lost = (x if axis == 0 else y), 0.0
             if is_posed:
-                value = turn[axis, 0] * x + turn[axis, 1] * y + move[axis]
+                value, lost = two_sum(turn[axis, 0] * x + turn[axis, 1] * y, move[axis])
+            is_exact = is_exact and lost == 0.0
             placed[vertex, axis] = value
-    return 2.0**-49 * (3.0 * reach + max(abs(move[0]), abs(move[1]))) + 2.0**-1060 if is_posed else 0.0
+    if is_exact:
+        return 0.0
+    return 2.0**-49 * (3.0 * reach + max(abs(move[0]), abs(move[1]))) + 2.0**-1060
 
 
 @inline
@@ -155,7 +226,7 @@ def _misses(boxes: Any, block: int, a: Point2, b: Point2, slack: float) -> bool:
 
 @inline
 def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
-    """Return 1 for a point inside the rings, 0 outside, UNSURE where a bound does not tell."""
+    """Return 1 for a point inside the rings, 0 outside, ON_EDGE, or UNSURE where a bound does not tell."""
     is_inside = 0
     for edge in range(len(following)):
         a, b = as_point2(vertices, edge), as_point2(vertices, following[edge])
@@ -163,11 +234,13 @@ def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
             continue
         if error != 0.0 and min(abs(a.y - p.y), abs(b.y - p.y)) <= 2.0 * error:
             return UNSURE
+        if a == p or (a.y == b.y and min(a.x, b.x) <= p.x):
+            return ON_EDGE
         if (a.y <= p.y) == (b.y <= p.y):
             continue
         side = orient2d_near(a, b, p, error)
         if side == UNDECIDED or side == 0:
-            return UNSURE
+            return ON_EDGE if side == 0 else UNSURE
         if (side > 0) == (b.y > a.y):
             is_inside = 1 - is_inside
     return is_inside
@@ -175,28 +248,75 @@ def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
 
 @inline
 def _rings_inside(points: Any, following: Any, vertices: Any, their_following: Any, error: float) -> int:
-    """Return 1 if all rings of a body lie inside another one that they do not meet, 0 if none does, else UNSURE."""
-    found = -1
+    """Return where the rings of a body lie that do not meet another one, as bits; others add nothing that is wrong."""
+    found = 0
     for vertex in range(len(following)):
         if following[vertex] > vertex:  # not the last of its ring
             continue
         where = inside(as_point2(points, vertex), vertices, their_following, error)
-        if where == UNSURE or (found >= 0 and where != found):
-            return UNSURE
-        found = where
+        if where != ON_EDGE:
+            found |= _IN if where == 1 else (_OUT if where == 0 else _MAYBE)
+    return found
+
+
+@inline
+def _is_from(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
+    """Tell whether the direction from p to x is that to s, or lies strictly between s and e, counter-clockwise."""
+    by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
+    if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
+        if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
+            return True
+    if turn == 0:
+        return by_s > 0
+    return (by_s > 0 and by_e > 0) if turn > 0 else (by_s > 0 or by_e > 0)
+
+
+@called
+def _have_common(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
+    """Tell whether the open sectors about p from s to e, and from t to f, counter-clockwise, have common points."""
+    return _is_from(p, s, e, t) or _is_from(p, t, f, s)
+
+
+@inline
+def _of_sectors(
+    p: Point2, before: Point2, after: Point2, side: int, their_before: Point2, their_after: Point2, their_side: int
+) -> int:
+    """Return what holds about a vertex of one boundary on another, as bits."""
+    s, e = (after, before) if side > 0 else (before, after)
+    t, f = (their_after, their_before) if their_side > 0 else (their_before, their_after)
+    found = IN_BOTH if _have_common(p, s, e, t, f) else 0
+    found |= OUT_OF_SECOND if _have_common(p, s, e, f, t) else 0
+    return found | (OUT_OF_FIRST if _have_common(p, t, f, e, s) else 0)
+
+
+@called
+def _of_contact(
+    points: Any, following: Any, edge: int, side: int, vertices: Any, theirs: Any, other: int, their_side: int
+) -> int:
+    """Return what holds where two edges meet, as bits; of the start of an edge the one before it says that."""
+    a, b = as_point2(points, edge), as_point2(points, following[edge])
+    c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
+    found = 0
+    if b != c and _is_in_box(b, c, d) and orient2d(c, d, b) == 0:
+        after = as_point2(points, following[following[edge]])
+        their_after = as_point2(vertices, theirs[theirs[other]]) if b == d else d
+        found = _of_sectors(b, a, after, side, c, their_after, their_side)
+    if d != a and d != b and _is_in_box(d, a, b) and orient2d(a, b, d) == 0:
+        found |= _of_sectors(d, a, b, side, c, as_point2(vertices, theirs[theirs[other]]), their_side)
     return found
 
 
 @inline
 def relate_placed(
-    points: Any, following: Any, vertices: Any, theirs: Any, boxes: Any, error: float
-) -> tuple[int, int, int]:
-    """Return the relation of two placed bodies, or UNSETTLED, and the edges that cross, -1 for none or not the first.
+    points: Any, following: Any, sides: Any, vertices: Any, theirs: Any, their_sides: Any, boxes: Any, error: float
+) -> tuple[int, int, int, int, int]:
+    """Return the relation of two placed bodies, or UNSETTLED; what holds of their interiors, as bits; the first edges
+    that meet, -1 for none or not the first, and how.
 
-    Of bodies that are not simple OVERLAPPING says no more than that they meet. boxes: of the second's blocks. error: of
-    each coordinate.
+    Of bodies that are not simple a relation says no more than whether they meet. sides: none where that is enough.
+    boxes: of the second's blocks. error: of each coordinate.
     """
-    is_unsure = False
+    is_unsure, found, first, second, kind = False, 0, -1, -1, APART
     for edge in range(len(following)):
         a, b = as_point2(points, edge), as_point2(points, following[edge])
         for block in range(n_blocks(len(theirs))):
@@ -205,28 +325,48 @@ def relate_placed(
             for other in range(BLOCK * block, min(BLOCK * (block + 1), len(theirs))):
                 c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
                 how = _crossing(a, b, c, d, error)
-                if how == 1:
-                    return OVERLAPPING, (-1 if is_unsure else edge), other
-                is_unsure |= how != 0
+                if how == APART:
+                    continue
+                if how == UNSURE:
+                    is_unsure = True
+                elif kind == APART:
+                    first, second, kind = (-1 if is_unsure else edge), other, how
+                if how == CROSSING:
+                    return OVERLAPPING, IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND, first, second, kind
+                if how > UNSURE:
+                    if len(sides) == 0 or len(their_sides) == 0 or sides[edge] == 0 or their_sides[other] == 0:
+                        return UNSETTLED, 0, -1, -1, kind
+                    found |= _of_contact(
+                        points, following, edge, sides[edge], vertices, theirs, other, their_sides[other]
+                    )
     if is_unsure:
-        return UNSETTLED, -1, -1
-    in_second = _rings_inside(points, following, vertices, theirs, error)
-    in_first = _rings_inside(vertices, theirs, points, following, error)
-    if in_second == 0 and in_first == 0:
-        return DISJOINT, -1, -1
-    if in_second + in_first == 1:
-        return FIRST_INSIDE_SECOND if in_second == 1 else SECOND_INSIDE_FIRST, -1, -1
-    return UNSETTLED, -1, -1
+        return UNSETTLED, 0, -1, -1, kind
+    own, their = (
+        _rings_inside(points, following, vertices, theirs, error),
+        _rings_inside(vertices, theirs, points, following, error),
+    )
+    if (own | their) & _MAYBE:
+        return UNSETTLED, 0, -1, -1, kind
+    if kind == APART and own == _IN and their == _OUT:
+        return FIRST_INSIDE_SECOND, IN_BOTH | OUT_OF_FIRST, -1, -1, kind
+    if kind == APART and own == _OUT and their == _IN:
+        return SECOND_INSIDE_FIRST, IN_BOTH | OUT_OF_SECOND, -1, -1, kind
+    found |= (IN_BOTH | OUT_OF_FIRST if own & _IN else 0) | (OUT_OF_SECOND if own & _OUT else 0)
+    found |= (IN_BOTH | OUT_OF_SECOND if their & _IN else 0) | (OUT_OF_FIRST if their & _OUT else 0)
+    if found & IN_BOTH:
+        return OVERLAPPING, found, first, second, kind
+    return (DISJOINT if kind == APART else TOUCHING), found, first, second, kind
 
 
 @allocating_kernel
 def relate_outline_pairs(
-    pool: OutlineArrays, bodies: Any, rows: Any, poses: PoseArrays, pairs: Any, relations: Any, flag: Any
-) -> None:
+    pool: OutlineArrays, bodies: Any, rows: Any, poses: PoseArrays, pairs: Any, has_detail: bool, relations: Any,
+    flag: Any,
+) -> None:  # fmt: skip
     """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of bodies of a scene.
 
-    bodies: of each its number in the pool, or -1; rows: of each the row of its pose, 0 for none. Returns early when the
-    flag is raised.
+    bodies: of each its number in the pool, or -1; rows: of each the row of its pose, 0 for none. has_detail: overlaps
+    that are no PO stay UNSETTLED. Returns early when the flag is raised.
     """
     placed, boxes = np.empty((2, MOST_EDGES, 2)), np.empty((n_blocks(MOST_EDGES), 4))
     for item in range(pairs.shape[0]):
@@ -241,43 +381,61 @@ def relate_outline_pairs(
         error = _place(pool.vertices[own], r[i_row], t[i_row], i_row != 0, placed[0])
         error = max(error, _place(pool.vertices[their], r[j_row], t[j_row], j_row != 0, placed[1]))
         box_blocks(placed[1], pool.following[their], boxes)
-        relations[item], _, _ = relate_placed(
-            placed[0], pool.following[own], placed[1], pool.following[their], boxes, error
-        )
+        relation, found, _, _, _ = relate_placed(
+            placed[0], pool.following[own], pool.sides[own], placed[1], pool.following[their], pool.sides[their], boxes,
+            error,
+        )  # fmt: skip
+        if not has_detail or relation != OVERLAPPING or found == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
+            relations[item] = relation
 
 
 @allocating_kernel
 def _relate_two(
-    vertices: Any, following: Any, turn: Any, move: Any, other: Any, their_following: Any, their_turn: Any,
-    their_move: Any, are_posed: tuple[bool, bool],
-) -> tuple[int, int, int]:  # fmt: skip
+    vertices: Any, following: Any, sides: Any, turn: Any, move: Any, other: Any, their_following: Any, their_sides: Any,
+    their_turn: Any, their_move: Any, are_posed: tuple[bool, bool],
+) -> tuple[int, int, int, int, int]:  # fmt: skip
     """Return what `relate_placed` does, of two bodies under poses."""
     n = len(vertices)
     placed, boxes = np.empty((n + len(other), 2)), np.empty((n_blocks(len(other)), 4))
     error = _place(vertices, turn, move, are_posed[0], placed[:n])
     error = max(error, _place(other, their_turn, their_move, are_posed[1], placed[n:]))
     box_blocks(placed[n:], their_following, boxes)
-    return relate_placed(placed[:n], following, placed[n:], their_following, boxes, error)
+    return relate_placed(placed[:n], following, sides, placed[n:], their_following, their_sides, boxes, error)
+
+
+def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, int, int]:
+    """Return what `relate_placed` does, UNSETTLED where that is not all: of bodies that meet and are not simple, or
+    large."""
+    one, other = outline_arrays(first), outline_arrays(second)
+    if max(len(one[1]), len(other[1])) > MOST_EDGES:
+        return UNSETTLED, 0, -1, -1, APART
+    found: tuple[int, int, int, int, int] = entry_of(_relate_two)(
+        *one, *motion_of(poses[0], 2), *other, *motion_of(poses[1], 2), (poses[0] is not None, poses[1] is not None)
+    )
+    if found[0] == DISJOINT or (found[0] != UNSETTLED and _is_simple(first) and _is_simple(second)):
+        return found
+    return UNSETTLED, 0, -1, -1, APART
 
 
 def collide_outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
     """Return what `collide_outline_outline` does, which decides what is not sure here."""
-    (vertices, following), (other, their_following) = outline_arrays(first), outline_arrays(second)
-    if max(len(following), len(their_following)) > MOST_EDGES:
-        return collide_outline_outline(first, second, poses, work)
-    own, their = motion_of(poses[0], 2), motion_of(poses[1], 2)
-    relation, i, j = entry_of(_relate_two)(
-        vertices, following, *own, other, their_following, *their, (poses[0] is not None, poses[1] is not None)
-    )
-    is_sure = relation != UNSETTLED and (relation == DISJOINT or (_is_simple(first) and _is_simple(second)))
-    if not is_sure or (relation == OVERLAPPING and work.witness and i < 0):
+    relation, _, i, j, kind = _related(first, second, poses)
+    if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
         return collide_outline_outline(first, second, poses, work)
     if relation == DISJOINT or not work.witness:
         return UNNAMED[relation]
-    if relation == OVERLAPPING:
-        return Collision(Relation.OVERLAPPING, Witness("edge_edge", i, j))
+    if relation >= OVERLAPPING:
+        return Collision(RELATIONS[relation], Witness(_KINDS[kind], i, j))
     return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
 
 
+def outline_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+    """Return what of each of two overlapping bodies lies outside the other."""
+    relation, found, _, _, kind = _related(first, second, poses)
+    if relation == UNSETTLED:
+        return parts_by_arrangement(first, second, poses, work)
+    return Parts(found & OUT_OF_SECOND != 0, found & OUT_OF_FIRST != 0, kind != APART)
+
+
 def _is_simple(solid: Solid) -> bool:
-    return solid.prepared("is_simple", lambda: bool(is_simple(*outline_arrays(solid))))
+    return solid.prepared("is_simple", lambda: bool(is_simple(*outline_arrays(solid)[:2])))

@@ -60,7 +60,7 @@ class SceneBatches:
         bodies, flag = self.bodies, budget.flag
         relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, found)
         if bodies.dimension == 2:
-            self._relate_outlines(pairs, found, budget, workers)
+            self._relate_outlines(pairs, found, detail, budget, workers)
             return found
         if not (found == UNSETTLED).any():
             return found
@@ -90,7 +90,9 @@ class SceneBatches:
             budget.check()
         return found
 
-    def _relate_outlines(self, pairs: IntArray, found: Int8Array, budget: Budget, workers: int | None) -> None:
+    def _relate_outlines(
+        self, pairs: IntArray, found: Int8Array, detail: bool, budget: Budget, workers: int | None
+    ) -> None:
         """Fill the relations of pairs of polygons, triangles and boxes of the plane, UNSETTLED where they are open."""
         bodies, flag = self.bodies, budget.flag
         if self._pools.outlines is None:
@@ -102,7 +104,7 @@ class SceneBatches:
 
         def task(start: int, stop: int) -> None:
             with np.errstate(all="ignore"):  # uncompiled runs only
-                relate_outline_pairs(outlines, simple, rows, poses, pairs[start:stop], found[start:stop], flag)
+                relate_outline_pairs(outlines, simple, rows, poses, pairs[start:stop], detail, found[start:stop], flag)
 
         run_chunks(task, len(pairs), budget=budget, workers=workers)
 

@@ -8,8 +8,9 @@ import pytest
 from engine import Aabb, Polygon, Pose, Solid, Triangle, collide
 from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
-from engine.collision.planar.outline import collide_outline_outline
-from engine.collision.planar.outline_batch import collide_outlines, outline_pool
+from engine.collision.planar import outline_batch
+from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement
+from engine.collision.planar.outline_batch import collide_outlines, outline_parts, outline_pool
 from engine.collision.result import Work
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import scene_bodies
@@ -87,3 +88,55 @@ def test_collinear_edges_that_are_apart_are_no_contact() -> None:
     assert SceneBatches(scene_bodies([first, second], [None, None])).relations(
         np.array([[0, 1]]), False, False, Budget(None, None), None
     ).tolist() == [0]
+
+
+IN_CONTACT = [
+    [SQUARE],
+    [SQUARE, [[1, 1], [3, 1], [3, 3], [1, 3]]],
+    [[[0, 0], [6, 1], [3, 2], [5, 5], [1, 4]]],
+    [[[0, 0], [2, 0], [4, 0], [4, 4], [2, 2], [0, 4]]],  # a straight corner and a reflex one
+    [SQUARE, [[1, 1], [3, 1], [2, 3]], [[6, 0], [8, 0], [8, 4]]],  # a hole, and a part beside it
+    [[[-4, -4], [8, -4], [8, 8], [-4, 8]], [[-2, -2], [6, -2], [6, 6], [-2, 6]], [[1, 1], [3, 1], [3, 3], [1, 3]]],
+    [[[0, 0], [2, -2], [4, 0], [2, 2]]],
+]
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.1, 2.0**300])
+def test_contacts_are_decided_without_an_arrangement(unit: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, relations = np.random.default_rng(8), []
+    quarter = Pose([[0, -1], [1, 0]], [3.0 * unit, 1.0 * unit])
+    for _ in range(400):
+        bodies = []
+        for k in rng.integers(0, len(IN_CONTACT), 2):
+            rings = [np.array(ring)[:: rng.choice([-1, 1])] for ring in IN_CONTACT[k]]
+            step, size = rng.integers(-4, 5, 2), rng.choice([0.5, 1.0, 1.0, 3.0])
+            bodies.append(Polygon([np.roll(ring * size + step, rng.integers(9), axis=0) * unit for ring in rings]))
+        first, second = bodies
+        work, poses = Work(Budget(None, None)), (None, quarter if unit != 0.1 and rng.integers(2) else None)
+        answer = collide_outline_outline(first, second, poses, work)
+        parts = parts_by_arrangement(first, second, poses, work)
+        with monkeypatch.context() as patch:
+            if answer.relation != answer.relation.OVERLAPPING or answer.witness.kind != "containment":
+                patch.setattr(outline_batch, "collide_outline_outline", None)
+            patch.setattr(outline_batch, "parts_by_arrangement", None)
+            assert collide_outlines(first, second, poses, work) == answer
+            assert outline_parts(first, second, poses, work) == parts
+        batches = SceneBatches(scene_bodies(bodies, list(poses)))
+        for detail in (False, True):
+            (how,) = batches.relations(np.array([[0, 1]]), False, detail, Budget(), None).tolist()
+            is_left = detail and answer.relation == answer.relation.OVERLAPPING and not (parts.first and parts.second)
+            assert how == (UNSETTLED if is_left else answer.relation)
+        relations.append(answer.relation.label)
+    assert set(relations) >= {"touching", "overlapping", "first_inside_second", "second_inside_first", "disjoint"}
+    assert relations.count("touching") > 20
+
+
+def test_contacts_beyond_the_range_of_signs_are_left_to_the_arrangement() -> None:
+    tiny, large = 2.0**-1000, 2.0**1000
+    first = Polygon([[[0, 0], [large, 0], [large, tiny], [0, large]]])
+    for step in (0.0, -large):
+        second = Polygon([np.array([[step, 0], [step + large, 0], [step + large, tiny], [step, large]])])
+        work = Work(Budget(None, None))
+        assert collide_outlines(first, second, (None, None), work) == collide_outline_outline(
+            first, second, (None, None), work
+        )
