@@ -12,7 +12,6 @@ from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ConvexArrays, ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
-from engine.collision.convex.poses import LEAST_POSES, lane_arrays, relate_in_lanes
 from engine.collision.detail import details_of_boxes, details_where_proven
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
@@ -25,6 +24,8 @@ from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 
+_LEAST_POSES: Final = 32
+"""What a batch of poses needs is made in the time that it spares on so many."""
 _FEW: Final = 64
 """Distinct solids that are all described for a question about some of them."""
 
@@ -134,29 +135,20 @@ def convex_poses(
     first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, budget: Budget, boolean: bool
 ) -> Callable[[int, int], None] | None:
     """Return the task that relates ranges of poses, UNSETTLED where open; None where this does not pay."""
-    if len(relations) < LEAST_POSES:
-        return None
     bodies = [body for body in (convex_body_of(first), convex_body_of(second)) if body is not None]
-    if len(bodies) < 2:
+    n = len(relations)
+    if len(bodies) < 2 or n < _LEAST_POSES:
         return None
-    pool, lanes = pooled(bodies), lane_arrays(*bodies)
-    turns, moves, _ = poses
+    pool, rows = pooled(bodies), np.append(np.int64(0), np.ones(n, np.int64))
+    pairs = np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
+    placed = (np.concatenate([still, given]) for still, given in zip(STILL[:2], poses[:2]))
+    all_poses = PoseArrays(*placed, True)
 
     def fill(start: int, stop: int) -> None:
-        found = relations[start:stop]
         with np.errstate(all="ignore"):  # uncompiled runs only
-            if lanes is not None:
-                some = PoseArrays(turns[start:stop], moves[start:stop], True)
-                relate_in_lanes(pool, lanes, STILL, some, boolean, found, budget.flag)
-            rest = np.flatnonzero(found == UNSETTLED)
-            if len(rest):
-                rows = np.append(np.int64(0), np.ones(len(rest), np.int64))
-                pairs = np.column_stack([np.zeros(len(rest), np.int64), np.arange(1, len(rest) + 1)])
-                placed = np.concatenate([STILL.rotations, turns[start + rest]])
-                moved = np.concatenate([STILL.translations, moves[start + rest]])
-                some, answers = PoseArrays(placed, moved, True), np.full(len(rest), UNSETTLED, np.int8)
-                relate_convex_pairs(pool, rows, some, pairs, boolean, False, answers, budget.flag)
-                found[rest] = answers
+            relate_convex_pairs(
+                pool, rows, all_poses, pairs[start:stop], boolean, False, relations[start:stop], budget.flag
+            )
         budget.check()
 
     return fill

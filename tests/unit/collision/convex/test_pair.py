@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from engine import Aabb, Polyhedron, Pose, Relation, Solid, Sphere
+from engine import Aabb, Polyhedron, Pose, Relation, Solid, Sphere, collide, collide_poses
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
 from engine.collision.convex.body import convex_body_of, pooled
@@ -52,7 +53,9 @@ def poses(n: int, spread: float, seed: int) -> list[Pose]:
     return result
 
 
-def short_answers(first: Solid, second: Solid, placed: list[Pose | None], boolean: bool = False) -> list[int]:
+def short_answers(
+    first: Solid, second: Solid, placed: list[Pose | None], boolean: bool = False, flag: npt.NDArray[np.uint8] = FLAG
+) -> list[int]:
     bodies = [convex_body_of(first), convex_body_of(second)]
     assert bodies[0] is not None
     assert bodies[1] is not None
@@ -65,7 +68,7 @@ def short_answers(first: Solid, second: Solid, placed: list[Pose | None], boolea
     rows, found = np.append(0, np.ones(n, np.int64)), np.full(n, UNSETTLED, np.int8)
     with np.errstate(all="ignore"):
         pool = pooled([body for body in bodies if body is not None])
-        relate_convex_pairs(pool, rows, PoseArrays(rotations, translations, True), pairs, boolean, False, found, FLAG)
+        relate_convex_pairs(pool, rows, PoseArrays(rotations, translations, True), pairs, boolean, False, found, flag)
     return found.tolist()
 
 
@@ -123,3 +126,58 @@ def test_the_ends_of_the_exponent_range_prove_nothing_wrong(scale: float) -> Non
 def test_bodies_without_interior_or_not_convex_have_no_short_path() -> None:
     flat, point = Aabb([0, 0, 0], [1, 1, 0]), Sphere([0, 0, 0], 0.0)
     assert convex_body_of(flat) is convex_body_of(point) is None
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-6, 1e-8, 1e-12, 0.0, -1e-12, -1e-8, -1e-6, -1e-5, -1e-3])
+def test_near_contact_is_decided_or_left_open(gap: float) -> None:
+    """Corner on corner and corner on face, from clearly apart to clearly within: never the wrong answer."""
+    one = BODIES["box"]
+    spike = Polyhedron([[0, 0, 0], [1, -1, -1], [1, 1, -1], [1, 0, 1]], [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+    placed: list[Pose | None] = [Pose(np.eye(3), [1 + gap, y, z]) for y in (0.0, 0.1, 0.45) for z in (0.0, -0.2)]
+    found = short_answers(one, spike, placed)
+    right = Relation.DISJOINT if gap > 0 else Relation.OVERLAPPING
+    if abs(gap) >= 1e-3:
+        assert found.count(right) >= len(placed) - 1
+    assert all(answer in (right, UNSETTLED) for answer in found)
+    if gap == 0.0:
+        assert found == [UNSETTLED] * len(placed)
+
+
+@pytest.mark.parametrize("shift", [1e3, 1e6, 1e9, 1e15])
+def test_bodies_far_from_the_origin(shift: float) -> None:
+    one, other = (Polyhedron(body.vertices * scale + move, body.triangles) for body, scale, move in (
+        (ball_of_belts(5, 2), 1.0, shift), (ball_of_belts(4, 3), 0.5, -shift)))  # fmt: skip
+    if convex_body_of(one) is None or convex_body_of(other) is None:
+        return  # rounded to so few places that they are not convex any more
+    placed: list[Pose | None] = [
+        Pose(pose.rotation, one.vertices.mean(0) - pose.rotation @ other.vertices.mean(0) + pose.translation)
+        for pose in poses(10, 0.8, 3)
+    ]
+    found = short_answers(one, other, placed)
+    exact = [collide_pair(one, other, (None, pose), Work(witness=False)).relation for pose in placed]
+    assert all(answer in (right, UNSETTLED) for answer, right in zip(found, exact))
+    assert shift > 1e6 or found.count(UNSETTLED) <= 1
+
+
+@pytest.mark.parametrize("scale", [1e-320, 1e-200, 1e-30, 1e30, 1e70, 1e200, 1e306])
+def test_rounded_bodies_at_the_ends_of_the_exponent_range(scale: float) -> None:
+    body = ball_of_belts(5, 2)
+    one = Polyhedron(body.vertices * scale, body.triangles)
+    if convex_body_of(one) is None:
+        return
+    placed: list[Pose | None] = [Pose(pose.rotation, pose.translation * scale) for pose in poses(9, 0.8, 4)]
+    found, unscaled = short_answers(one, one, placed), short_answers(body, body, list(poses(9, 0.8, 4)))
+    assert all(UNSETTLED in (a, b) or a == b for a, b in zip(found, unscaled))
+    assert short_answers(one, one, [Pose(np.eye(3), [1.7e308, 0, 0])])[0] in (Relation.DISJOINT, UNSETTLED)
+
+
+def test_a_raised_flag_ends_the_search() -> None:
+    body = ball_of_belts(5, 2)
+    assert short_answers(body, body, list(poses(20, 0.5, 5)), flag=np.ones(1, np.uint8)) == [UNSETTLED] * 20
+
+
+def test_many_poses_of_one_pair_are_what_each_alone_is() -> None:
+    body, placed = ball_of_belts(5, 2), poses(40, 0.6, 6)
+    turns, moves = [pose.rotation for pose in placed], [pose.translation for pose in placed]
+    alone = [int(collide(body, body, second_pose=pose).relation) for pose in placed]
+    assert collide_poses(body, body, turns, moves).tolist() == alone
