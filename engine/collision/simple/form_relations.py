@@ -13,12 +13,11 @@ from typing import Any, Final, NamedTuple
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
-from engine.collision.meshes.placement import orient2d_near
 from engine.jit import called, inline, kernel
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import add, add_product, grow, grow_product, is_safe, sign
 from engine.predicates.vectors import as_point3, cross, dot, minus
-from engine.types import UNDECIDED, Point2, Point3
+from engine.types import Point3
 
 HIGH: Final = 3
 RADIUS: Final = 6
@@ -132,31 +131,17 @@ def _face(turn: Any, axis: int, side: int) -> int:
 
 
 @inline
-def _side_of_diagonal(w: Any, own: int, their: int, i: int, p: int, j: int, q: int, is_rising: bool) -> int:
-    """Return on which side of the diagonal that cuts a face an edge passes it: 0 on it, UNDECIDED maybe."""
-    x, y = 12 * own + 4 * i + 2 * p, 12 * own + 4 * j + 2 * q
-    low, high = 12 * their + 4 * i, 12 * their + 4 * i + 2
-    start, end = 12 * their + 4 * j + (0 if is_rising else 2), 12 * their + 4 * j + (2 if is_rising else 0)
-    error = 0.0
-    for at in (x, y, low, high, start, end):
-        error = max(error, abs(w[at + 1]))
-    point = Point2(w[x], w[y])
-    return orient2d_near(Point2(w[low], w[start]), Point2(w[high], w[end]), point, error)
-
-
-@inline
 def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
     """Tell whether a rank lies strictly between those of the bounds of a body."""
     return bool(ranks[_THEIRS * body + axis] < rank < ranks[_THEIRS * body + 3 + axis])
 
 
 @called
-def _name_overlap(w: Any, ranks: Any, turn: Any, their_turn: Any) -> int:
+def _name_overlap(ranks: Any, turn: Any, their_turn: Any) -> int:
     """Return kind and faces of a contact of two boxes of space that overlap, or UNSETTLED.
 
     Faces in one plane on one side share an area. Where there are none, an edge of one box passes through a face of the
-    other: of each axis either both ends of one box lie within the other, or one of each. It passes the diagonal that
-    cuts the face in two, or one of the triangles.
+    other: of each axis either both ends of one box lie within the other, or one of each.
     """
     for face in range(6):
         axis, side = face >> 1, face & 1
@@ -172,11 +157,8 @@ def _name_overlap(w: Any, ranks: Any, turn: Any, their_turn: Any) -> int:
         if not _is_between(ranks, their, j, ranks[_THEIRS * own + 3 * q + j]):
             continue
         own_turn, other_turn = (turn, their_turn) if own == 0 else (their_turn, turn)
-        is_rising = source_of(other_turn, i)[1] == source_of(other_turn, j)[1]
-        side = _side_of_diagonal(w, own, their, i, p, j, q, is_rising)
         edge, face = _face(own_turn, i, p), _face(other_turn, k, s)
-        faces = edge << 3 | face << 6 if own == 0 else face << 3 | edge << 6
-        return UNSETTLED if side == UNDECIDED else (EDGE_EDGE if side == 0 else EDGE_FACE) | faces
+        return EDGE_FACE | (edge << 3 | face << 6 if own == 0 else face << 3 | edge << 6)
     return UNSETTLED
 
 
@@ -251,7 +233,7 @@ def _relate_boxes(a: Placed, b: Placed) -> int:
     if d == 2 or relation < OVERLAPPING:
         return relation
     touch = relation == TOUCHING
-    name = _name_touching(ranks, a.turn, b.turn) if touch else _name_overlap(w, ranks, a.turn, b.turn)
+    name = _name_touching(ranks, a.turn, b.turn) if touch else _name_overlap(ranks, a.turn, b.turn)
     return name if name == UNSETTLED else relation | name << KIND_AT
 
 
