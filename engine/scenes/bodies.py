@@ -58,7 +58,7 @@ class Bodies(Preparing):
         return self.prepared("arrays", lambda: self._as_arrays(budget), budget.check)
 
     def _as_arrays(self, budget: Budget) -> SceneBodies:
-        return bodies_of(self.solids, self.poses, *distinct_of(self.solids)[:2], budget.check)
+        return bodies_of(self.solids, self.poses, *distinct_of(self.solids), budget.check)
 
     def tree(self, budget: Budget) -> BodyTree:
         """Return the tree over the boxes of the bodies, at least one."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from engine.bounding.aabb import place_boxes
 from engine.collision.collide import TAKEN, check_pose, pair_function
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
-from engine.jit import kernel
 from engine.solids.base import Solid
 from engine.solids.bounds import own_box
 from engine.solids.pose import Pose, motions_of
@@ -102,19 +101,21 @@ def _placed(
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
     """Return each solid once and which of them each body is; raise unless every solid is one that `collide` takes, all
     of one dimension."""
-    distinct, kinds, firsts = distinct_of(bodies)
-    for index, body in zip(firsts.tolist(), distinct):
+    distinct, kinds = distinct_of(bodies)
+    for body in distinct:
         try:
             pair_function(body, body)
         except UnsupportedPairError:
+            index = _first(body, bodies)
             raise UnsupportedPairError(
                 f"solids[{index}] is a {body.type}; a scene in {body.dimension}D takes {TAKEN[body.dimension]}",
                 ("solids", index),
             ) from None
         except (UnsupportedSolidError, WrongDimensionError) as error:
-            error.where = ("solids", index)
+            error.where = ("solids", _first(body, bodies))
             raise
         if body.dimension != distinct[0].dimension:
+            index = _first(body, bodies)
             raise WrongDimensionError(
                 f"solids[{index}] is {body.dimension}D, solids[0] {distinct[0].dimension}D; a scene has one dimension",
                 ("solids", index),
@@ -122,32 +123,12 @@ def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
     return distinct, kinds
 
 
-def distinct_of(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray, IntArray]:
-    """Return each solid once, which of them each body is, and where each first appears."""
-    kinds, firsts = numbered(np.fromiter(map(id, bodies), np.int64, len(bodies)))
-    return [bodies[first] for first in firsts.tolist()], kinds, firsts
+def _first(solid: Solid, bodies: Sequence[Solid]) -> int:
+    return next(index for index, body in enumerate(bodies) if body is solid)
 
 
-def numbered(keys: IntArray) -> tuple[IntArray, IntArray]:
-    """Return for each of keys (n,) >= 0 the number of its kind, and for each kind where it first appears."""
-    kinds, firsts = np.empty(len(keys), np.int64), np.empty(len(keys), np.int64)
-    bits = max(4, (2 * len(keys)).bit_length())
-    with np.errstate(over="ignore"):  # uncompiled runs only
-        n_kinds = entry_of(_number)(keys, np.full(1 << bits, -1, np.int64), kinds, firsts)
-    return kinds, firsts[:n_kinds].copy()
-
-
-@kernel
-def _number(keys: Any, table: Any, kinds: Any, firsts: Any) -> int:
-    """Fill kinds and firsts; return the number of kinds. table: -1 everywhere, a power of two longer than keys."""
-    last, n_kinds = table.shape[0] - 1, 0
-    for item in range(keys.shape[0]):
-        key = keys[item]
-        place = (key >> 4 ^ key >> 16) & last
-        while table[place] >= 0 and keys[firsts[table[place]]] != key:  # bound: a place is free
-            place = (place + 1) & last
-        if table[place] < 0:
-            table[place], firsts[n_kinds] = n_kinds, item
-            n_kinds += 1
-        kinds[item] = table[place]
-    return n_kinds
+def distinct_of(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
+    """Return each solid once, in the order in which they first appear, and which of them each body is."""
+    distinct = list({id(body): body for body in bodies}.values())
+    numbers = {id(solid): number for number, solid in enumerate(distinct)}
+    return distinct, np.fromiter((numbers[id(body)] for body in bodies), np.int64, len(bodies))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Pose, Sphere, WrongDimensionError
-from engine.collision.scenes.bodies import scene_bodies
+from engine.collision.scenes.bodies import distinct_of, scene_bodies
 
 TURN = Pose([[0, -1], [1, 0]], [5, 0])
 
@@ -28,3 +28,13 @@ def test_no_bodies_and_wrong_dimensions() -> None:
     assert scene_bodies([], None).low.shape == (0, 3)
     with pytest.raises(WrongDimensionError, match=r"poses\[1\]"):
         scene_bodies([Sphere([0, 0, 0], 1)] * 2, [None, TURN])
+
+
+@pytest.mark.parametrize("n", [0, 1, 1000])
+def test_solids_are_numbered_in_the_order_in_which_they_first_appear(n: int) -> None:
+    solids = [Sphere([0, 0, 0], 1) for _ in range(50)]
+    bodies = [solids[k] for k in np.random.default_rng(n).integers(0, 50, n)]
+    distinct, kinds = distinct_of(bodies)
+    places: dict[int, int] = {}
+    assert kinds.tolist() == [places.setdefault(id(body), len(places)) for body in bodies]
+    assert [id(solid) for solid in distinct] == list(places)
