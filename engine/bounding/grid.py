@@ -31,15 +31,6 @@ class Axis(NamedTuple):
     n_cells: int
 
 
-class BoxGrid(NamedTuple):
-    """Boxes listed by cell: those of cell (u, v) are ``items[offsets[k]:offsets[k + 1]]`` with k = v * u_cells + u."""
-
-    u: Axis
-    v: Axis
-    offsets: IntArray
-    items: Int32Array
-
-
 @inline
 def cell_of(value: float, low: float, cells_per_unit: float, n_cells: int) -> int:
     """Return the cell of a value that is not below `low`."""
@@ -111,16 +102,3 @@ def list_in_cells(
     items = np.empty(offsets[-1], np.int32)
     list_boxes(tuple(lows), tuple(highs), tuple(axes), offsets[:-1].copy(), items, True)
     return axes, offsets, items
-
-
-def build_box_grid(
-    lows: list[FloatArray], highs: list[FloatArray], cells: list[int], check: Callable[[], object] = lambda: None
-) -> BoxGrid:
-    """List boxes, given by their sides (n,) on two axes, in a grid of about ``cells[0] x cells[1]`` over all of them.
-
-    Cost: linear in the boxes and the entries, at most four for each box and cell together.
-    check: called between the steps; what it raises ends the building.
-    """
-    flat, limit = np.zeros(1), 4 * (len(lows[0]) + cells[0] * cells[1]) + 64
-    axes, offsets, items = list_in_cells([*lows, flat], [*highs, flat], [*cells, 1], limit, check)
-    return BoxGrid(axes[0], axes[1], offsets, items)

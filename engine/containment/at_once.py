@@ -34,7 +34,7 @@ MOST: Final = 1024
 _SMALL: Final = 32
 """Edges of a polygon that is passed over whatever the number of points."""
 _NO_FLAG: Final = np.zeros(1, np.uint8)
-_KEYS: Final = {PASS: "pass_plan", LISTS: "list_plan"}
+_KEYS: Final = {PASS: "pass_plan", LISTS: "list_plan", CELLS: "plan"}
 
 Plan: TypeAlias = tuple[Any, tuple[Any, ...], str]
 """Compiled code, what stands between points and locations among its arguments, and the method's name."""
@@ -112,9 +112,9 @@ def _plan_of(solid: Solid, n_points: int) -> tuple[int, Plan | None]:
         choice, by = choose_for_mesh(solid, n_points, UNLIMITED), polyhedron_by
     else:
         return PASS, _kept(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))
-    if choice == CELLS:
+    if choice == CELLS and isinstance(solid, Polyhedron):
         return choice, None
-    return choice, solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], by(solid, choice, UNLIMITED))
+    return PASS, solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], by(solid, choice, UNLIMITED))
 
 
 def _kept(solid: Solid, key: str, locator: Any) -> Plan | None:

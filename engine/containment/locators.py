@@ -18,16 +18,14 @@ from engine.containment.cells.locate import locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
-from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
-from engine.containment.prepared import EXACT, prism_rows, rings_of, tree_of
+from engine.containment.prepared import EXACT, prism_rows, tree_of
 from engine.containment.rational_locate import combine, over_tree, rational_location, unsupported
-from engine.containment.ring_cells.build import ring_cells_of
-from engine.containment.ring_cells.locate import locate_by_ring_cells
+from engine.containment.rings import edges_of, ring_cells_of, rings_of
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -153,13 +151,10 @@ def _in_rows(solid: HalfSpace | Convex) -> Locator:
 
 def _in_triangle(solid: Triangle) -> Locator:
     if solid.dimension == 2:
-        return by_ring_pass("same_side", solid)
+        return _by_choice(
+            "same_side", lambda *_: by_kernel("same_side", locate_in_rings, solid, EXACT, edges_of(solid))
+        )
     return _by_choice("prism", lambda _, budget: by_kernel("prism", locate_in_half_spaces, solid, *prism_rows(solid)))
-
-
-def by_ring_pass(method: str, solid: Polygon | Triangle) -> Locator:
-    """Return the locator that passes over all edges."""
-    return by_kernel(method, locate_by_ring_pass, solid, EXACT, solid.vertices, solid.ring_offsets)
 
 
 def _in_polygon(solid: Polygon) -> Locator:
@@ -170,17 +165,10 @@ def _in_polygon(solid: Polygon) -> Locator:
 
 def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
     """Return the locator by what policy.py chose; it builds that."""
-
-    def by_rays(budget: Budget) -> Locator:
-        return by_kernel("ring_crossing", locate_in_rings, solid, EXACT, *rings_of(solid, budget.check))
-
-    if choice == PASS:
-        return by_ring_pass("ring_crossing", solid)
-    cells = ring_cells_of(solid, budget) if choice == CELLS else None
-    if cells is None:
-        return by_rays(budget)
-    rays: Fill = lambda points, out, budget: by_rays(budget).fill(points, out, budget)  # noqa: E731
-    return Locator("ring_cells", _filled_by(locate_by_ring_cells, cells, rest=rays))
+    if choice == CELLS:
+        return by_kernel("ring_cells", locate_in_rings, solid, EXACT, ring_cells_of(solid, budget.flag, budget.check))
+    rings = edges_of(solid) if choice == PASS else rings_of(solid, budget.check)
+    return by_kernel("ring_crossing", locate_in_rings, solid, EXACT, rings)
 
 
 def _in_polyhedron(solid: Polyhedron) -> Locator:

@@ -13,6 +13,7 @@ import numpy as np
 
 from engine.budget import Budget
 from engine.containment.cells.top import can_have_cells, lattice_of
+from engine.containment.rings import edges_met
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 
@@ -39,11 +40,10 @@ _IN_TREE, _IN_TREE_A_FACE_OVER = 150.0, 2.0
 _ENTRIES_A_FACE, _CELLS_AN_ENTRY = 3.0, 900.0
 """On level 0; and what more of them cost, with all that deeper levels make of them."""
 
-_PASS_AN_EDGE: Final = 0.8
-_SLABS_AN_EDGE: Final = 410.0
-_RING_CELLS_FROM, _RING_CELLS_AN_EDGE = 1 << 12, 1_000.0
-_IN_SLABS: Final = 40.0
-_MET_EDGE: Final = 4.0
+_IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
+_SLABS, _SLABS_AN_EDGE = 40_000.0, 15.0
+_RING_CELLS, _RING_CELLS_AN_EDGE = 100_000.0, 80.0
+_IN_SLABS: Final = 50.0
 
 
 def faces_over(solid: Polyhedron) -> float:
@@ -113,26 +113,16 @@ def _pay_cells(solid: Polyhedron, seen: int, budget: Budget) -> bool:
 
 
 def choose_for_rings(solid: Polygon, n_points: int) -> int:
-    """Return PASS, LISTS (slabs) or CELLS; cells only where the coordinates are in their range."""
+    """Return PASS, LISTS (slabs) or CELLS."""
     seen, n_edges = _points_seen(solid, n_points), len(solid.vertices)
-    if n_points > _FEW and solid.kept("ring_cells") is not None:
+    if solid.kept("ring_cells") is not None:
         return CELLS
-    by_pass, lists = _PASS_AN_EDGE * n_edges, PASS
-    if seen * _PASS_AN_EDGE > _SLABS_AN_EDGE or n_points >= _RING_CELLS_FROM:
-        by_slabs = _IN_SLABS + _MET_EDGE * solid.prepared("edges_met", lambda: _edges_met(solid))
-        by_pass, lists = min((by_pass, PASS), (by_slabs, LISTS))
-    if n_points <= _FEW:
-        return lists
-    is_dear = seen * by_pass > _RING_CELLS_AN_EDGE * (n_edges + _RING_CELLS_FROM)
-    return CELLS if is_dear or seen >= _RING_CELLS_FROM + n_edges else lists
-
-
-def _edges_met(solid: Polygon) -> float:
-    """Return how many edges a horizontal line meets, in the mean; at most all."""
-    heights = solid.vertices[:, 1] * 0.25
-    with np.errstate(all="ignore"):
-        met = float((np.abs(np.diff(heights)) / (heights.max() - heights.min())).sum())
-    return met if met < len(heights) else float(len(heights))
+    by_pass, by_slabs = _IN_RINGS + _PASS_AN_EDGE * n_edges, np.inf
+    if solid.kept("slabs") is not None or seen * by_pass > _SLABS + _SLABS_AN_EDGE * n_edges:
+        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * edges_met(solid)[1])
+    if seen * min(by_pass, by_slabs) > _RING_CELLS + _RING_CELLS_AN_EDGE * n_edges:
+        return CELLS
+    return LISTS if by_slabs < by_pass else PASS
 
 
 def _points_seen(solid: Polygon | Polyhedron, n_points: int) -> int:

@@ -1,4 +1,4 @@
-"""Structures that queries share, each built once a solid: the tree of triangles, slabs of edges, rounded rows."""
+"""Structures that queries share, each built once a solid: the tree of triangles, rounded rows."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, IntArray, read_only
+from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, read_only
 from engine.bounding.bvh import WIDTH, build_bvh, on_lines
-from engine.bounding.grid import BoxGrid, build_box_grid
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
-from engine.containment.rational_locate import Check, next_in_ring, no_check, prism_walls
+from engine.containment.rational_locate import Check, no_check, prism_walls
 from engine.lanes.triangles import OVERHEAD_ROWS
-from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
 
@@ -41,20 +39,6 @@ class TriangleTree(NamedTuple):
     high: tuple[float, float, float]
 
 
-class Rings(NamedTuple):
-    """Edges of a polygon by horizontal slabs, for rays to the right."""
-
-    starts: FloatArray
-    """``(m, 2)``, by falling larger x."""
-    ends: FloatArray
-    x_highs: FloatArray
-    """``(m,)``: the larger x of each edge."""
-    slabs: BoxGrid
-    """Over y; its second axis has one cell."""
-    box: tuple[float, float, float, float]
-    """xmin, xmax, ymin, ymax."""
-
-
 def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
     """Return the tree over the triangles of `solid`, prepared once.
 
@@ -77,26 +61,6 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
     origin = tuple(tree.origin.tolist())
     return TriangleTree(solid.vertices, triangles, tree.boxes, child, on_lines(blocks), origin, tree.scale, low, high)
-
-
-def rings_of(solid: Polygon, check: Check = no_check) -> Rings:
-    """Return the slabs of a polygon, prepared once; check as in `tree_of`."""
-    return solid.prepared("slabs", lambda: _build_rings(solid.vertices, next_in_ring(solid), check), check)
-
-
-def _build_rings(vertices: FloatArray, following: IntArray, check: Check) -> Rings:
-    check()
-    starts, ends = vertices, vertices[following]
-    order = np.argsort(-np.maximum(starts[:, 0], ends[:, 0]), kind="stable")
-    check()
-    starts, ends = np.ascontiguousarray(starts[order]), np.ascontiguousarray(ends[order])
-    check()
-    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    flat = np.zeros(1)
-    slabs = build_box_grid([low[:, 1], flat], [high[:, 1], flat], [max(1, min(1 << 20, len(order))), 1], check)
-    xs, ys = vertices[:, 0], vertices[:, 1]  # one by one: some 40 times as fast as min(axis=0)
-    box = float(xs.min()), float(xs.max()), float(ys.min()), float(ys.max())
-    return Rings(starts, ends, np.ascontiguousarray(high[:, 0]), slabs, box)
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:

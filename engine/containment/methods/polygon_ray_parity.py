@@ -5,8 +5,13 @@ has y <= q.y and the other y > q.y, and counts if its crossing lies to the right
 that sign is zero and q is between the ends, q is on the edge: BOUNDARY, whatever the parity. Horizontal edges are
 never passed and are only looked at for BOUNDARY.
 
-Edges are listed by horizontal slabs (grid.py), those reaching farthest right first: the list is left at the first
-edge that ends to the left of q.
+Edges are listed as runs, from one vertex of a ring to another: the rings themselves, or what a horizontal slab holds of
+them (rings.py). The filter looks at all edges of a run without a branch, so that the compiler works on several at a
+time; where the sign at a passed edge is not sure, or a vertex is level with q (which may then lie on a horizontal
+edge), the edges are taken one by one. A grid of cells, if there is one, knows the location of all points of most cells.
+
+A point may carry a blur, a bound on its coordinates' error as in posed/filters.py; then what is not sure stays
+UNDECIDED.
 
 Source: Shimrat 1962, "Algorithm 112: position of point relative to polygon"; Hormann and Agathos 2001, "The point in
 polygon problem for arbitrary polygons". Changed: exact signs, three values.
@@ -14,35 +19,155 @@ polygon problem for arbitrary polygons". Changed: exact signs, three values.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final, NamedTuple
 
-from engine.bounding.grid import cell_of
-from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred
+import numpy as np
+
+from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
+from engine.bounding.grid import Axis, cell_of
+from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import called, inline, kernel, merged
-from engine.predicates.orientation import orient2d_exact, orient2d_filter
+from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact, orient2d_filter
 from engine.predicates.vectors import as_point2
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, Point2
 
-MISSED, CROSSED, ON_EDGE, BEYOND = 0, 1, 3, 4
-"""How a ray meets an edge, as `polyhedron_ray_parity.py` has it for faces."""
+MISSED, CROSSED, ON_EDGE = 0, 1, 3
+"""How a ray meets an edge."""
+MIXED: Final = 2
+"""Status of a cell that an edge may reach into; others have the location of their points."""
+
+
+class Rings(NamedTuple):
+    """Edges of a polygon by horizontal slabs, for rays to the right."""
+
+    xs: FloatArray
+    """The vertices of all rings, each ended by its first one."""
+    ys: FloatArray
+    slabs: Axis
+    offsets: IntArray
+    """``(n_slabs + 1,)``: where the runs of each slab begin."""
+    runs: Int32Array
+    """``(n, 2)``: the first and the last vertex of each."""
+    box: tuple[float, float, float, float]
+    """xmin, xmax, ymin, ymax."""
+    u: Axis
+    v: Axis
+    statuses: Int8Array
+    """Of the cells, row by row; none where there is no grid."""
+
+
+@merged
+def _pass_edge(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any, blur: Any) -> tuple[bool, bool]:
+    """Tell whether the edge counts for q, and whether that is not sure."""
+    above = ay - y
+    left = (ax - x) * (by - y)
+    right = above * (bx - x)
+    turn = left - right
+    bound = BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
+    bound += blur * (abs(bx - ax) + abs(by - ay))
+    is_passed = (ay <= y) != (by <= y)
+    is_unsure = (is_passed & (not abs(turn) > bound)) | (not abs(above) > blur)  # NaN is not sure
+    return is_passed & ((turn > 0.0) == (ay < by)), is_unsure
+
+
+@merged
+def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float, blur: float) -> tuple[int, int]:
+    """Return how many edges between the vertices first ... last count for q, and how many are not sure."""
+    n_crossed = n_unsure = 0
+    for edge in range(np.uint64(first), np.uint64(last)):  # unsigned: no index that counts from the end
+        follow = edge + np.uint64(1)
+        is_crossed, is_unsure = _pass_edge(xs[edge], ys[edge], xs[follow], ys[follow], x, y, blur)
+        n_crossed += is_crossed
+        n_unsure += is_unsure
+    return n_crossed, n_unsure
+
+
+@inline
+def meet_edge(a: Any, b: Any, q: Any) -> int:
+    """Return CROSSED if the ray to the right from q passes the edge, MISSED, ON_EDGE or UNDECIDED."""
+    if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
+        return MISSED
+    is_passed = (a.y <= q.y) != (b.y <= q.y)
+    if a.x > q.x and b.x > q.x:  # wholly to the right: no sign needed
+        return CROSSED if is_passed else MISSED
+    turn = orient2d_filter(a, b, q)
+    if turn == UNDECIDED:
+        turn = orient2d_exact(a, b, q)
+    if turn == UNDECIDED:
+        return UNDECIDED
+    if turn == 0:
+        # on the line, and between the ends in y; in x too, unless the edge is horizontal and q beyond it
+        return ON_EDGE if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x) else MISSED
+    return CROSSED if is_passed and (turn > 0) == (a.y < b.y) else MISSED
+
+
+@called
+def _one_by_one(xs: Any, ys: Any, runs: Any, first: int, last: int, q: Any) -> int:
+    """Return the location of q by some runs, UNDECIDED where a sign is out of the compiled range."""
+    is_odd, is_open = False, False
+    for run in range(first, last):
+        for edge in range(runs[run, 0], runs[run, 1]):
+            ay, by = ys[edge], ys[edge + 1]
+            if (ay < q.y and by < q.y) or (ay > q.y and by > q.y):
+                continue
+            met = meet_edge(Point2(float(xs[edge]), float(ay)), Point2(float(xs[edge + 1]), float(by)), q)
+            if met == ON_EDGE:
+                return 0
+            is_open |= met == UNDECIDED
+            is_odd ^= met == CROSSED
+    return UNDECIDED if is_open else 1 if is_odd else -1
+
+
+@inline
+def locate_in_runs(
+    xs: Any, ys: Any, runs: Any, first: int, last: int, x: float, y: float, blur: float
+) -> tuple[int, bool]:
+    """Return the location of (x, y) by the runs first ... last, and whether it took more than a filter.
+
+    xs, ys: of closed rings. Caller guarantees that every edge at the height of the point is in one of these runs; so a
+    vertex at that height is never the end of a run but where it closes a ring.
+    """
+    n_crossed = n_unsure = 0
+    for run in range(first, last):
+        crossed, unsure = _count_crossings(xs, ys, runs[run, 0], runs[run, 1], x, y, blur)
+        n_crossed += crossed
+        n_unsure += unsure
+    if n_unsure == 0:
+        return (1 if n_crossed & 1 else -1), False
+    if blur != 0.0:
+        return UNDECIDED, True
+    return _one_by_one(xs, ys, runs, first, last, Point2(x, y)), True
+
+
+@merged
+def _look_up(points: Any, rings: Any, locations: Any) -> None:
+    """Give each point the status of its cell, without a branch."""
+    u, v, (x_min, x_max, y_min, y_max), statuses = rings.u, rings.v, rings.box, rings.statuses
+    for item in range(len(points)):
+        x, y = points[item, 0], points[item, 1]
+        is_out = (x < x_min) | (x > x_max) | (y < y_min) | (y > y_max)
+        column = cell_of(min(max(x, x_min), x_max), u.low, u.cells_per_unit, u.n_cells)
+        row = cell_of(min(max(y, y_min), y_max), v.low, v.cells_per_unit, v.n_cells)
+        status = statuses[np.uint64(row * u.n_cells + column)]
+        locations[item] = status | -np.int8(is_out)  # any but 0 would be a branch
 
 
 @kernel
-def locate_in_rings(
-    points: Any, blurs: Any, starts: Any, ends: Any, x_highs: Any, slabs: Any, box: Any, locations: Any, flag: Any
-) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2); returns how many needed more than the filter.
+def locate_in_rings(points: Any, blurs: Any, rings: Any, locations: Any, flag: Any) -> int:
+    """Fill `locations` (n,) int8 for points (n, 2) from a `Rings`; returns how many needed more than the filter.
 
     blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite.
-    starts, ends: (m, 2) edges, by falling x_highs (m,), the larger x of each edge.
-    slabs: a `BoxGrid` over y whose second axis has one cell; box: xmin, xmax, ymin, ymax of all edges.
-    Caller guarantees rings: every vertex starts as many edges as it ends.
     """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
-    x_min, x_max, y_min, y_max = box
-    edges, u, n_beyond = (starts, ends, x_highs), slabs.u, 0
+    x_min, x_max, y_min, y_max = rings.box
+    slabs, offsets, n_beyond = rings.slabs, rings.offsets, 0
+    has_cells = len(rings.statuses) > 0 and len(blurs) == 0
+    if has_cells:
+        _look_up(points, rings, locations)
     for item in range(len(points)):
+        if has_cells and locations[item] != MIXED:
+            continue
         if flag[0]:
             break
         q, blur = as_point2(points, item), float(blurs[item]) if len(blurs) > 0 else 0.0
@@ -51,72 +176,11 @@ def locate_in_rings(
             locations[item] = -1
             continue
         location, is_beyond = UNDECIDED, True
-        if below >= y_min and q.x - blur >= x_min:  # false for NaN; what sticks out of the box is left open
-            slab = cell_of(below, u.low, u.cells_per_unit, u.n_cells)
-            if blur == 0.0:
-                location, is_beyond = _locate_in_slab(q, 0.0, edges, slabs, slab, flag)
-            elif slab == cell_of(above, u.low, u.cells_per_unit, u.n_cells):
-                location, is_beyond = _locate_in_slab(q, blur, edges, slabs, slab, flag)
+        if below >= y_min:  # false for NaN; what sticks out of the slabs is left open
+            slab = cell_of(below, slabs.low, slabs.cells_per_unit, slabs.n_cells)
+            if blur == 0.0 or slab == cell_of(above, slabs.low, slabs.cells_per_unit, slabs.n_cells):
+                first, last = offsets[slab], offsets[slab + 1]
+                location, is_beyond = locate_in_runs(rings.xs, rings.ys, rings.runs, first, last, q.x, q.y, blur)
         locations[item] = location
         n_beyond += is_beyond
     return n_beyond
-
-
-@merged
-def _locate_in_slab(q: Any, blur: float, edges: Any, slabs: Any, slab: int, flag: Any) -> tuple[int, bool]:
-    """Return the location of a blurred q by the edges of a slab, and whether it took more than the filter."""
-    starts, ends, x_highs = edges
-    is_odd, is_open, beyond = False, False, 0
-    for entry in range(slabs.offsets[slab], slabs.offsets[slab + 1]):
-        edge = slabs.items[entry]
-        if x_highs[edge] < q.x - blur:
-            break
-        if entry & 4095 == 4095 and flag[0]:
-            break
-        a, b = as_point2(starts, edge), as_point2(ends, edge)
-        met = meet_edge(a, b, q) if blur == 0.0 else _meet_blurred(a, b, q, blur)
-        beyond |= met & BEYOND
-        if met & 3 == ON_EDGE:
-            return 0, True
-        is_open |= met & 3 == UNDECIDED
-        is_odd ^= met & 3 == CROSSED
-    return UNDECIDED if is_open else 1 if is_odd else -1, beyond != 0
-
-
-@inline
-def meet_edge(a: Any, b: Any, q: Any) -> int:
-    """Return CROSSED if the ray to the right from q passes the edge, MISSED, ON_EDGE or UNDECIDED.
-
-    BEYOND is added where it took more than the filter.
-    """
-    if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
-        return MISSED
-    is_passed = (a.y <= q.y) != (b.y <= q.y)
-    if a.x > q.x and b.x > q.x:  # wholly to the right: no sign needed
-        return CROSSED if is_passed else MISSED
-    turn, beyond = orient2d_filter(a, b, q), 0
-    if turn == UNDECIDED:
-        turn, beyond = orient2d_exact(a, b, q), BEYOND
-    if turn == UNDECIDED:
-        return UNDECIDED | beyond
-    if turn == 0:
-        # on the line, and between the ends in y; in x too, unless the edge is horizontal and q beyond it
-        return (ON_EDGE if min(a.x, b.x) <= q.x and q.x <= max(a.x, b.x) else MISSED) | beyond
-    return (CROSSED if is_passed and (turn > 0) == (a.y < b.y) else MISSED) | beyond
-
-
-@called
-def _meet_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
-    """Return CROSSED if the rays from all of the blurred q pass the edge, MISSED if none does, or UNDECIDED."""
-    left, right, below, above = q.x - blur, q.x + blur, q.y - blur, q.y + blur
-    if (a.y < below and b.y < below) or (a.y > above and b.y > above) or (a.x < left and b.x < left):
-        return MISSED
-    if (below <= a.y and a.y <= above) or (below <= b.y and b.y <= above):
-        return UNDECIDED | BEYOND
-    is_passed = (a.y <= q.y) != (b.y <= q.y)
-    if a.x > right and b.x > right:
-        return CROSSED if is_passed else MISSED
-    turn = orient2d_blurred(a, b, q, blur)
-    if turn == UNDECIDED:
-        return UNDECIDED | BEYOND
-    return CROSSED if is_passed and (turn > 0) == (a.y < b.y) else MISSED

@@ -20,13 +20,13 @@ from engine.arrays import FloatArray, Int8Array, read_only
 from engine.budget import Budget
 from engine.containment.locators import Counts, Fill, Locator, by_kernel, csg_locator, locator_of, rational_half, settle
 from engine.containment.methods.ball import locate_in_ball
-from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.posed.filters import locate_by_polynomial, locate_in_box, locate_in_rows_blurred
 from engine.containment.posed.frames import Frames, frames_of, move_to_body_frame
-from engine.containment.prepared import prism_rows, rings_of, tree_of
+from engine.containment.prepared import prism_rows, tree_of
 from engine.containment.rational_locate import Check, to_world_frame
+from engine.containment.rings import rings_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_in_space, rows_of
@@ -101,10 +101,8 @@ def _blurred_kernel(solid: Solid) -> Blurred:
     elif isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
         rows = rows_in_space(prism_rows(solid)[0] if isinstance(solid, Triangle) else rows_of(solid))
         kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
-    elif isinstance(solid, Triangle):
-        kernel, prepared = locate_by_ring_pass, lambda _: (solid.vertices, solid.ring_offsets)
-    elif isinstance(solid, Polygon):
-        kernel, prepared = locate_in_rings, lambda check: rings_of(solid, check)
+    elif isinstance(solid, (Polygon, Triangle)):
+        kernel, prepared = locate_in_rings, lambda check: (rings_of(solid, check),)
     elif isinstance(solid, Polyhedron):
         kernel, prepared = locate_by_tree, lambda check: (tree_of(solid, check),)
     else:

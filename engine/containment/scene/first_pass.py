@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.locate import side_in_cell
 from engine.containment.methods.ball import located
-from engine.containment.methods.polygon_one_pass import locate_in_small_rings
+from engine.containment.methods.polygon_ray_parity import locate_in_runs
 from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
 from engine.containment.posed.frames import to_frame
 from engine.containment.scene.grid import cell_at
@@ -57,7 +57,7 @@ class SceneTables(NamedTuple):
     """``(n, 4)``: normal and offset; the plane's have 0 in the third place."""
     polygon_offsets: IntArray
     """Where the rings of a polygon begin."""
-    ring_offsets: IntArray
+    rings: Int32Array
     xs: FloatArray
     """The vertices of all rings, each ended by its first one."""
     ys: FloatArray
@@ -81,8 +81,8 @@ def _locate_in_body(tables: Any, body: int, is_flat: bool, p: Any) -> tuple[int,
     kind, slot = tables.kinds[body], tables.slots[body]
     q, blur = to_frame(tables, tables.frames[body], p)
     if kind == RINGS:
-        rings = tables.polygon_offsets[slot], tables.polygon_offsets[slot + 1]
-        return locate_in_small_rings(tables.xs, tables.ys, tables.ring_offsets, rings, q, blur)
+        first, last = tables.polygon_offsets[slot], tables.polygon_offsets[slot + 1]
+        return locate_in_runs(tables.xs, tables.ys, tables.rings, first, last, q[0], q[1], blur)
     location = UNDECIDED
     if kind == CELLS:
         location = side_in_cell(tables.cell_frames, tables.cell_places, slot, q, blur)

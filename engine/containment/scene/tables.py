@@ -15,9 +15,9 @@ from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget
 from engine.containment.cells.top import TopCells
 from engine.containment.locators import Locator
-from engine.containment.methods.polygon_one_pass import close_rings
 from engine.containment.posed.frames import frames_of
 from engine.containment.posed.locators import posed_locator
+from engine.containment.rings import closed_rings
 from engine.containment.scene.first_pass import BALL, BOX, CELLS, RINGS, ROWS, SECOND_PASS, SceneTables
 from engine.containment.scene.grid import SceneGrid, body_box, build_scene_grid, grown_boxes, moved_boxes
 from engine.errors import EngineError
@@ -93,7 +93,7 @@ def scene_of(solids: Sequence[Solid], poses: Sequence[Pose | None] | None, dimen
     tables = SceneTables(
         kinds.kinds[owners], slots, lows, highs, frames.rows, frames.inverses, frames.translations, frames.is_turn,
         kinds.boxes[0], kinds.boxes[1], centers, radii, kinds.row_offsets, kinds.rows, kinds.polygon_offsets,
-        kinds.ring_offsets, kinds.xs, kinds.ys, kinds.cell_frames, kinds.cell_places,
+        kinds.rings, kinds.xs, kinds.ys, kinds.cell_frames, kinds.cell_places,
     )  # fmt: skip
     grid = build_scene_grid(np.flatnonzero(is_bounded & ~is_empty), lows, highs)
     unbounded = np.flatnonzero(~is_bounded & ~is_empty)
@@ -158,14 +158,14 @@ class _Kinds:
         ends = np.concatenate([np.zeros(0, np.int64), *offsets])  # each begins with 0
         sizes = np.delete(np.diff(ends, prepend=0), polygon_offsets[:-1] + np.arange(len(offsets)))
         vertices = np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)])
-        xs, ys, ring_offsets = close_rings(vertices, summed(sizes))
-        firsts = ring_offsets[polygon_offsets[:-1]]
+        xs, ys, rings, _ = closed_rings(vertices, summed(sizes))
+        firsts = rings[polygon_offsets[:-1], 0]
         for axis, values in enumerate((xs, ys) if solids else ()):
             self.lows[indices, axis] = np.minimum.reduceat(values, firsts)
             self.highs[indices, axis] = np.maximum.reduceat(values, firsts)
-        n_edges = ring_offsets[polygon_offsets[1:]] - ring_offsets[polygon_offsets[:-1]]
+        n_edges = rings[polygon_offsets[1:] - 1, 1] - firsts
         self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = SECOND_PASS
-        self.polygon_offsets, self.ring_offsets, self.xs, self.ys = polygon_offsets, ring_offsets, xs, ys
+        self.polygon_offsets, self.rings, self.xs, self.ys = polygon_offsets, rings, xs, ys
 
     def _set_boxes(self, indices: list[int]) -> None:
         solids = self._chosen(indices, BOX)

@@ -12,7 +12,6 @@ import engine
 from engine.bounding.grid import list_boxes
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
-from engine.containment.methods.polygon_one_pass import locate_by_ring_pass
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
@@ -32,7 +31,7 @@ SOLIDS = [
     (engine.Aabb([0, 0], [1, 1]), [locate_in_box]),
     (engine.HalfSpace([1, 0], 0), [locate_in_half_planes]),
     (engine.Polygon([np.column_stack([np.arange(600.0), np.arange(600.0) ** 2])]), [locate_in_rings]),
-    (engine.Triangle([[0, 0], [1, 0], [0, 1]]), [locate_by_ring_pass]),
+    (engine.Triangle([[0, 0], [1, 0], [0, 1]]), [locate_in_rings]),
     (engine.Implicit([{"powers": [1, 0], "coefficient": 1}]), [locate_by_polynomial]),
 ]
 

@@ -26,7 +26,7 @@ def test_kinds_and_slots_of_the_plane() -> None:
     assert scene.unbounded.tolist() == [3, 5, 7]
     assert (tables.lows[4].tolist(), tables.highs[4].tolist()) == ([5, 5, 0], [6, 7, 0])
     assert (tables.lows[1].tolist(), tables.highs[8].tolist()) == ([0, 0, 0], [4, 4, 0])
-    first = tables.ring_offsets[tables.polygon_offsets[tables.slots[8]] + 1]
+    first = tables.rings[tables.polygon_offsets[tables.slots[8]] + 1, 0]
     assert (tables.xs[first : first + 4].tolist(), tables.ys[first : first + 4].tolist()) == (
         [1, 2, 1, 1],
         [1, 1, 2, 1],
