@@ -141,8 +141,8 @@ def convex_poses(
         return None
     pool, rows = pooled(bodies), np.append(np.int64(0), np.ones(n, np.int64))
     pairs = np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
-    placed = (np.concatenate([still, given]) for still, given in zip(STILL[:2], poses[:2]))
-    all_poses = PoseArrays(*placed, True)
+    rotations = np.concatenate([STILL.rotations, poses.rotations])
+    all_poses = PoseArrays(rotations, np.concatenate([STILL.translations, poses.translations]), True)
 
     def fill(start: int, stop: int) -> None:
         with np.errstate(all="ignore"):  # uncompiled runs only
