@@ -245,17 +245,8 @@ class _Job:
         if isinstance(answer, np.ndarray):
             self.call.media_type = body.OCTETS
             return wire.cut(wire.octets(answer))
-        self._check_least(wire.least_of(answer))
+        self.call.check_answer(wire.least_of(answer))
         return wire.encoded(answer, self.call.remaining)
-
-    def _check_least(self, n_bytes: int) -> None:
-        """Raise `answer_too_large` or `out_of_memory` at once where an answer of so many bytes would be refused."""
-        limit = self.call.settings.max_answer_bytes
-        if n_bytes > limit:
-            detail = f"the answer would need more than {limit} bytes; {self.call.instead}, or raise "
-            raise ServiceError("answer_too_large", detail + "GEOMETRY_MAX_ANSWER_BYTES")
-        self.call.take(n_bytes)
-        self.call.take(-n_bytes)
 
     def _gathered(self, parts: Iterable[Part]) -> list[Part]:
         """Return the parts of an answer, within its limits, compressed if that was asked for and is worth it."""

@@ -134,10 +134,19 @@ class Call(Cancel):
     def take_part(self, part: Sized) -> None:
         """Account for a part of the answer; `answer_too_large` beyond its limit."""
         self.remaining()
+        self._check_answer(len(part))
         self._answer += len(part)
-        if self._answer > self.settings.max_answer_bytes:
-            raise self._too_large(self.settings.max_answer_bytes, "GEOMETRY_MAX_ANSWER_BYTES")
         self.take(len(part))
+
+    def check_answer(self, n_bytes: int) -> None:
+        """Raise at once what `take_part` would where an answer gets so long at least."""
+        self._check_answer(n_bytes)
+        self.take(n_bytes)
+        self.take(-n_bytes)
+
+    def _check_answer(self, n_bytes: int) -> None:
+        if self._answer + n_bytes > self.settings.max_answer_bytes:
+            raise self._too_large(self.settings.max_answer_bytes, "GEOMETRY_MAX_ANSWER_BYTES")
 
     def _too_large(self, limit: int, setting: str) -> ServiceError:
         what = "this body" if self.instead is None else "the answer"
