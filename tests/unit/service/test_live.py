@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -112,15 +112,22 @@ class Service:
             return answer
 
 
-@pytest.fixture(scope="module")
-def service() -> Iterator[Service]:
-    service = Service(max_body_bytes=10_000, header_seconds=PATIENCE, body_seconds=PATIENCE)
+@contextmanager
+def running(**settings: object) -> Iterator[Service]:
+    """Start a service; check that it ends with 0, and that no traceback is in its log."""
+    service = Service(**settings)
     try:
         yield service
         assert service.stop() == 0, "".join(service.log)
         assert "Traceback" not in "".join(service.log)
     finally:
         service.close()
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[Service]:
+    with running(max_body_bytes=10_000, header_seconds=PATIENCE, body_seconds=PATIENCE) as service:
+        yield service
 
 
 def test_it_becomes_ready_and_answers(service: Service) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import load, measure
 from tests.unit.service.asking import SPHERE
-from tests.unit.service.test_live import Service
+from tests.unit.service.test_live import Service, running
 
 DEADLINE = 5.0
 
@@ -19,14 +19,9 @@ DEADLINE = 5.0
 @pytest.fixture
 def service() -> Iterator[Service]:
     # room for four: on a slow machine sixty clients do not get more than some twenty requests under way at once
-    service = Service(deadline_seconds=DEADLINE, concurrency=2, queue_length=2, access_log=False)
-    try:
+    with running(deadline_seconds=DEADLINE, concurrency=2, queue_length=2, access_log=False) as service:
         service.wait_until_ready()
         yield service
-        assert service.stop() == 0, "".join(service.log)
-        assert "Traceback" not in "".join(service.log)
-    finally:
-        service.close()
 
 
 def overload(service: Service, seconds: float) -> None:

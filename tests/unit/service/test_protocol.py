@@ -15,7 +15,7 @@ import pytest
 from benchmarks.measure import memory_of
 from tests.contract.test_deadlines import vanishing
 from tests.unit.service.asking import SPHERE
-from tests.unit.service.test_live import Service
+from tests.unit.service.test_live import Service, running
 
 HEAD = b"POST /v1/solids HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n%s\r\n\r\n"
 CHUNKED = HEAD % b"Transfer-Encoding: chunked"
@@ -27,14 +27,9 @@ MB = 2**20
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Service]:
-    service = Service(api_keys="secret", deadline_seconds=5, answer_seconds=3, write_seconds=30)
-    try:
+    with running(api_keys="secret", deadline_seconds=5, answer_seconds=3, write_seconds=30) as service:
         service.wait_until_ready()
         yield service
-        assert service.stop() == 0, "".join(service.log)
-        assert "Traceback" not in "".join(service.log)
-    finally:
-        service.close()
 
 
 def connect(service: Service) -> socket.socket:

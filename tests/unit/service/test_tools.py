@@ -22,21 +22,16 @@ from service.schemas.problem import Schema
 from service.settings import Settings
 from service.wire import Raw, Series
 from tests.unit.service.asking import SPHERE, check_problem, client_of, examples
-from tests.unit.service.test_live import Service
+from tests.unit.service.test_live import Service, running
 
 needs_mcp = pytest.mark.skipif(importlib.util.find_spec("mcp") is None, reason="the extra `mcp` is not installed")
 
 
 @pytest.fixture(scope="module")
 def service() -> Iterator[Service]:
-    service = Service(access_log=False, api_keys="secret")
-    try:
+    with running(access_log=False, api_keys="secret") as service:
         service.wait_until_ready()
         yield service
-        assert service.stop() == 0
-        assert "Traceback" not in "".join(service.log)
-    finally:
-        service.close()
 
 
 def talk(url: str, *calls: tuple[str, dict[str, Any]]) -> tuple[list[Any], list[tuple[bool, str]]]:
