@@ -8,22 +8,31 @@ from __future__ import annotations
 import multiprocessing
 import re
 import socket
+import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
+
+from benchmarks.measure import memory_of
 
 NAME = "blocking sockets, Python"
 _LENGTH = re.compile(rb"\r\ncontent-length: (\d+)", re.IGNORECASE)
 
 
-def request(path: str, body: bytes, media_type: str = "application/json") -> bytes:
-    """Return a POST request as bytes."""
-    head = f"POST {path} HTTP/1.1\r\nHost: x\r\nContent-Type: {media_type}\r\nContent-Length: {len(body)}\r\n\r\n"
-    return head.encode() + body
+def head(path: str, **headers: object) -> bytes:
+    """Return the first line and the headers of a POST request of JSON; named with _ for -, another value or more."""
+    named = {"host": "x", "content_type": "application/json", **headers}
+    lines = [f"{name.replace('_', '-')}: {value}\r\n" for name, value in named.items()]
+    return f"POST {path} HTTP/1.1\r\n{''.join(lines)}\r\n".encode()
+
+
+def request(path: str, body: bytes, media_type: str = "application/json", **headers: object) -> bytes:
+    """Return a POST request as bytes; headers: as `head` takes them."""
+    return head(path, content_type=media_type, content_length=len(body), **headers) + body
 
 
 def free_port() -> int:
@@ -94,6 +103,39 @@ class Seen:
     lost: int = 0
     """Connections that broke within a request."""
     span: float = 0.0
+
+
+@dataclass
+class Watched:
+    """Of a service: the longest wait for /healthz in seconds, and its resident megabytes at most."""
+
+    wait: float = 0.0
+    memory: float = 0.0
+
+
+@contextmanager
+def watched(port: int, pid: int, patience: float) -> Iterator[Watched]:
+    """Ask /healthz again and again meanwhile; raise at the end where it gave no 200 within `patience` seconds."""
+    seen, is_over, message = Watched(), threading.Event(), b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
+
+    def watch() -> None:
+        connection = Connection(port, patience)
+        while not is_over.is_set():
+            before = time.monotonic()
+            status, _ = connection.ask(message)
+            assert status == 200, status
+            seen.wait = max(seen.wait, time.monotonic() - before)
+            seen.memory = max(seen.memory, memory_of(pid))
+            is_over.wait(0.01)
+        connection.close()
+
+    with ThreadPoolExecutor(1) as pool:
+        watcher = pool.submit(watch)
+        try:
+            yield seen
+        finally:
+            is_over.set()
+        watcher.result()
 
 
 def loop(port: int, message: bytes, seconds: float, pause: float = 0.0) -> Seen:

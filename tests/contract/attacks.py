@@ -15,13 +15,14 @@ from contextlib import suppress
 from functools import cache
 from typing import Any, NamedTuple
 
-from benchmarks.load import request
+from benchmarks.load import head, request
+from tests.unit.service.asking import SPHERE
 
 MB = 2**20
 SECONDS = 20.0
 """After which an attack gives up: an answer that takes longer is one that never came."""
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
-SPHERE = {"type": "sphere", "center": [0, 0, 0], "radius": 1}
+_IN_CHUNKS = head("/v1/contains", transfer_encoding="chunked")
 
 
 class Attack(NamedTuple):
@@ -55,8 +56,7 @@ def _post(path: str, document: Callable[[], Any], is_packed: bool = False) -> Ca
     def message() -> bytes:
         body = document()
         body = body if isinstance(body, bytes) else json.dumps(body, separators=(",", ":")).encode()
-        made = request(path, gzip.compress(body, 6) if is_packed else body)
-        return made.replace(b"\r\n\r\n", b"\r\nContent-Encoding: gzip\r\n\r\n", 1) if is_packed else made
+        return request(path, gzip.compress(body, 6), content_encoding="gzip") if is_packed else request(path, body)
 
     return lambda port: [talk(port, [message()])]
 
@@ -130,32 +130,23 @@ def _small_objects() -> bytes:
 def trailers_for_ever(port: int) -> list[int]:
     """Send a body in chunks, and then trailers, 30 MB of them."""
     body = json.dumps({"solid": SPHERE, "points": [[0, 0, 0]]}).encode()
-    head = (
-        b"POST /v1/contains HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
-    )
     trailers = b"a:b\r\n" * (2**16)
-    parts = [head, b"%x\r\n%b\r\n0\r\n" % (len(body), body), *[trailers] * (30 * MB // len(trailers)), b"\r\n"]
+    parts = [_IN_CHUNKS, b"%x\r\n%b\r\n0\r\n" % (len(body), body), *[trailers] * (30 * MB // len(trailers)), b"\r\n"]
     return [talk(port, parts)]
 
 
 def chunks_of_a_byte(port: int) -> list[int]:
     """Send chunks whose extensions are far longer than what is in them."""
-    head = (
-        b"POST /v1/contains HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
-    )
     chunk = b"1;" + b"x" * 2**16 + b"\r\n \r\n"
-    return [talk(port, [head, *[chunk] * (30 * MB // len(chunk)), b"1\r\n0\r\n0\r\n\r\n"])]
+    return [talk(port, [_IN_CHUNKS, *[chunk] * (30 * MB // len(chunk)), b"1\r\n0\r\n0\r\n\r\n"])]
 
 
 def declared_alone(port: int) -> list[int]:
     """Declare four bodies of 64 MiB, send a byte of each; return what a body of 20 kB gets meanwhile."""
-    head = (
-        b"POST /v1/contains HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\nContent-Length: 67108864\r\n\r\n{"
-    )
     idle = [socket.create_connection(("127.0.0.1", port), timeout=SECONDS) for _ in range(4)]
     try:
         for each in idle:
-            each.sendall(head)
+            each.sendall(head("/v1/contains", content_length=64 * MB) + b"{")
         time.sleep(0.1)
         body = json.dumps({"solid": SPHERE, "points": [[0.25, 0.5, 0.75]] * 1_000}).encode()
         return [talk(port, [request("/v1/contains", body)])]
@@ -181,11 +172,10 @@ def tools_with_large_answers(port: int) -> list[int]:
         "method": "tools/call",
         "params": {"name": "contains_scene", "arguments": arguments},
     }
-    message = request("/mcp", json.dumps(call, separators=(",", ":")).encode()).replace(
-        b"Host: x", b"Host: localhost", 1
-    )
-    more = b"\r\nAccept: application/json, text/event-stream\r\nMcp-Protocol-Version: 2025-06-18\r\n\r\n"
-    return [talk(port, [message.replace(b"\r\n\r\n", more, 1)])]
+    body = json.dumps(call, separators=(",", ":")).encode()
+    accepted = "application/json, text/event-stream"
+    version = "2025-06-18"
+    return [talk(port, [request("/mcp", body, host="localhost", accept=accepted, mcp_protocol_version=version)])]
 
 
 def all_attacks() -> list[Attack]:

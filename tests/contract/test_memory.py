@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import json
 import socket
-import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,11 +16,12 @@ import httpx
 import pytest
 import zstandard
 
+from benchmarks.load import watched
 from benchmarks.measure import memory_of
 from service.schemas.scenes import SCENE_ID
 from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, across, comb, features, stripes
 from tests.unit.service.asking import SPHERE, examples
-from tests.unit.service.test_live import Service
+from tests.unit.service.test_live import Service, running
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="memory of processes is read from /proc")
 MB = 2**20
@@ -83,14 +83,9 @@ def bodies() -> Iterator[tuple[str, bytes, dict[str, str]]]:
 
 @pytest.fixture
 def service() -> Iterator[Service]:
-    service = Service(deadline_seconds=2, request_bytes=GIVEN, store_bytes=STORED, access_log=False)
-    try:
+    with running(deadline_seconds=2, request_bytes=GIVEN, store_bytes=STORED, access_log=False) as service:
         service.wait_until_ready()
         yield service
-        assert service.stop() == 0, "".join(service.log)
-        assert "Traceback" not in "".join(service.log)
-    finally:
-        service.close()
 
 
 def ask(service: Service, path: str, body: bytes, headers: dict[str, str]) -> int:
@@ -109,8 +104,8 @@ def never_read(service: Service) -> None:
         time.sleep(3)
 
 
-def hold_within(service: Service, n_clients: int, turns: int) -> list[float]:
-    """Send all bodies, some at once; return how long /healthz took each time."""
+def hold_within(service: Service, n_clients: int, turns: int) -> float:
+    """Send all bodies, some at once; return how long /healthz took at most."""
     messages = [*bodies()] * turns
     for path, example in examples(httpx.get(f"{service.url}/openapi.json").json()):
         url = service.url + path.replace("{scene_id}", SCENE_ID)
@@ -118,31 +113,15 @@ def hold_within(service: Service, n_clients: int, turns: int) -> list[float]:
         assert statuses[-1] in (200, 201), (path, statuses)  # the first may compile past its deadline
     stored = httpx.post(f"{service.url}/v1/scenes", json=SCENE).json()["id"]
     messages = [(path.replace("{scene}", stored), body, headers) for path, body, headers in messages]
-    base, most, waited, is_over = memory_of(service.process.pid), 0.0, [0.0], threading.Event()
-
-    def watch() -> None:
-        nonlocal most
-        with httpx.Client() as client:
-            while not is_over.is_set():
-                before = time.monotonic()
-                assert client.get(f"{service.url}/healthz").status_code == 200
-                waited.append(time.monotonic() - before)
-                most = max(most, memory_of(service.process.pid))
-                time.sleep(0.01)
-
-    with ThreadPoolExecutor(n_clients + 9) as clients:
-        watcher = clients.submit(watch)
-        try:
-            idle = [clients.submit(never_read, service) for _ in range(8)]
-            statuses = set(clients.map(lambda message: ask(service, *message), messages))
-            for one in idle:
-                one.result()
-        finally:
-            is_over.set()
-        watcher.result()
+    base = memory_of(service.process.pid)
+    with watched(service.port, service.process.pid, 5.0) as seen, ThreadPoolExecutor(n_clients + 8) as clients:
+        idle = [clients.submit(never_read, service) for _ in range(8)]
+        statuses = set(clients.map(lambda message: ask(service, *message), messages))
+        for one in idle:
+            one.result()
     assert statuses <= {200, 201, 400, 404, 413, 422, 503, 504, 507}
-    assert most - base < (1.1 * GIVEN + STORED) / MB, (base, most)
-    return waited
+    assert seen.memory - base < (1.1 * GIVEN + STORED) / MB, (base, seen.memory)
+    return seen.wait
 
 
 def test_memory_stays_within_what_requests_are_given(service: Service) -> None:
@@ -151,4 +130,4 @@ def test_memory_stays_within_what_requests_are_given(service: Service) -> None:
 
 @pytest.mark.full
 def test_it_does_so_for_long_and_small_questions_are_answered(service: Service) -> None:
-    assert max(hold_within(service, 8, 10)) < 0.1
+    assert hold_within(service, 8, 10) < 0.1
