@@ -38,7 +38,7 @@ def text_of(value: Any) -> bytes:
     Raises: NotJsonError; what `poll` raises.
     """
     try:
-        if _count(value, _FEW) <= _FEW:
+        if isinstance(value, str) or _count(value, _FEW) <= _FEW:
             return _encoded(value)
         writer = _Writer()
         writer.write(value)

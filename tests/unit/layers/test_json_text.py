@@ -36,6 +36,8 @@ def test_the_text_is_that_of_json(few: int, monkeypatch: pytest.MonkeyPatch) -> 
         assert json.loads(text_of({"a": array})) == {"a": array.tolist()}
         assert key_of({"a": array}) == key_of({"a": array.tolist()}) != key_of({"a": [array.tolist()]})
     assert text_of("\ud800") == b'"\\ud800"'
+    for value in ("x" * 300_000, ["é" * 300_000, 1], {"x" * 300_000: "y" * 300_000}):
+        assert text_of(value) == json.dumps(value, separators=(",", ":"), ensure_ascii=False).encode()
 
 
 @pytest.mark.parametrize("few", [1, 3, 256])
