@@ -33,8 +33,9 @@ _SEARCHED: Final = 2**19
 """Bytes searched at once: two milliseconds."""
 EXACT_INTEGERS: Final = 2**53
 
-_OPENING: Final = re.compile(rb"(?:\s*\[){1,4}")
-_CUTS: Final = {depth: re.compile(rb"\]\s*" * (depth - 1) + rb",") for depth in (1, 2, 3, 4)}
+_DEEPEST: Final = 4
+_OPENING: Final = re.compile(rb"(?:\s{0,64}\[){1,%d}" % (_DEEPEST + 1))
+_CUTS: Final = {depth: re.compile(rb"\]\s*" * (depth - 1) + rb",") for depth in range(1, _DEEPEST + 1)}
 _NO_TOKENS: Final = bytes(set(range(256)) - set(b"[],"))
 
 
@@ -55,6 +56,8 @@ class Decoder:
         if found is None or not inner.endswith(b"]"):
             raise Unfit
         depth = found[0].count(b"[")
+        if depth > _DEEPEST:
+            raise Unfit
         stop = len(text) - len(bytes(text[-64:])) + len(inner) - 1
         if depth > 2 and stop > PIECE and _cut(text, depth, 1 + PIECE, stop) == stop:
             with suppress(Unfit):  # one long item

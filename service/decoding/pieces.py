@@ -113,6 +113,15 @@ def _cut(text: Body, start: int) -> tuple[int, bytes]:
     return len(text), b""
 
 
+def _still_open(brackets: bytes) -> bytes:
+    """Return those that no later one closes; the parser finds out where they are of two kinds."""
+    codes = np.frombuffer(brackets, np.uint8)
+    opens = codes & 2 > 0
+    depths = np.cumsum(2 * opens.astype(np.int64) - 1)
+    lowest_after = np.minimum.accumulate(depths[::-1])[::-1]
+    return codes[opens & (lowest_after >= depths)].tobytes()
+
+
 def _without_strings(piece: bytes) -> bytes:
     """Return a piece that begins outside of strings, with blanks for what is inside of them."""
     if b'"' not in piece:
@@ -150,11 +159,7 @@ class _Pieces:
 
     def add(self, piece: bytes, brackets: bytes) -> None:
         """Add a piece that is not the last; brackets: those in it outside strings."""
-        opened = self._brackets + brackets
-        shorter = len(opened) + 1
-        while len(opened) < shorter:  # bound: each turn takes a pair at least
-            shorter = len(opened)
-            opened = opened.replace(b"[]", b"").replace(b"{}", b"")
+        opened = _still_open(self._brackets + brackets)
         if not opened:
             piece += b","  # case: the text goes on after its value, which the parser refuses
         elif piece.rstrip()[-1:] in (b"[", b"{"):

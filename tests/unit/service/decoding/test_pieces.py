@@ -165,3 +165,16 @@ def test_a_long_value_is_emptied() -> None:
     pieces.let_go(value)
     assert (value, listed, inner) == ({}, [], {})
     pieces.let_go(None)
+
+
+def test_brackets_that_stay_open_are_those_that_pairs_leave() -> None:
+    source = random.Random(7)
+    for _ in range(2000):
+        text = opened = "".join(source.choice("[{") for _ in range(source.randrange(30)))
+        for _ in range(source.randrange(30)):
+            if opened and source.random() < 0.6:
+                text, opened = text + {"[": "]", "{": "}"}[opened[-1]], opened[:-1]
+            else:
+                more = source.choice("[{")
+                text, opened = text + more, opened + more
+        assert pieces._still_open(text.encode()) == opened.encode()
