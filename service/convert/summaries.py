@@ -65,6 +65,8 @@ def _cut(value: Any, show: int) -> Any:
         value = {name: item for name, item in vars(value).items() if item is not None}
     if isinstance(value, dict):
         return {name: _cut(item, show) for name, item in value.items()}
+    if type(value) is int and not -(2**63) <= value < 2**64:
+        return Raw(str(value).encode())  # the encoder takes none so large
     if isinstance(value, str):
         return value if len(value) <= _LONG else {"count": len(value), "first": value[:_LONG]}
     if isinstance(value, (list, tuple, np.ndarray)) and not isinstance(value, Series):

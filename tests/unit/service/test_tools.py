@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 
-from service import tools
+from service import tools, wire
 from service.app import create_app
 from service.convert.summaries import summary
 from service.errors import ServiceError
@@ -276,3 +276,10 @@ def test_long_lists_are_cut_at_every_depth() -> None:
     assert len(found["pieces"]["items"]) == 2
     assert found["pieces"]["items"][0]["shell"] == {"count": 100, "first": rings[0][:3]}
     assert found["area"] == 1.0
+
+
+def test_whole_numbers_of_any_size_are_shown() -> None:
+    feature = b'{"properties":{"a":%d,"b":[%d,1.5,true]}}' % (2**70, -(2**63) - 1)
+    answer = LayersResponse.made(type="FeatureCollection", features=Series(1, lambda i, j: [Raw(feature)][i:j]))
+    shown = json.loads(wire.encode(summary(answer, 10, 0)))
+    assert shown["features"]["items"] == [json.loads(feature)]
