@@ -23,7 +23,7 @@ from fastapi.routing import APIRoute, APIRouter
 from pydantic import TypeAdapter, ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
-from starlette.types import Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 from engine import EngineError
 from service import body, traces, wire
@@ -120,7 +120,7 @@ class GeometryRoute(APIRoute):
                     is_small = 0 < declared <= call.settings.inline_bytes
                     if not is_small:
                         state.pool.check_room()
-                    job.body = await body.read(request.receive, declared, call)
+                    job.body = await body.read(_receive_of(request), declared, call)
                     call.start_clock()
                     state.metrics.bytes_in.inc(len(job.body))
                 if is_small and state.warm.is_set() and adapter is not None and job.coding is None:
@@ -154,6 +154,18 @@ def _guard_of(route: APIRoute) -> Answer | None:
         effective.path, _nothing, dependencies=effective.dependencies, dependency_overrides_provider=provider
     )
     return made.get_route_handler()
+
+
+def _receive_of(request: Request) -> Receive:
+    """Return what hands the body on, also where a dependency of the host has read it: the framework keeps it then."""
+    known: bytes | None = getattr(request, "_body", None)
+    if known is None:
+        return request.receive
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": known}
+
+    return receive
 
 
 def _nothing() -> None:

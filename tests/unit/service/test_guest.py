@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import httpx
 import pytest
-from fastapi import Depends, FastAPI, Header, HTTPException
+from fastapi import Depends, FastAPI, Header, HTTPException, Request
 
 import engine
 import service
@@ -98,6 +98,21 @@ async def test_dependencies_of_the_host_guard_every_call(host: FastAPI, anyio_ba
         missing = f"/geometry/v1/solids/{'0' * 64}"
         assert (await client.get(missing)).status_code == 401
         check_problem(await client.get(missing, headers={"x-key": "right"}), 404, "unknown_solid")
+
+
+async def test_a_dependency_of_the_host_may_read_the_body(host: FastAPI, anyio_backend: str) -> None:
+    """One that checks a signature does; the call then waited for a body that had arrived."""
+
+    async def check(request: Request) -> None:
+        if b"points" not in await request.body():
+            raise HTTPException(401, "no")
+
+    host.include_router(service.router(Settings(body_seconds=1)), dependencies=[Depends(check)])
+    async with host.router.lifespan_context(host):
+        for n in (1, 3000):
+            question = {"solid": SPHERE, "points": [[0, 0, 0]] * n}
+            answer = await client_of(host).post("/v1/contains", json=question)
+            assert answer.json()["contained"] == [True] * n
 
 
 @pytest.mark.parametrize("path", ["/v1/contains", "/readyz", "/metrics"])
