@@ -145,6 +145,8 @@ class Protocol(HttpToolsProtocol):
             if stop == start:
                 break
             piece, start = raw[start:stop], stop
+            if not self._is_in_message and "headers" not in self._timers:  # also where it is blank lines alone
+                self._start_headers()
             self._overhead += len(piece)
             super().data_received(piece)  # type: ignore[arg-type]
             self._check_overhead()
@@ -187,11 +189,9 @@ class Protocol(HttpToolsProtocol):
             self._refuse("large_headers", f"the {what} are longer than {most} bytes; send fewer")
 
     def on_message_begin(self) -> None:
-        """Start the clock for a later request on the same connection."""
+        """Note that a request has begun."""
         super().on_message_begin()
         self._is_in_message, self._is_in_body = True, False
-        if "headers" not in self._timers:
-            self._start_headers()
 
     def _start_headers(self) -> None:
         self._overhead, seconds = 0, _settings().header_seconds

@@ -183,3 +183,17 @@ def test_a_whole_answer_has_its_time(service: Service) -> None:
             received += len(connection.recv(2**15))
             time.sleep(0.05)
         assert received < len(body) // 2
+
+
+def test_blank_lines_hold_no_connection() -> None:
+    """They ended the time that a connection may idle, and began none."""
+    with running(header_seconds=1) as service, connect(service) as connection:
+        connection.sendall(HEALTH)
+        while b"}" not in connection.recv(2**16):
+            pass
+        connection.sendall(b"\r\n\r\n")
+        connection.settimeout(10)
+        answer = b""
+        while more := connection.recv(2**16):
+            answer += more
+        assert answer.startswith(b"HTTP/1.1 408 ")
