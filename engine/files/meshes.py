@@ -21,6 +21,12 @@ _SOUPS: Final = ("stl",)
 M = TypeVar("M", bound=Mesh)
 _NAMES: Final = re.compile(rb"^[ \t]*(?:g|o|s|usemtl|mtllib)(?:[ \t][^\r\n]*)?$", re.MULTILINE)
 """Lines of an OBJ file that say nothing of its shape: trimesh's time grows with their number squared."""
+_ELEMENT: Final = re.compile(rb"^[ \t]*([vf])[ \t]+([^\r\n]*)", re.MULTILINE)
+_ODD: Final = re.compile(
+    rb"^[ \t]*f[ \t](?:[^\r\n#]*[ \t])?(?:-|0+(?=[/\s]|\Z))|^[ \t]*f(?:[ \t]+[^\s\\]+){0,2}[ \t]*(?=[\r\n#]|\Z)",
+    re.MULTILINE,
+)
+"""Lines of an OBJ file that trimesh reads as something else: indices from 0 down, faces of fewer than three corners."""
 
 
 class _Arrays(NamedTuple):
@@ -97,7 +103,7 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
     try:
         if file_format == "obj":
-            file = io.BytesIO(_NAMES.sub(b"", file.read()))
+            file = io.BytesIO(_counted(_NAMES.sub(b"", file.read())))
         with np.errstate(all="ignore"):
             scene = trimesh.load_scene(
                 file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
@@ -119,6 +125,32 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
             ("file",),
         )
     return _merged(vertices, faces, file_format)
+
+
+def _counted(text: bytes) -> bytes:
+    """Return an OBJ file with its relative indices counted, from the last vertex before the face; ValueError for faces
+    that are none. trimesh counts from the end of the file, takes 0 for 1, and drops faces of fewer than three corners.
+    """
+    if _ODD.search(text) is None:
+        return text
+    n_vertices = n_faces = 0
+
+    def rewritten(match: re.Match[bytes]) -> bytes:
+        nonlocal n_vertices, n_faces
+        if match[1] == b"v":
+            n_vertices += 1
+            return match[0]
+        given = [int(corner.partition(b"/")[0]) for corner in match[2].partition(b"#")[0].split()]
+        corners = [n_vertices + 1 + number if number < 0 else number for number in given]
+        if len(corners) < 3 or min(corners) < 1 or 0 in given:
+            raise ValueError(
+                f"face {n_faces} has the corners {given!s:.100}; it needs three or more, from 1, or from -1 for the "
+                f"last of {n_vertices} vertices before it"
+            )
+        n_faces += 1
+        return b"f " + b" ".join(b"%d" % number for number in corners)
+
+    return _ELEMENT.sub(rewritten, text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))
 
 
 def _merged(vertices: FloatArray, faces: IntArray, file_format: str) -> MeshOfFile:

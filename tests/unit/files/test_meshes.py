@@ -78,6 +78,23 @@ def test_a_triangle_that_names_a_vertex_twice_is_refused_as_it_was() -> None:
         mesh.solid()
 
 
+def test_relative_indices_count_from_the_last_vertex_before_the_face() -> None:
+    """trimesh counts from the end of the file: both shells became the second, twice, and held nothing."""
+    shells = [[[x + dx, y, z] for x, y, z in ([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1])] for dx in (0, 10)]
+    faces = "f -4 -2//-1 -3\nf -4 -3 \\\n -1\n  f -4/1/-2 -1 -2 # f 0\nf -3 -2 -1\n"
+    text = "".join("".join(f"v {x} {y} {z}\n" for x, y, z in shell) + faces for shell in shells)
+    solid = engine.read_mesh(text.encode(), "obj").solid()
+    assert engine.locate([[0.1, 0.1, 0.1], [10.1, 0.1, 0.1], [5, 0, 0]], solid).tolist() == [1, 1, -1]
+
+
+@pytest.mark.parametrize("face", ["0 1 2", "1 2 0/3", "1 0/1/1 2", "-5 -1 -2", "1 2", "1", "3 4 # 2", "-1 -2"])
+def test_faces_that_are_none_are_refused(face: str) -> None:
+    """0 was taken for 1, and what has fewer than three corners left out without a word."""
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf {face}\nf 1 4 3\nf 2 3 4\n"
+    with pytest.raises(engine.InvalidInputError, match="face 2 has the corners"):
+        engine.read_mesh(text.encode(), "obj")
+
+
 def test_where_everything_collapses_it_is_said() -> None:
     with pytest.raises(engine.EmptyGeometryError, match="all triangles of the stl file have two equal corners"):
         read("stl", np.zeros((5, 3, 3)))
