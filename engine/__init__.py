@@ -11,7 +11,6 @@ from engine.collision.scenes.collide_scene import ScenePairs, collide_scene
 from engine.collision.triangles import collide_triangles
 from engine.compare import Comparison, compare
 from engine.containment.locate import contains, locate
-from engine.containment.scene.locate_scene import SceneLocations, locate_scene
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -47,6 +46,8 @@ from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
 from engine.polygon_overlay.union_all import filled, union_all
 from engine.scenes.ends import ScenePieces
+from engine.scenes.locate import SceneLocations
+from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.lines import LinePieces, clip_lines

@@ -24,12 +24,12 @@ from engine.containment.cells.order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.posed.locators import posed_locator
 from engine.containment.rational_locate import rational_location
-from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import InvalidInputError
 from engine.parallel import check_options
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
+from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.lines import clip_lines

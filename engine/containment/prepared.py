@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, read_
 from engine.bounding.bvh import WIDTH, build_bvh, on_lines
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
 from engine.containment.rational_locate import Check, no_check, prism_walls
+from engine.jit import inline
+from engine.lanes.addresses import array_at
+from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.triangles import OVERHEAD_ROWS
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.triangle import Triangle
@@ -61,6 +64,28 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
     origin = tuple(tree.origin.tolist())
     return TriangleTree(solid.vertices, triangles, tree.boxes, child, on_lines(blocks), origin, tree.scale, low, high)
+
+
+def tree_line(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
+    """Return a solid's row of addresses, sizes and places."""
+    arrays: Any = tree.vertices, tree.triangles, tree.boxes, tree.child, tree.blocks
+    sizes = len(tree.vertices), len(tree.triangles), len(tree.child)
+    return tuple(array.ctypes.data for array in arrays), sizes, (*tree.origin, tree.scale, *tree.low, *tree.high)
+
+
+@inline
+def tree_at(tables: Any, row: int) -> TriangleTree:
+    """Return the tree of a row of what has addresses, sizes and places (n, 5 / 3 / 10), as `tree_line` gives them."""
+    addresses, sizes, places = tables.addresses, tables.sizes, tables.places
+    return TriangleTree(
+        array_at(addresses[row, 0], (sizes[row, 0], 3), np.float64),
+        array_at(addresses[row, 1], (sizes[row, 1], 3), np.int32),
+        array_at(addresses[row, 2], (sizes[row, 2], BOX_ROWS, WIDTH), np.float32),
+        array_at(addresses[row, 3], (sizes[row, 2], WIDTH), np.int32),
+        array_at(addresses[row, 4], (sizes[row, 2], OVERHEAD_ROWS, WIDTH), np.float32),
+        (places[row, 0], places[row, 1], places[row, 2]), places[row, 3],
+        (places[row, 4], places[row, 5], places[row, 6]), (places[row, 7], places[row, 8], places[row, 9]),
+    )  # fmt: skip
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:

@@ -20,24 +20,31 @@ from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.budget import Budget
 from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of
-from engine.containment.locators import Locator
+from engine.containment.locators import Locator, locator_of
 from engine.containment.posed.locators import posed_locator
-from engine.containment.scene.first_pass import SECOND_PASS
-from engine.containment.scene.grid import body_box
-from engine.containment.scene.tables import Scene as LocateTables
-from engine.containment.scene.tables import scene_of
 from engine.direct import entry_of
+from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
+from engine.scenes.body_box import body_box
+from engine.scenes.located import Kinds, LocateTables
 from engine.scenes.near_boxes import BodyTree, Where, list_near, put_keys
 from engine.scenes.scratch import scratch_for
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
+from engine.solids.aabb import Aabb
 from engine.solids.base import Preparing, Solid
+from engine.solids.convex import Convex
 from engine.solids.csg import Csg
+from engine.solids.half_space import HalfSpace
+from engine.solids.implicit import Implicit
+from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose, motions_of
+from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 
+LOCATED: Final = (Aabb, Convex, HalfSpace, Implicit, Polygon, Polyhedron, Sphere, Triangle)
+"""Solids in which points are located whatever the body."""
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""
 
@@ -45,11 +52,13 @@ _LISTED: Final = 4
 class Bodies(Preparing):
     """Checked solids with a pose or None each; safe to share between threads.
 
-    whole: bodies that these are some of, which share what does not depend on poses.
+    whole, owners: bodies that these are some of, which share what does not depend on poses, and the solid of each.
     """
 
-    def __init__(self, solids: tuple[Solid, ...], poses: tuple[Pose | None, ...], whole: Bodies | None = None) -> None:
-        self.solids, self.poses, self._whole = solids, poses, whole
+    def __init__(
+        self, solids: tuple[Solid, ...], poses: tuple[Pose | None, ...], whole: Bodies | None = None, owners: Any = None
+    ) -> None:
+        self.solids, self.poses, self._whole, self._owners = solids, poses, whole, owners
         self._prepared: dict[str, Any] = {}
         self._lock = threading.RLock()
 
@@ -93,14 +102,52 @@ class Bodies(Preparing):
 
     def locator(self, body: int) -> Locator:
         """Return how points are located in a body."""
-        return self.prepared(f"locator {body}", lambda: posed_locator(self.solids[body], self.poses[body]))
 
-    def tables(self, dimension: int, budget: Budget) -> LocateTables:
-        """Return what points are located in; made anew where cells have been built that its first pass lacks."""
-        found: LocateTables | None = self.kept("tables")
-        if found is not None and self.kept("asked_often") and _has_new_cells(found):
-            self.drop("tables", "asked_often")
-        return self.prepared("tables", lambda: scene_of(self.solids, self.poses, dimension, budget), budget.check)
+        def make() -> Locator:
+            try:
+                return posed_locator(self.solids[body], self.poses[body])
+            except EngineError as error:
+                error.where = ("solids", body)
+                raise
+
+        return self.prepared(f"locator {body}", make)
+
+    def solid_tables(self, budget: Budget) -> Kinds:
+        """Return the tables of the solids that points are located in. Raises: UnsupportedSolidError."""
+
+        def build() -> Kinds:
+            arrays = self.arrays(budget)
+            return Kinds(arrays.distinct, arrays.kinds, self.poses, budget)
+
+        return self.prepared("solid_tables", build, budget.check)
+
+    def tables(self, budget: Budget) -> LocateTables:
+        """Return what points are located in, at least one body."""
+        kinds = (self._whole or self).solid_tables(budget)
+        owners = self.arrays(budget).kinds if self._whole is None else self._owners
+        return self.prepared("tables", lambda: kinds.placed(owners, self.poses), budget.check)
+
+    def check_located(self, budget: Budget) -> None:
+        """Raise unless points are located in every body. Raises: UnsupportedSolidError."""
+
+        def check() -> bool:
+            for body, solid in enumerate(self.solids):
+                if type(solid) not in LOCATED:
+                    budget.check()
+                    self.locator(body)
+            return True
+
+        self.prepared("can_locate", check, budget.check)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether no callable decides."""
+
+        def find() -> bool:
+            solids = {id(solid): solid for solid in self.solids if isinstance(solid, (Csg, Implicit))}.values()
+            return all(locator_of(solid).decisions == "exact" for solid in solids)
+
+        return self.prepared("is_exact", find)
 
     def batches(self, budget: Budget) -> SceneBatches:
         """Return what pairs are related by. Raises: as `collide_scene` where it does not take a body."""
@@ -131,14 +178,6 @@ class Bodies(Preparing):
     def check_cut(self, budget: Budget) -> None:
         """Raise unless segments are cut on every body."""
         self.prepared("cut", lambda: check_cut(self.solids), budget.check)
-
-
-def _has_new_cells(tables: LocateTables) -> bool:
-    """Tell whether polyhedra that the first pass leaves to the second have cells by now."""
-    kinds = np.full(len(tables.solids), SECOND_PASS, np.int8)
-    kinds[tables.owners] = tables.tables.kinds
-    left = [tables.solids[index] for index in np.flatnonzero(kinds == SECOND_PASS).tolist()]
-    return any(isinstance(solid, Polyhedron) and solid.kept("top_cells") is not None for solid in left)
 
 
 _MANY: Final = 4096

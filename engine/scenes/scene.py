@@ -14,13 +14,18 @@ from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
 from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
-from engine.containment.at_once import are_few
-from engine.containment.scene.locate_scene import SceneLocations, check_bodies, locate_few, locate_in
-from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
+from engine.errors import (
+    EngineError,
+    IndexOutOfRangeError,
+    InvalidArrayError,
+    InvalidOperationError,
+    WrongDimensionError,
+)
 from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
 from engine.scenes.ends import ScenePieces, in_order, joined
+from engine.scenes.locate import SceneLocations, locate_all
 from engine.scenes.standing import Standing
 from engine.segment_clipping.parameters import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
@@ -30,10 +35,6 @@ from engine.types import Accuracy
 
 _BYTES_OF_POSE: Final = 1000
 Keep = Literal["all", "first", "any"]
-_FEW: Final = 4
-"""Points of a question that are asked body by body."""
-_MANY: Final = 1000
-"""Points of a question after which polyhedra may have got cells."""
 
 
 class Scene(Immutable):
@@ -133,27 +134,10 @@ class Scene(Immutable):
     ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
         """Find for each point the bodies that hold it; all is as in `locate_scene`, which prepares anew each time."""
         check_options(workers, progress, report=report)
-        standing, solids = self._standing, self.solids
-        array = as_points(points, solids[0].dimension if solids else None)
+        array = as_points(points, self.solids[0].dimension if len(self) else None)
         with Budget(deadline, cancel) as budget:
-            if not standing.base.kept("located") and are_few(array, solids):  # the first question
-                standing.base.prepared("located", lambda: True)
-                found, accuracy = locate_few(array, solids, self.poses, budget, progress)
-                return (found, accuracy) if report else found
-            tables = standing.base.tables(array.shape[1], budget)
-            if 0 < len(array) <= _FEW and solids:
-                found, accuracy = standing.located(array, budget)
-                if progress is not None:
-                    progress(len(array))
-            else:
-                found, accuracy = locate_in(array, tables, budget, workers, progress)
-                if len(array) >= _MANY:
-                    standing.base.prepared("asked_often", lambda: True)
-                if standing.moved:
-                    tables = standing.few().tables(array.shape[1], budget)
-                    more, besides = locate_in(array, tables, budget, workers, None)
-                    found, accuracy = standing.merged(found, more), _both(accuracy, besides)
-        return (found, accuracy) if report else found
+            found = locate_all(array, self._standing, budget, workers, progress)
+        return found if report else found[0]
 
     def collide(
         self,
@@ -323,12 +307,32 @@ class Scene(Immutable):
         return sorted(found)
 
 
-def _both(first: Accuracy, second: Accuracy) -> Accuracy:
-    """Return the report on items asked about in two parts of a scene."""
-    decisions = first.decisions if first.decisions == "float64" else second.decisions
-    beyond = min(first.n_items, first.n_beyond_filter + second.n_beyond_filter)
-    rational = min(first.n_items, first.n_rational + second.n_rational)
-    return Accuracy(decisions, first.coordinates_ulp, first.n_items, beyond, rational, first.method)
+def check_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> None:
+    """Raise unless these are solids of one dimension and a pose or None for each, naming the first that is wrong."""
+    if not isinstance(solids, (list, tuple)):
+        raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
+    for index, solid in enumerate(solids):
+        if not isinstance(solid, Solid):
+            raise InvalidArrayError(f"solids[{index}] must be a solid, got {type(solid).__name__}", ("solids", index))
+        if solid.dimension != solids[0].dimension:
+            raise WrongDimensionError(
+                f"solids[{index}] is {solid.dimension}D, solids[0] {solids[0].dimension}D; use one dimension",
+                ("solids", index),
+            )
+    if poses is None:
+        return
+    if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):
+        given = f"{len(poses)}" if isinstance(poses, (list, tuple)) else type(poses).__name__
+        raise InvalidArrayError(f"poses must be a list of {len(solids)}, one for each solid, got {given}", ("poses",))
+    for index, pose in enumerate(poses):
+        if pose is not None and not isinstance(pose, Pose):
+            raise InvalidArrayError(
+                f"poses[{index}] must be a Pose or None, got {type(pose).__name__}", ("poses", index)
+            )
+        if pose is not None and pose.dimension != solids[index].dimension:
+            raise WrongDimensionError(
+                f"poses[{index}] is {pose.dimension}D, its solid {solids[index].dimension}D", ("poses", index)
+            )
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:

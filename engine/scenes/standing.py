@@ -9,22 +9,23 @@ from __future__ import annotations
 import threading
 from collections import namedtuple
 from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
-from engine.budget import Budget
-from engine.containment.scene.locate_scene import SceneLocations
+from engine.budget import UNLIMITED, Budget
+from engine.containment.locators import Locator
 from engine.direct import entry_of
 from engine.jit import inline, kernel
-from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, body_tree, candidates, words_of
+from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, body_tree, words_of
+from engine.scenes.located import LocateTables, both
 from engine.scenes.near_boxes import PLACED, Where, bodies_in, place_in
 from engine.scenes.scratch import scratch_at, scratch_for
 from engine.scenes.table import unready
 from engine.solids.base import Preparing, Solid
+from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
-from engine.types import Accuracy
 
 _FEW: Final = 64
 _PART: Final = 4
@@ -83,7 +84,8 @@ class Standing(Preparing):
     def few(self) -> Bodies:
         """Return those that moved, where they are; at least one."""
         solids, poses = tuple(self.base.solids[body] for body in self.moved), tuple(self.moved.values())
-        return self.prepared("few", lambda: Bodies(solids, poses, self.base))
+        owners = self.base.arrays(UNLIMITED).kinds[self.names]
+        return self.prepared("few", lambda: Bodies(solids, poses, self.base, owners))
 
     def pose(self, body: int) -> Pose | None:
         """Return the pose of a body."""
@@ -165,38 +167,35 @@ class Standing(Preparing):
                 return rows.keys[:n], batches.related(*rows[1:], n, boolean, budget)
             room = n
 
-    def located(self, points: FloatArray, budget: Budget) -> tuple[SceneLocations, Accuracy]:
-        """Return where a few points lie, body by body: for many `locate_in` is faster."""
-        n, n_bodies, beyond, rational, is_exact = len(points), len(self.base.solids), 0, 0, True
-        budget.check()
-        pairs, at = candidates(self.where(budget), points, budget), np.empty(1, np.int8)
-        held, on_boundary, offsets = list[int](), list[bool](), np.zeros(n + 1, np.int64)
-        for item, name, body in sorted(
-            zip(pairs[:, 0].tolist(), self.names_of(pairs[:, 1]).tolist(), pairs[:, 1].tolist())
-        ):
-            locator = self.base.locator(body) if body < n_bodies else self.few().locator(body - n_bodies)
-            counts = locator.chosen(1, budget).fill(points[item : item + 1], at, budget)
-            beyond, rational = beyond + counts.beyond, rational + counts.rational
-            is_exact &= locator.decisions == "exact"
-            if at[0] >= 0:
-                held.append(name)
-                on_boundary.append(at[0] == 0)
-                offsets[item + 1 :] += 1
-        decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
-        accuracy = Accuracy(decisions, None, n, min(n, beyond), min(n, rational), "box_grid")
-        return SceneLocations(offsets, np.array(held, np.int64), np.array(on_boundary, np.bool_)), accuracy
+    def locator(self, body: int) -> Locator:
+        """Return how points are located in a body."""
+        if body not in self.moved:
+            return self.base.locator(body)
+        return self.few().locator(int(np.searchsorted(self.names, body)))
 
-    def merged(self, found: SceneLocations, more: SceneLocations) -> SceneLocations:
-        """Return where points lie among all bodies, from where they lie among those of `base` and of `few`."""
-        stay, n = np.isin(found.indices, self.names, invert=True), len(found.offsets) - 1
-        owners = np.repeat(np.arange(n), np.diff(found.offsets))[stay]
-        owners = np.concatenate([owners, np.repeat(np.arange(n), np.diff(more.offsets))])
-        bodies = np.concatenate([found.indices[stay], self.names[more.indices]])
-        order = np.lexsort((bodies, owners))
-        on_boundary = np.concatenate([found.on_boundary[stay], more.on_boundary])[order]
-        offsets = np.zeros(n + 1, np.int64)
-        np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
-        return SceneLocations(offsets, bodies[order], on_boundary)
+    def tables(self, budget: Budget) -> LocateTables:
+        """Return what points are located in, those that moved last."""
+        if not self.moved:
+            return self.base.tables(budget)
+        few = self.few()
+        return self.prepared("tables", lambda: both(self.base.tables(budget), few.tables(budget)), budget.check)
+
+    def rows_of(self, bodies: IntArray) -> IntArray:
+        """Return where bodies stand of which those that moved count from n on: the inverse of `names_of`."""
+        rows = np.arange(len(self.base.solids))
+        rows[self.names] = len(rows) + np.arange(len(self.names))
+        return rows[bodies]
+
+    def has_new_trees(self, solids: list[Polyhedron]) -> bool:
+        """Tell whether tables lack what is prepared of some solids by now; then they are made again when asked for."""
+        known: set[int] = self.base.prepared("trees", lambda: set())
+        new = {2 * id(solid) + (solid.kept("top_cells") is not None) for solid in solids} - known
+        if new:
+            known |= new
+            for bodies in (self.base, self.kept("few"), self):
+                if bodies is not None:
+                    bodies.drop("tables", "solid_tables")
+        return bool(new)
 
 
 Placed = namedtuple("Placed", "kinds rotations translations")

@@ -32,13 +32,13 @@ FLOORS = {
     "engine.collision": 7,
     "engine.textbook": 7,
     "engine.scenes": 8,
-    "engine.layers": 8,
-    "engine.compare": 9,
-    "engine.distributed": 9,
-    "engine.files": 9,
-    "engine.warmup": 9,
-    "engine": 10,
-    "engine.__main__": 11,
+    "engine.layers": 9,
+    "engine.compare": 10,
+    "engine.distributed": 10,
+    "engine.files": 10,
+    "engine.warmup": 10,
+    "engine": 11,
+    "engine.__main__": 12,
 }
 SAME_FLOOR_ALLOWED = {("engine.budget", "engine.errors"), ("engine.budget", "engine.arrays")}
 SPEAKS_LLVM = {"engine.predicates.error_free"}

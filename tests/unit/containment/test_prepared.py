@@ -13,8 +13,8 @@ from engine.containment.locate import locate
 from engine.containment.locators import locator_of
 from engine.containment.prepared import tree_of
 from engine.containment.rings import rings_of
-from engine.containment.scene.locate_scene import locate_scene
 from engine.errors import DeadlineExceededError
+from engine.scenes.locate_scene import locate_scene
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron

@@ -9,7 +9,6 @@ import pytest
 from numba import config as numba_config
 
 import engine
-from engine.bounding.grid import list_boxes
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
@@ -49,7 +48,7 @@ def test_a_kernel_sees_one_kind_of_array(solid: engine.Solid, kernels: list[Any]
         engine.locate_scene(given, [solid, solid], [turn, None])
     if isinstance(solid, engine.Polyhedron):
         engine.locate(np.random.default_rng(1).random((1 << 15, 3)), solid)  # more than a few passes
-    for kernel in (*kernels, list_boxes):
+    for kernel in kernels:
         layouts = {
             tuple((each.ndim, each.layout, each.mutable) for each in signature if hasattr(each, "layout"))
             for signature in kernel.signatures

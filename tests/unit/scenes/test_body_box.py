@@ -1,4 +1,4 @@
-"""The grid of a scene: the cell of a point lists every body whose box holds it, in ascending order."""
+"""Boxes of single bodies hold all of their points."""
 
 from __future__ import annotations
 
@@ -7,30 +7,8 @@ import pytest
 
 from engine import Aabb, Csg, HalfSpace, Polygon, Pose, Solid, Sphere, Triangle
 from engine.containment.rational_locate import no_check, to_world_frame
-from engine.containment.scene.grid import body_box, build_scene_grid, cell_at
+from engine.scenes.body_box import body_box
 from tests.unit.containment.scenes import box_mesh, made
-
-
-@pytest.mark.parametrize("depth", [0.0, 4.0])
-def test_lists_are_conservative(depth: float) -> None:
-    random = np.random.default_rng(0)
-    lows = random.integers(0, 20, (200, 3)) / 2.0 * [1.0, 1.0, depth]
-    highs = lows + random.integers(0, 4, (200, 3)) / 2.0 * [1.0, 1.0, depth]
-    bodies = np.arange(3, 200, 2)
-    grid = build_scene_grid(bodies, lows, highs)
-    for point in np.concatenate([lows[bodies], highs[bodies]]):
-        cell = cell_at(tuple(point.tolist()), grid)
-        listed = grid.items[grid.offsets[cell] : grid.offsets[cell + 1]].tolist()
-        held = bodies[((lows <= point) & (point <= highs)).all(axis=1)[bodies]].tolist()
-        assert set(held) <= set(listed)
-        assert listed == sorted(listed)
-    assert cell_at((-1.0, 0.0, 0.0), grid) == -1
-
-
-def test_no_bodies_are_in_no_cell() -> None:
-    grid = build_scene_grid(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
-    assert cell_at((0.0, 0.0, 0.0), grid) == -1
-
 
 POSE = Pose([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]], [0.1, 1e9, -3])
 FLAT = Pose([[0.6, -0.8], [0.8, 0.6]], [0.1, 1e-300])

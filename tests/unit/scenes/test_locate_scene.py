@@ -121,8 +121,8 @@ def test_portions_threads_and_order_change_nothing(monkeypatch: pytest.MonkeyPat
     solids = [Sphere(center, 0.5) for center in random.uniform(0, 4, (60, 3))] + [HalfSpace([1, 0, 0], -2)]
     points = random.uniform(0, 4, (3000, 3))
     whole = table(locate_scene(points, solids, workers=1), 61)
-    monkeypatch.setattr("engine.containment.scene.locate_scene._MOST_PAIRS", 500)
-    monkeypatch.setattr("engine.containment.scene.second_pass._MOST_IN_GROUP", 7)
+    monkeypatch.setattr("engine.scenes.locate._MOST_IN_GROUP", 7)
+    monkeypatch.setattr("engine.scenes.locate._MOST_SORTED", 1)
     done: list[int] = []
     cut = table(locate_scene(points[::-1], solids[::-1], progress=done.append), 61)
     assert (whole == cut[::-1, ::-1]).all()

@@ -1,0 +1,238 @@
+"""Which bodies of a scene hold each of many points.
+
+A tree over the boxes of the bodies names the candidates of a point, and the tables of the bodies (located.py) decide
+most of them on the spot. A few candidates, and what the tables leave, each body locates as `locate` does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final, Literal
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.budget import Budget
+from engine.containment.at_once import located_at_once
+from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
+from engine.containment.locators import Counts
+from engine.containment.posed.filters import in_space
+from engine.containment.prepared import tree_of
+from engine.direct import entry_of
+from engine.jit import kernel
+from engine.parallel import Progress, run_chunks
+from engine.scenes.bodies import candidates
+from engine.scenes.located import MESH, locate_in_body
+from engine.scenes.near_boxes import bodies_in
+from engine.scenes.scratch import scratch_at, scratch_for
+from engine.scenes.standing import Standing
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.ragged import Ragged
+from engine.types import UNDECIDED, Accuracy
+
+_BYTES: Final = 40
+"""Of a body and point that it may hold, in its part and in the answer."""
+_MOST_SORTED: Final = 32
+"""Bodies that hold a point, put in order one by one."""
+_FEW_POINTS, _FEW_PAIRS, _FEW_BESIDE_TABLES = 32, 16, 2
+"""So few are located body by body, without tables, or though there are some."""
+_FEW_BODIES, _FEW_VERTICES = 16, 1000
+"""So few, of so few vertices each, are located without a tree when they are asked about for the first time."""
+_MOST_IN_GROUP: Final = 1 << 14
+"""Points that one body locates in one piece of work."""
+_FEWEST_FOR_TREES: Final = 64
+"""Points that a tree is built for; fewer are left to what `locate` does with few points."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneLocations(Ragged):
+    """The bodies that hold each point: those of point i are ``indices[offsets[i]:offsets[i + 1]]``, ascending."""
+
+    _levels: ClassVar[tuple[str, ...]] = ("indices", "offsets")
+    offsets: IntArray
+    """``(n_points + 1,)`` int64."""
+    indices: IntArray
+    """``(n_held,)`` int64: positions in the list of solids."""
+    on_boundary: BoolArray
+    """``(n_held,)``: True where the point is on the body's boundary, False where it is inside."""
+
+
+@kernel
+def locate_near(
+    points: Any, first: int, last: int, where: Any, tables: Any, room: Any, keys: Any, asked: Any, flag: Any
+) -> Any:
+    """List the bodies that hold points (n, dim) first ... last, or may, as far as there is room.
+
+    keys (room,): 4 (point n_bodies + body) + location, UNDECIDED among them, ascending; asked (n_meshes,): of how many
+    points each mesh was a candidate.
+    Returns the numbers of points done, of keys, of those that took more than a filter, and whether the keys ascend.
+    """
+    scratch, n, is_flat, is_sorted = scratch_at(room), where.together.low.shape[0], points.shape[1] == 2, True
+    n_keys, n_beyond, done = 0, 0, first
+    for item in range(first, last):
+        if flag[0]:
+            break
+        n_near = bodies_in(points[item], points[item], where, scratch.stack, scratch.near)
+        if n_keys + n_near > keys.size:
+            break
+        p, before = in_space(points, item), n_keys
+        for place in range(n_near):
+            body = scratch.near[place]
+            location, is_beyond = locate_in_body(tables, body, is_flat, p, scratch.stack, flag)
+            n_beyond += is_beyond
+            if tables.kinds[body] == MESH:
+                asked[tables.slots[body]] += 1
+            if location == -1:
+                continue
+            key, put = 4 * (item * n + (body if body < n else where.names[body - n])) + location, n_keys
+            if n_keys - before > _MOST_SORTED:
+                is_sorted &= keys[put - 1] < key
+            else:
+                while put > before and keys[put - 1] > key:
+                    keys[put] = keys[put - 1]
+                    put -= 1
+            keys[put] = key
+            n_keys += 1
+        done = item + 1
+    return done, n_keys, n_beyond, is_sorted
+
+
+@kernel
+def locate_pairs(points: Any, owners: Any, bodies: Any, tables: Any, room: Any, located: Any, flag: Any) -> None:
+    """Fill located (n,) int8 for pairs of a point and a body that its tables decide, UNDECIDED for others."""
+    scratch, is_flat = scratch_at(room), points.shape[1] == 2
+    for pair in range(owners.size):
+        if flag[0]:
+            break
+        p = in_space(points, owners[pair])
+        located[pair], _ = locate_in_body(tables, bodies[pair], is_flat, p, scratch.stack, flag)
+
+
+def locate_all(
+    points: FloatArray, standing: Standing, budget: Budget, workers: int | None, progress: Progress | None
+) -> tuple[SceneLocations, Accuracy]:
+    """Return the bodies that hold each of some checked points."""
+    budget.check()
+    n, n_bodies, parts = len(points), len(standing.base.solids), dict[int, IntArray]()
+    if not n_bodies:
+        none = SceneLocations(np.zeros(n + 1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_))
+        return none, Accuracy("exact", None, n, 0, 0, "box_grid")
+    points, beyond, asked, has_new = read_only(points), [0], list[IntArray](), False
+    if 0 < n <= _FEW_POINTS and n_bodies <= _FEW_BODIES and not standing.base.kept("can_locate"):
+        if all(len(getattr(solid, "vertices", ())) <= _FEW_VERTICES for solid in standing.base.solids):
+            return _first(points, standing, budget, progress)
+    where = standing.where(budget)
+
+    def task(start: int, stop: int) -> None:
+        done, size, found = start, 2 * (stop - start) + standing.n_rows, list[IntArray]()
+        scratch, counted = scratch_for(standing.n_rows), np.zeros(len(tables.sizes), np.int64)
+        while done < stop:  # bound: each turn locates a point, for all candidates of one have room
+            keys = np.empty(size, np.int64)
+            done, n_keys, n_beyond, is_sorted = entry_of(locate_near)(
+                points, done, stop, where, tables, scratch, keys, counted, budget.flag
+            )
+            budget.check()
+            budget.take(_BYTES * n_keys)
+            found.append(keys[:n_keys] if is_sorted else np.sort(keys[:n_keys]))
+            beyond.append(n_beyond)
+        parts[start] = np.concatenate(found)
+        asked.append(counted)
+
+    most = _FEW_PAIRS if standing.base.kept("tables") is None else _FEW_BESIDE_TABLES
+    if n <= _FEW_POINTS and len(pairs := candidates(where, points, budget)) <= most:
+        standing.base.check_located(budget)
+        keys = 4 * (pairs[:, 0] * n_bodies + standing.names_of(pairs[:, 1])) + UNDECIDED
+        keys.sort()
+    else:
+        tables = standing.tables(budget)
+        run_chunks(task, n, budget=budget, workers=workers, progress=progress)
+        keys = np.concatenate([np.zeros(0, np.int64), *(parts[start] for start in sorted(parts))])
+        if asked and len(tables.sizes):
+            has_new = _build_trees(standing, np.sum(asked, axis=0), budget, workers)
+    located = (keys & 3).astype(np.int8)
+    owners, bodies = np.divmod(keys >> 2, n_bodies)
+    left = np.flatnonzero(located == UNDECIDED)
+    counts, is_exact = Counts(0, 0), standing.base.is_exact
+    if len(left):
+        located[left], counts = _settled(points, owners[left], bodies[left], standing, has_new, budget, workers)
+        held = located >= 0
+        located, owners, bodies = located[held], owners[held], bodies[held]
+    if progress is not None and not parts:
+        progress(n)
+    offsets = np.zeros(n + 1, np.int64)
+    np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
+    decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
+    n_beyond = min(n, sum(beyond) + counts.beyond)
+    accuracy = Accuracy(decisions, None, n, n_beyond, min(n, counts.rational), "box_grid")
+    return SceneLocations(offsets, bodies, located == 0), accuracy
+
+
+def _first(
+    points: FloatArray, standing: Standing, budget: Budget, progress: Progress | None
+) -> tuple[SceneLocations, Accuracy]:
+    """Return the bodies that hold each of a few points, each body asked about all, before a tree is made."""
+    n, located, counts = len(points), np.empty((len(standing.base.solids), len(points)), np.int8), [0, 0]
+    standing.base.check_located(budget)
+    for body in range(len(located)):
+        solid, pose = standing.placed(body)
+        found = located_at_once(points, solid) if pose is None else None
+        if found is None:
+            more = standing.locator(body).chosen(n, budget).fill(points, located[body], budget)
+        else:
+            located[body], more = found[0], Counts(*found[1:3])
+        counts = [min(n, counts[0] + more.beyond), min(n, counts[1] + more.rational)]
+    owners, bodies = np.nonzero(located.T >= 0)
+    if progress is not None:
+        progress(n)
+    accuracy = Accuracy("exact" if standing.base.is_exact else "float64", None, n, counts[0], counts[1], "box_grid")
+    offsets = np.searchsorted(owners, np.arange(n + 1))
+    return SceneLocations(offsets, bodies, located[bodies, owners] == 0), accuracy
+
+
+def _settled(
+    points: FloatArray, owners: IntArray, bodies: IntArray, standing: Standing, has_new: bool, budget: Budget,
+    workers: int | None,
+) -> tuple[Int8Array, Counts]:  # fmt: skip
+    """Return the locations of pairs of a point and a body, each body's by its locator, and what they took."""
+    found, order = np.full(len(owners), UNDECIDED, np.int8), np.argsort(bodies, kind="stable")
+    if has_new:
+        tables, names, scratch = standing.tables(budget), standing.rows_of(bodies), scratch_for(standing.n_rows)
+        entry_of(locate_pairs)(points, owners[order], names[order], tables, scratch, again := found[order], budget.flag)
+        budget.check()
+        found[order] = again
+        order = order[again == UNDECIDED]
+    ends = np.flatnonzero(np.append(bodies[order][1:] != bodies[order][:-1], True)) + 1 if len(order) else order
+    groups = [
+        (begin, min(begin + _MOST_IN_GROUP, end))
+        for first, end in zip([0, *ends.tolist()], ends.tolist())
+        for begin in range(first, end, _MOST_IN_GROUP)
+    ]
+    counts = []
+
+    def task(first: int, last: int) -> None:
+        for begin, end in groups[first:last]:
+            places = order[begin:end]
+            located = np.empty(end - begin, np.int8)
+            locator = standing.locator(int(bodies[places[0]])).chosen(end - begin, budget)
+            counts.append(locator.fill(points[owners[places]], located, budget))
+            found[places] = located
+
+    run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
+    return found, Counts(sum(each.beyond for each in counts), sum(each.rational for each in counts))
+
+
+def _build_trees(standing: Standing, asked: IntArray, budget: Budget, workers: int | None) -> bool:
+    """Build trees and cells of the polyhedra that are asked often enough; return whether tables lack one of these."""
+    chosen = list[tuple[Polyhedron, int]]()
+    for solid, n_asked in zip(standing.base.solid_tables(budget).meshes, asked.tolist()):
+        if n_asked and len(solid.triangles) <= MOST_FACES:
+            if n_asked >= _FEWEST_FOR_TREES or solid.kept("tree") is not None:
+                chosen.append((solid, n_asked))
+
+    def build(start: int, stop: int) -> None:
+        for solid, n_asked in chosen[start:stop]:
+            tree_of(solid, budget.check)
+            top_cells_if_they_pay(solid, n_asked, budget)
+
+    run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
+    return bool(chosen) and standing.has_new_trees([solid for solid, _ in chosen])

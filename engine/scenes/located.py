@@ -1,0 +1,215 @@
+"""What points are located in: the bodies of a scene in flat tables, with array operations over all bodies of a kind.
+
+A solid that stands for many bodies stands once in the table of its kind; its row there is the slot of each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.bounding.aabb import place_boxes
+from engine.budget import Budget
+from engine.containment.cells.locate import side_in_cell
+from engine.containment.methods.ball import located
+from engine.containment.methods.polygon_ray_parity import locate_in_runs
+from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
+from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
+from engine.containment.posed.frames import Frames, frames_of, to_frame
+from engine.containment.posed.locators import posed_locator
+from engine.containment.prepared import tree_at, tree_line
+from engine.containment.rings import closed_rings
+from engine.errors import EngineError
+from engine.jit import merged
+from engine.solids.aabb import Aabb
+from engine.solids.base import Solid
+from engine.solids.convex import Convex, rows_in_space, rows_of
+from engine.solids.half_space import HalfSpace
+from engine.solids.polygon import Polygon
+from engine.solids.polyhedron import Polyhedron
+from engine.solids.pose import Pose
+from engine.solids.ragged import summed
+from engine.solids.sphere import Sphere
+from engine.solids.triangle import Triangle
+from engine.types import UNDECIDED, Point3
+
+BY_ITSELF, BOX, BALL, ROWS, RINGS, MESH = range(6)
+"""How a candidate is decided: by the locator of the body, or by the tables."""
+_MOST_EDGES: Final = 128
+"""Of a polygon whose edges are all looked at: above it the lists of single solids are better."""
+_CHECK_EVERY: Final = 256
+
+
+class LocateTables(NamedTuple):
+    """What kernels read of bodies, those that moved last (n + m,), and of their solids."""
+
+    kinds: Int8Array
+    slots: Int32Array
+    frames: Int32Array
+    """Row of a body's pose in the next three, -1 for none."""
+    inverses: FloatArray
+    """``(n_poses, 3, 3)``: R^-1 rounded (posed/frames.py); the plane's in the upper left."""
+    translations: FloatArray
+    is_turn: BoolArray
+    centers: FloatArray
+    """``(n_balls, 3)``: of balls, in the world; their slots count bodies."""
+    balls: FloatArray
+    """``(n_balls, 2)``: radius, and a bound on the error of each coordinate of the centre."""
+    box_lows: FloatArray
+    """``(n, 3)``: of boxes in their own frame."""
+    box_highs: FloatArray
+    row_offsets: IntArray
+    """Where the rows of a half-space or convex begin."""
+    rows: FloatArray
+    """``(n, 4)``: normal and offset; the plane's have 0 in the third place."""
+    polygon_offsets: IntArray
+    """Where the rings of a polygon begin."""
+    rings: Int32Array
+    xs: FloatArray
+    """The vertices of all rings, each ended by its first one."""
+    ys: FloatArray
+    cell_frames: FloatArray
+    cell_places: IntArray
+    """``(n, 6)`` and ``(n, 4)``: what `TopCells` has of a polyhedron, 0 where there is none."""
+    addresses: IntArray
+    sizes: IntArray
+    places: FloatArray
+    """What `tree_line` has of a polyhedron, 0 where there is no tree."""
+
+
+@merged
+def locate_in_body(tables: Any, body: int, is_flat: bool, p: Any, stack: Any, flag: Any) -> tuple[int, bool]:
+    """Return the location of a point in a body, and whether it took more than a filter; stack: (STACK,), scratch."""
+    kind, slot = tables.kinds[body], tables.slots[body]
+    q, blur = to_frame(tables, tables.frames[body], p)
+    if kind == RINGS:
+        first, last = tables.polygon_offsets[slot], tables.polygon_offsets[slot + 1]
+        return locate_in_runs(tables.xs, tables.ys, tables.rings, first, last, q[0], q[1], blur)
+    location = UNDECIDED
+    if kind == MESH:
+        if tables.cell_places[slot, 0] != 0:
+            location = side_in_cell(tables.cell_frames, tables.cell_places, slot, q, blur)
+        if location == UNDECIDED and tables.addresses[slot, 0] != 0:
+            location, _ = locate_in_tree(tree_at(tables, slot), Point3(q[0], q[1], q[2]), blur, stack, flag)
+    elif kind == BOX:
+        location = side_of_box(in_space(tables.box_lows, slot), in_space(tables.box_highs, slot), is_flat, q, blur)
+    elif kind == BALL:
+        c, radius, blur = in_space(tables.centers, slot), tables.balls[slot, 0], tables.balls[slot, 1]
+        square, reach = radius * radius, radius + 2.0 * blur
+        location = int(located(p[0] - c[0], p[1] - c[1], p[2] - c[2], square, reach, blur))
+    elif kind == ROWS:
+        location = side_of_rows(tables.rows, tables.row_offsets[slot], tables.row_offsets[slot + 1], q, blur)
+    return location, False
+
+
+class Kinds:
+    """The tables of the distinct solids of some bodies, by kind, each in its own frame."""
+
+    def __init__(self, solids: Sequence[Solid], owners: IntArray, poses: Sequence[Pose | None], budget: Budget) -> None:
+        n, self.dimension = len(solids), solids[0].dimension
+        self.kinds, self.slots = np.full(n, BY_ITSELF, np.int8), np.zeros(n, np.int32)
+        self._solids = solids
+        by_type: dict[type[Solid], list[int]] = {}
+        for index, solid in enumerate(solids):
+            by_type.setdefault(type(solid), []).append(index)
+        flat = by_type.pop(Triangle, []) if self.dimension == 2 else []
+        rings = self._rings(by_type.pop(Polygon, []) + flat)
+        budget.check()
+        boxes = self._chosen(by_type.pop(Aabb, []), BOX)
+        balls = self._chosen(by_type.pop(Sphere, []), BALL)
+        self._radii, self._centers = np.array([ball.radius for ball in balls]), self._vectors([b.center for b in balls])
+        rows = self._rows(by_type.pop(HalfSpace, []) + by_type.pop(Convex, []))
+        self.meshes: list[Polyhedron] = self._chosen(by_type.pop(Polyhedron, []), MESH)
+        others = np.zeros(n, np.bool_)
+        others[[index for rest in by_type.values() for index in rest]] = True
+        for turn, body in enumerate(np.flatnonzero(others[owners]).tolist()):
+            if turn % _CHECK_EVERY == 0:
+                budget.check()
+            try:
+                posed_locator(solids[owners[body]], poses[body])
+            except EngineError as error:
+                error.where = ("solids", body)
+                raise
+        lows, highs = (self._vectors([getattr(box, side) for box in boxes]) for side in ("min", "max"))
+        self._fixed = lows, highs, *rows, *rings, *_meshes(self.meshes)
+
+    def _chosen(self, indices: list[int], kind: int) -> list[Any]:
+        """Return solids that get a kind, their slots in the order given."""
+        self.kinds[indices], self.slots[indices] = kind, np.arange(len(indices))
+        return [self._solids[index] for index in indices]
+
+    def _vectors(self, values: list[FloatArray]) -> FloatArray:
+        """Return vectors as (n, 3); 0 in the third place in the plane."""
+        vectors = np.zeros((len(values), 3))
+        if values:
+            vectors[:, : self.dimension] = values
+        return vectors
+
+    def _rings(self, indices: list[int]) -> tuple[Any, ...]:
+        solids = self._chosen(indices, RINGS)
+        offsets = [solid.ring_offsets for solid in solids]
+        polygon_offsets = summed([len(each) - 1 for each in offsets])
+        ends = np.concatenate([np.zeros(0, np.int64), *offsets])  # each begins with 0
+        sizes = np.delete(np.diff(ends, prepend=0), polygon_offsets[:-1] + np.arange(len(offsets)))
+        vertices = read_only(np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)]))
+        xs, ys, rings, _ = closed_rings(vertices, summed(sizes))
+        n_edges = rings[polygon_offsets[1:] - 1, 1] - rings[polygon_offsets[:-1], 0]
+        self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = BY_ITSELF
+        return polygon_offsets, rings, xs, ys
+
+    def _rows(self, indices: list[int]) -> tuple[Any, ...]:
+        planes = [rows_of(solid) for solid in self._chosen(indices, ROWS)]
+        rows = np.concatenate([np.zeros((0, self.dimension + 1)), *planes])
+        return summed([len(each) for each in planes]), rows_in_space(rows)
+
+    def placed(self, owners: IntArray, poses: Sequence[Pose | None]) -> LocateTables:
+        """Return the tables of bodies, of each its solid and its pose."""
+        frames, kinds, slots = frames_of(poses, self.dimension), self.kinds[owners], self.slots[owners]
+        bodies = np.flatnonzero(kinds == BALL)
+        low, high = moved_boxes(*(self._centers[slots[bodies]],) * 2, frames, frames.rows[bodies])
+        with np.errstate(over="ignore", invalid="ignore"):
+            centers = low * 0.5 + high * 0.5
+            centers[(low == high).all(axis=1)] = low[(low == high).all(axis=1)]  # halves of subnormals may round
+            blurs = (high - low).max(axis=1, initial=0.0)
+        balls = np.stack([self._radii[slots[bodies]], blurs], axis=1)
+        slots[bodies] = np.arange(len(bodies))
+        return LocateTables(
+            kinds, slots, frames.rows, frames.inverses, frames.translations, frames.is_turn, centers, balls,
+            *self._fixed,
+        )  # fmt: skip
+
+
+def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
+    """Return of polyhedra the cells of level 0 and the trees, of those that have them by now."""
+    cells, trees = [solid.kept("top_cells") for solid in solids], [solid.kept("tree") for solid in solids]
+    lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_line(tree) for tree in trees]
+    addresses, sizes, places = zip(*lines) if lines else ((), (), ())
+    return (
+        np.array([np.zeros(6) if each is None else each.frame for each in cells]).reshape(-1, 6),
+        np.array([(0, 0, 0, 0) if each is None else each.place for each in cells], np.int64).reshape(-1, 4),
+        np.array(addresses, np.int64).reshape(-1, 5), np.array(sizes, np.int64).reshape(-1, 3),
+        np.array(places, np.float64).reshape(-1, 10),
+    )  # fmt: skip
+
+
+def both(first: LocateTables, then: LocateTables) -> LocateTables:
+    """Return the tables of bodies and of others behind them, all of the same solids."""
+    rows, slots = np.where(then.frames < 0, -1, then.frames + len(first.inverses)), then.slots.copy()
+    slots[then.kinds == BALL] += len(first.balls)
+    then = then._replace(frames=rows.astype(np.int32), slots=slots)
+    return first._replace(**{
+        name: np.concatenate([getattr(first, name), getattr(then, name)])
+        for name in ("kinds", "slots", "frames", "inverses", "translations", "is_turn", "centers", "balls")
+    })  # fmt: skip
+
+
+def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> tuple[FloatArray, FloatArray]:
+    """Return boxes (n, 2 or 3) around the images of finite boxes under poses, of each its row; -1 for none."""
+    low, high, n = np.empty_like(lows), np.empty_like(highs), len(rows)
+    boxes, moves = np.stack([lows, highs], axis=1), (frames.rotations, frames.translations)
+    with np.errstate(all="ignore"):
+        place_boxes(boxes, np.full(n, np.inf), np.zeros(n), np.arange(n), rows.astype(np.int64), *moves, low, high)
+    return low, high
