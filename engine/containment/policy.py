@@ -20,8 +20,8 @@ from engine.solids.polyhedron import Polyhedron
 PASS, LISTS, CELLS = 0, 1, 2
 """One pass over all faces or edges; a tree or slabs; cells."""
 
-_FEW: Final = 64
-"""Points for which cells, if there are any, are not worth the general way."""
+_FEW: Final = 192
+"""Points for which the tree, entered directly, is as fast as cells."""
 _FEW_RAYS: Final = 256
 """Of points through faces: a pass over so many costs less than to hand over a tree."""
 _POINTS_A_PASS: Final = 1024
