@@ -45,6 +45,7 @@ from engine.polygon_overlay.compiled.workspace import release
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
 from engine.polygon_overlay.union_all import filled, union_all
+from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of solids)
 from engine.scenes.ends import ScenePieces
 from engine.scenes.locate import SceneLocations
 from engine.scenes.locate_scene import locate_scene
@@ -62,6 +63,7 @@ from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
 from engine.solids.ragged import polygons
+from engine.solids.registry import SOLIDS
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
@@ -70,6 +72,7 @@ from engine.version import __version__
 from engine.warmup import warm
 
 __all__ = [
+    "SOLIDS",
     "Aabb",
     "Accuracy",
     "Bounds",

@@ -21,7 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -208,7 +208,7 @@ def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], p
         node |= {"solids": [_add_node(body, nodes, arrays, places) for body in solid.solids], "poses": "poses"}
         arrays["poses"] = pose_rows(solid)
     else:
-        for field in codec_of(solid.type).fields:
+        for field in stored(solid.type)[1]:
             node[field] = f"array_{len(arrays)}"
             arrays[node[field]] = np.asarray(getattr(solid, field))
     nodes.append(node)
@@ -241,59 +241,21 @@ def from_octets(octets: bytes) -> Solid | Scene:
                 poses = [_posed(row, solids[0].dimension) for row in arrays[node["poses"]]]
                 return Scene(solids, poses)
             else:
-                codec = codec_of(node["type"])
-                made.append(codec.make(*(arrays[node[field]] for field in codec.fields)))
+                kind, names = stored(node["type"])
+                values = [arrays[node[name]] for name in names]
+                made.append(kind.restored(*(value if value.ndim else value.item() for value in values)))
     found: Solid = made[-1]
     return found
 
 
-def _split(items: Any, offsets: Any) -> Any:
-    return np.split(items, offsets[1:-1])
+def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
+    """Return the class of a type and the attributes that a file holds of it; `unsupported_solid` where there are none.
 
-
-def _faces(offsets: Any, indices: Any) -> Any:
-    """Return faces as the constructors take them: an array where all are triangles."""
-    if (np.diff(offsets) == 3).all():
-        return indices.reshape(-1, 3)
-    return [face.tolist() for face in _split(indices, offsets)]
-
-
-class Codec(NamedTuple):
-    """The fields that make up a solid of one type, arrays or numbers, and what makes the solid of them."""
-
-    fields: tuple[str, ...]
-    make: Callable[..., Solid]
-
-
-CODECS: Final[dict[str, Codec]] = {
-    "half_space": Codec(("normal", "offset"), lambda normal, offset: engine.HalfSpace(normal, float(offset))),
-    "sphere": Codec(("center", "radius"), lambda center, radius: engine.Sphere(center, float(radius))),
-    "aabb": Codec(("min", "max"), engine.Aabb),
-    "convex": Codec(("planes",), engine.Convex),
-    "triangle": Codec(("vertices",), engine.Triangle),
-    "polygon": Codec(("vertices", "ring_offsets"), lambda vertices, offsets: engine.Polygon(_split(vertices, offsets))),
-    "polyhedron": Codec(
-        ("vertices", "face_offsets", "face_indices"),
-        lambda vertices, offsets, indices: engine.Polyhedron(vertices, _faces(offsets, indices)),
-    ),
-    "surface": Codec(
-        ("vertices", "face_offsets", "face_indices"),
-        lambda vertices, offsets, indices: engine.Surface(vertices, _faces(offsets, indices)),
-    ),
-    "implicit": Codec(
-        ("powers", "coefficients"),
-        lambda powers, coefficients: engine.Implicit(
-            [{"powers": p, "coefficient": c} for p, c in zip(powers.tolist(), coefficients.tolist())]
-        ),
-    ),
-}
-"""By type; csg and scenes are made of solids."""
-
-
-def codec_of(kind: str) -> Codec:
-    """Return the codec of a type; `unsupported_solid` where there is none."""
-    if kind in CODECS:
-        return CODECS[kind]
+    Csg and scenes are made of solids.
+    """
+    row = engine.SOLIDS.get(kind)
+    if row is not None and row.stored:
+        return row.solid, row.stored
     raise ServiceError(
         "unsupported_solid",
         f"this version of the service stores no solid of type {kind[:64]!r}; send it with each request, or let every "

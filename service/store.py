@@ -21,7 +21,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine import Scene, Solid
-from service.disk import Folder, codec_of, pose_rows
+from service.disk import Folder, pose_rows, stored
 from service.errors import ServiceError
 from service.metrics import Metrics
 
@@ -58,7 +58,7 @@ def _parts(solid: Any, known: dict[int, str]) -> Iterator[Any]:
         yield solid.operation.encode()
         yield from (solid_id(operand, known).encode() for operand in solid.operands)  # depth: capped by the engine
         return
-    for name in codec_of(solid.type).fields:
+    for name in stored(solid.type)[1]:
         array = np.asarray(getattr(solid, name))
         little = np.ascontiguousarray(array, "<f8" if array.dtype.kind == "f" else "<i8")
         yield f"{name}:{little.dtype.str}:{array.shape}".encode()

@@ -1,4 +1,4 @@
-"""One explicit table from solid type to method: how the points of a batch are located in each solid.
+"""How the points of a batch are located in each type of solid: what the registry's rows name.
 
 A `Locator` has a compiled half, which fills in an int8 location for each point of a chunk and leaves UNDECIDED what is
 out of its range, and a rational half, which settles those. Structures are prepared once a solid.
@@ -24,7 +24,7 @@ from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
 from engine.containment.prepared import EXACT, prism_rows, tree_of
-from engine.containment.rational_locate import combine, over_tree, rational_location, unsupported
+from engine.containment.rational_locate import combine, is_located, over_tree, rational_location, unsupported
 from engine.containment.rings import edges_of, ring_cells_of, rings_of
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.solids.aabb import Aabb
@@ -36,6 +36,7 @@ from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.registry import row_of
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
@@ -109,10 +110,13 @@ def locator_of(solid: Solid) -> Locator:
 
     Raises: UnsupportedSolidError.
     """
-    maker = _MAKERS.get(type(solid))
-    if maker is None:
+    row = row_of(solid)
+    if row.locator is not None:
+        made: Locator = row.locator(solid)
+        return made
+    if not is_located(row):
         raise unsupported(solid)
-    return maker(solid)
+    return Locator("exact", rational_half(solid))
 
 
 def rational_half(solid: Solid, pose: Pose | None = None) -> Fill:
@@ -143,13 +147,25 @@ def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator
     )
 
 
-def _in_rows(solid: HalfSpace | Convex) -> Locator:
+def rows_locator(solid: HalfSpace | Convex) -> Locator:
+    """Return the locator by the planes that bound a solid."""
     rows = rows_of(solid)
     kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
     return by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
 
 
-def _in_triangle(solid: Triangle) -> Locator:
+def ball_locator(solid: Sphere) -> Locator:
+    """Return the locator by the distance from the centre."""
+    return by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius)
+
+
+def box_locator(solid: Aabb) -> Locator:
+    """Return the locator by comparisons."""
+    return by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max)
+
+
+def triangle_locator(solid: Triangle) -> Locator:
+    """Return the locator in a triangle of the plane, or in the prism over one of space."""
     if solid.dimension == 2:
         return _by_choice(
             "same_side", lambda *_: by_kernel("same_side", locate_in_rings, solid, EXACT, edges_of(solid))
@@ -157,7 +173,8 @@ def _in_triangle(solid: Triangle) -> Locator:
     return _by_choice("prism", lambda _, budget: by_kernel("prism", locate_in_half_spaces, solid, *prism_rows(solid)))
 
 
-def _in_polygon(solid: Polygon) -> Locator:
+def polygon_locator(solid: Polygon) -> Locator:
+    """Return the locator by rays through the rings."""
     return _by_choice(
         "ring_crossing", lambda n_points, budget: polygon_by(solid, choose_for_rings(solid, n_points), budget)
     )
@@ -171,7 +188,8 @@ def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
     return by_kernel("ring_crossing", locate_in_rings, solid, EXACT, rings)
 
 
-def _in_polyhedron(solid: Polyhedron) -> Locator:
+def polyhedron_locator(solid: Polyhedron) -> Locator:
+    """Return the locator by rays through the faces."""
     return _by_choice(
         "ray_parity", lambda n_points, budget: polyhedron_by(solid, choose_for_mesh(solid, n_points, budget), budget)
     )
@@ -193,7 +211,8 @@ def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
     )
 
 
-def _in_implicit(solid: Implicit) -> Locator:
+def implicit_locator(solid: Implicit) -> Locator:
+    """Return the locator by the sign of a polynomial, or of a caller's function."""
     if solid.function is not None:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
@@ -221,7 +240,7 @@ def _call(solid: Implicit) -> Fill:
     return fill
 
 
-def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator:
+def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator] = locator_of) -> Locator:
     """Return the locator of a tree: every distinct node is located once a chunk, its operands first."""
     leaves: dict[int, Locator] = {}
     over_tree(solid, lambda leaf: leaves.setdefault(id(leaf), leaf_locator(leaf)), lambda *_: None)
@@ -240,16 +259,3 @@ def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator]) -> Locator
 
     is_exact = all(leaf.decisions == "exact" for leaf in leaves.values())
     return Locator("csg_tree", fill, "exact" if is_exact else "float64")
-
-
-_MAKERS: dict[type[Solid], Callable[..., Locator]] = {
-    HalfSpace: _in_rows,
-    Convex: _in_rows,
-    Sphere: lambda solid: by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius),
-    Aabb: lambda solid: by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max),
-    Triangle: _in_triangle,
-    Polygon: _in_polygon,
-    Polyhedron: _in_polyhedron,
-    Implicit: _in_implicit,
-    Csg: lambda solid: csg_locator(solid, locator_of),
-}

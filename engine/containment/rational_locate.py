@@ -42,6 +42,7 @@ from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
 from engine.solids.ragged import next_in_rings
+from engine.solids.registry import Row, kind_of, names, row_of
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 
@@ -144,7 +145,8 @@ def _unsure_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntAr
     return solid.triangles[held], False
 
 
-def _in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
+def in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
+    """Return the location of a point in a polyhedron."""
     triangles, odd = _unsure_triangles(point, solid)
     for turn, triangle in enumerate(triangles):
         if turn % _CHECK_EVERY == 0:
@@ -163,7 +165,8 @@ def next_in_ring(solid: Polygon | Triangle) -> IntArray:
     return solid.prepared("next_in_ring", lambda: next_in_rings(solid.ring_offsets))
 
 
-def _in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:
+def in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:
+    """Return the location of a point in a polygon, or a triangle of the plane."""
     starts, ends = solid.vertices, solid.vertices[next_in_ring(solid)]
     (x_low, _), (y_low, y_high) = _around(point[0]), _around(point[1])
     held = (np.minimum(starts[:, 1], ends[:, 1]) <= y_high) & (np.maximum(starts[:, 1], ends[:, 1]) >= y_low)
@@ -203,13 +206,34 @@ def prism_walls(solid: Triangle) -> list[list[int]]:
     return solid.prepared("prism_walls", build)
 
 
-def _in_sphere(center: Sequence[Number], radius: float, point: Sequence[Number]) -> int:
-    *flat, r = scaled_integers((*center, *point, radius))
+def in_triangle(point: Sequence[Number], solid: Triangle, check: Check) -> int:
+    """Return the location of a point in a triangle of the plane, or in the prism over one of space."""
+    if solid.dimension == 2:
+        return in_polygon(point, solid, check)
+    return min(side_rational(wall, point) for wall in prism_walls(solid))
+
+
+def in_rows(point: Sequence[Number], solid: HalfSpace | Aabb | Convex, _: Check) -> int:
+    """Return the location of a point in what planes bound."""
+    return min(side_rational(row, point) for row in rows_of(solid).tolist())
+
+
+def in_sphere(point: Sequence[Number], solid: Sphere, pose: Pose | None, _: Check) -> int:
+    """Return the location of a point in a ball, which keeps its radius about the exact image of its centre."""
+    center: Sequence[Number] = solid.center.tolist()
+    center = center if pose is None else to_world_frame(center, pose)
+    *flat, r = scaled_integers((*center, *point, solid.radius))
     dimension = len(point)
     return sign_of(r * r - sum((flat[k] - flat[k + dimension]) ** 2 for k in range(dimension)))
 
 
-def _in_implicit(solid: Implicit, point: Sequence[Number]) -> int:
+def in_csg(point: Sequence[Number], solid: Csg, pose: Pose | None, check: Check) -> int:
+    """Return the location of a point in a Boolean tree."""
+    return int(over_tree(solid, lambda leaf: rational_location(point, leaf, pose, check), combine))
+
+
+def in_implicit(point: Sequence[Number], solid: Implicit, _: Check) -> int:
+    """Return the location of a point where a polynomial, or a caller's function, is not negative."""
     if solid.function is not None:
         value = np.asarray(solid.function(np.array([[float(x) for x in point]])), dtype=np.float64).ravel()[0]
         return sign_of(float(value))
@@ -269,26 +293,12 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
     0
     """
     check()
-    match solid:
-        case Csg():
-            return int(over_tree(solid, lambda leaf: rational_location(point, leaf, pose, check), combine))
-        case Sphere():
-            center: Sequence[Number] = solid.center.tolist()
-            return _in_sphere(center if pose is None else to_world_frame(center, pose), solid.radius, point)
-    if pose is not None:
-        point = to_body_frame(point, pose)
-    match solid:
-        case Polyhedron():
-            return _in_polyhedron(point, solid, check)
-        case Triangle() if solid.dimension == 3:
-            return min(side_rational(wall, point) for wall in prism_walls(solid))
-        case Polygon() | Triangle():
-            return _in_polygon(point, solid, check)
-        case HalfSpace() | Aabb() | Convex():
-            return min(side_rational(row, point) for row in rows_of(solid).tolist())
-        case Implicit():
-            return _in_implicit(solid, point)
-    raise unsupported(solid)
+    row = row_of(solid)
+    if row.exact_posed is not None:
+        return row.exact_posed(point, solid, pose, check)
+    if row.exact is None:
+        raise unsupported(solid)
+    return row.exact(point if pose is None else to_body_frame(point, pose), solid, check)
 
 
 def combine(operation: str, located: Sequence[Any]) -> Any:
@@ -319,10 +329,13 @@ def over_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, 
 
 def unsupported(solid: object) -> UnsupportedSolidError:
     """Return the error for a solid that has no inside, or for what is no solid at all."""
-    kind = solid.type if isinstance(solid, Solid) else f"{type(solid).__name__}, which is no solid"
     return UnsupportedSolidError(
-        f"nothing is inside a {kind}; a point can be located in a half_space, sphere, aabb, convex, polyhedron, "
-        "triangle, polygon, implicit or csg. A closed triangle mesh is a polyhedron; a planar 3D polygon can be asked "
-        "as triangles",
+        f"nothing is inside a {kind_of(solid)}; a point can be located in a {names(is_located)}. A closed triangle "
+        "mesh is a polyhedron; a planar 3D polygon can be asked as triangles",
         ("solid",),
     )
+
+
+def is_located(row: Row) -> bool:
+    """Tell whether points are located in solids of a type."""
+    return row.exact is not None or row.exact_posed is not None

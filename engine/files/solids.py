@@ -5,29 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from engine.errors import InvalidInputError
 from engine.files.meshes import FORMATS, read_mesh
 from engine.layers.geojson import polygon_of
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
-from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
-from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
-
-CLASSES: Final[dict[str, Callable[..., Solid]]] = {
-    "half_space": HalfSpace, "sphere": Sphere, "aabb": Aabb, "convex": Convex, "polyhedron": Polyhedron,
-    "surface": Surface, "triangle": Triangle, "polygon": Polygon, "implicit": Implicit, "csg": Csg,
-}  # fmt: skip
+from engine.solids.registry import SOLIDS
 
 Note = Callable[[str], object]
 
@@ -94,15 +82,15 @@ def from_json(value: Any) -> list[Solid]:
             return [Polygon(value["coordinates"])]
         if kind == "MultiPolygon":
             return [polygon_of(value)]
-        if kind in CLASSES:
+        if isinstance(kind, str) and kind in SOLIDS:
             fields = {name: field for name, field in value.items() if name != "type"}
             if kind == "csg":
                 fields["operands"] = [solid for operand in fields["operands"] for solid in from_json(operand)]
-            return [CLASSES[kind](**fields)]
+            return [SOLIDS[kind].solid(**fields)]
     except (KeyError, TypeError) as error:
         raise InvalidInputError(f"a {kind} lacks a field or has one too many: {error}", ("type",)) from None
     raise InvalidInputError(
-        f"type must be Polygon, MultiPolygon, Feature, FeatureCollection or one of {', '.join(CLASSES)}; got {kind!r}",
+        f"type must be Polygon, MultiPolygon, Feature, FeatureCollection or one of {', '.join(SOLIDS)}; got {kind!r}",
         ("type",),
     )
 

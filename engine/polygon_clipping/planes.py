@@ -33,6 +33,7 @@ from engine.solids.convex import Convex, rows_of
 from engine.solids.convexity import convexity
 from engine.solids.half_space import HalfSpace
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.registry import refused, row_of
 from engine.types import UNDECIDED, Location
 
 Check = Callable[[], object]
@@ -62,26 +63,30 @@ def planes_of(region: Solid, check: Check) -> list[Row]:
     if kept is not None:
         return cast(list[Row], kept)
 
-    if not isinstance(region, HalfSpace | Aabb | Convex | Polyhedron):
-        raise UnsupportedSolidError(
-            f"clip_polygons does not take a {getattr(region, 'type', type(region).__name__)}; give a half_space, "
-            "aabb, convex or convex polyhedron, or use overlay for polygons in the plane",
-            ("region",),
-        )
+    planes = row_of(region).planes
+    if planes is None:
+        more = " that is convex, or use overlay for polygons in the plane"
+        raise refused(region, "clip_polygons does not take", lambda row: row.planes, more, ("region",))
 
     def build() -> list[Row]:
-        if isinstance(region, Polyhedron):
-            rows: Iterable[Row] = starmap(plane_through, region.vertices[_outward_triangles(region, check)].tolist())
-        else:
-            rows = map(integer_row, rows_of(region).tolist())
         found: dict[Row, None] = {}
-        for turn, row in enumerate(rows):
+        for turn, row in enumerate(planes(region, check)):
             if turn % _CHECK_EVERY == 0:
                 check()
             found[reduced(row)] = None
         return list(found)
 
     return region.prepared("clipping_planes", build, check)
+
+
+def planes_of_rows(region: HalfSpace | Aabb | Convex, _: Check) -> Iterable[Row]:
+    """Return the planes that bound a region as integer rows."""
+    return map(integer_row, rows_of(region).tolist())
+
+
+def planes_of_faces(region: Polyhedron, check: Check) -> Iterable[Row]:
+    """Return the planes of the faces of a polyhedron. Raises: UnsupportedSolidError where it is not convex."""
+    return starmap(plane_through, region.vertices[_outward_triangles(region, check)].tolist())
 
 
 class KernelScene(NamedTuple):

@@ -22,6 +22,7 @@ from engine.collision.scenes.batches import SceneBatches
 from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.posed.locators import posed_locator
+from engine.containment.rational_locate import is_located
 from engine.direct import entry_of
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
@@ -31,20 +32,12 @@ from engine.scenes.near_boxes import BodyTree, Where, list_near, put_keys
 from engine.scenes.scratch import scratch_for
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
-from engine.solids.aabb import Aabb
 from engine.solids.base import Preparing, Solid
-from engine.solids.convex import Convex
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
-from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose, motions_of
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
+from engine.solids.registry import row_of
 
-LOCATED: Final = (Aabb, Convex, HalfSpace, Implicit, Polygon, Polyhedron, Sphere, Triangle)
-"""Solids in which points are located whatever the body."""
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""
 
@@ -80,9 +73,9 @@ class Bodies(Preparing):
         return body_tree(*boxes, _LISTED)
 
     def _place_odd(self, names: IntArray, poses: Sequence[Pose | None], low: Any, high: Any, budget: Budget) -> None:
-        """Set the boxes of each csg and prism among some, whose own are no boxes of theirs."""
-        arrays, kinds = self.arrays(budget), (Csg, Triangle) if self.solids[0].dimension == 3 else Csg
-        odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, kinds)])
+        """Set the boxes of each csg among some: those of its operands under the pose, put together."""
+        arrays = self.arrays(budget)
+        odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, Csg)])
         for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
             budget.check()
             low[place], high[place] = body_box(self.solids[names[place]], poses[place], budget.check)
@@ -132,7 +125,7 @@ class Bodies(Preparing):
 
         def check() -> bool:
             for body, solid in enumerate(self.solids):
-                if type(solid) not in LOCATED:
+                if type(solid) is Csg or not is_located(row_of(solid)):  # a csg depends on its operands
                     budget.check()
                     self.locator(body)
             return True

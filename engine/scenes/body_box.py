@@ -9,11 +9,10 @@ from engine.containment.posed.frames import frames_of
 from engine.containment.rational_locate import Check, over_tree
 from engine.scenes.located import moved_boxes
 from engine.solids.base import Solid
-from engine.solids.bounds import own_box
 from engine.solids.csg import Csg
 from engine.solids.pose import Pose
+from engine.solids.registry import own_box
 from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
 
 Box = tuple[FloatArray, FloatArray]
 
@@ -34,8 +33,8 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> Box:
         found: Box = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
         return found
     low, high, _ = own_box(solid, check)
-    if np.isinf(low).any() or (isinstance(solid, Triangle) and solid.dimension == 3):  # a prism
-        return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf)
+    if np.isinf(low).any():
+        return low, high
     frames = frames_of([pose], len(low))
     lows, highs = moved_boxes(low[None], high[None], frames, frames.rows)
     if isinstance(solid, Sphere):  # its box was that of its centre

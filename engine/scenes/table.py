@@ -18,11 +18,11 @@ from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.bounds import own_box
 from engine.solids.convex import Convex, rows_in_space, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.registry import own_box
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 

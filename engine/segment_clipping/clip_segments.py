@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget, Cancel
-from engine.errors import UnsupportedSolidError
 from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.predicates.scaling import balanced_rows
 from engine.segment_clipping.ball_cut import fill_on_sphere
@@ -25,10 +24,11 @@ from engine.segment_clipping.planes_cut import fill_on_boxes, fill_on_rows
 from engine.solids.aabb import Aabb, rows_between
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_of
 from engine.solids.half_space import HalfSpace
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.registry import refused, row_of
 from engine.solids.sphere import Sphere
 from engine.types import Accuracy
 
@@ -153,26 +153,20 @@ def _as_result(found: Pieces) -> SegmentPieces:
 
 
 def method_for(region: Solid) -> Method | Polygon | Polyhedron:
-    """Return what clips on this solid, kept with it, or the boundary that it is: the one table from type to method."""
-    match region:
-        case HalfSpace():
-            return region.prepared("segment_method", lambda: _on_rows(region.row[None, :]))
-        case Convex():
-            return region.prepared("segment_method", lambda: _on_rows(region.planes))
-        case Aabb():
-            return region.prepared("segment_method", lambda: _on_box(region.min, region.max))
-        case Sphere():
-            return region.prepared("segment_method", lambda: _on_ball(region.center, float(region.radius)))
-        case Polygon() | Polyhedron():
-            return region
-    kind = getattr(region, "type", type(region).__name__)
-    raise UnsupportedSolidError(
-        f"clip_segments does not take a {kind}; give a half_space, aabb, convex, sphere, polygon or polyhedron",
-        ("region",),
-    )
+    """Return what clips on this solid, kept with it, or the boundary that it is."""
+    if isinstance(region, Polygon | Polyhedron):
+        return region
+    make = row_of(region).clip
+    if make is None:
+        raise refused(region, "clip_segments does not take", lambda row: row.clip, where=("region",))
+    method: Method = region.prepared("segment_method", lambda: make(region))
+    return method
 
 
-def _on_box(low: FloatArray, high: FloatArray) -> Method:
+def on_box(region: Aabb) -> Method:
+    """Return how segments are clipped on a box."""
+    low, high = region.min, region.max
+
     def with_columns(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         return low, high, as_columns(rows_between(low, high))
 
@@ -183,7 +177,9 @@ def _on_box(low: FloatArray, high: FloatArray) -> Method:
     return Method("cohen_sutherland", decide_on_boxes, fill_on_boxes, with_columns(low, high), scale)
 
 
-def _on_rows(rows: FloatArray) -> Method:
+def on_planes(region: HalfSpace | Convex) -> Method:
+    """Return how segments are clipped on what planes bound."""
+    rows = rows_of(region)
     plain = balanced_rows(rows, 0)
 
     def scale(segments: FloatArray) -> Scaled | None:
@@ -194,7 +190,10 @@ def _on_rows(rows: FloatArray) -> Method:
     return Method("cyrus_beck", decide_on_rows, fill_on_rows, (as_columns(rows if plain is None else plain),), scale)
 
 
-def _on_ball(center: FloatArray, radius: float) -> Method:
+def on_ball(region: Sphere) -> Method:
+    """Return how segments are clipped on a ball."""
+    center, radius = region.center, float(region.radius)
+
     def scale(segments: FloatArray) -> Scaled | None:
         found = scaled(segments, center, np.array([radius]))
         return found and replace(found, region=(found.region[0], float(found.region[1][0])))

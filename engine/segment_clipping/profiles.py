@@ -33,13 +33,11 @@ from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare, pa
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.convex import Convex, rows_of
 from engine.solids.csg import Csg
 from engine.solids.half_space import HalfSpace
-from engine.solids.implicit import Implicit
-from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.registry import refused, row_of
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
@@ -47,7 +45,6 @@ from engine.solids.triangle import Triangle
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 _BYTES: Final = 1000
 """Of a piece, as Python holds it."""
-TAKEN: Final = "half_space, aabb, convex, sphere, triangle, polygon, polyhedron, surface and csg of these"
 Point = Sequence[Number]
 
 
@@ -101,6 +98,20 @@ def exact_pieces(
     return found
 
 
+class Line(NamedTuple):
+    """A segment, as placed solids see it."""
+
+    p: Point
+    q: Point
+    start: Point
+    """p in the solid's own frame."""
+    end: Point
+    pose: Pose | None
+    budget: Budget
+    locations: Any
+    """Of p and q in the solid, None where they are not known."""
+
+
 class ExactPiece(NamedTuple):
     """A piece of a segment: its parameters, and the faces crossed at either end."""
 
@@ -132,24 +143,15 @@ def profile_of(
 ) -> list[Node]:
     """Return the nodes of the segment p q, p and q different, within a placed solid, from t = 0 to t = 1."""
     start, end = (p, q) if pose is None else (to_body_frame(p, pose), to_body_frame(q, pose))
+    line = Line(p, q, start, end, pose, budget, locations)
 
     def of_leaf(leaf: Solid) -> list[Node]:
         budget.check()
-        match leaf:
-            case Sphere():
-                center = leaf.center.tolist()
-                return _on_sphere(p, q, center if pose is None else to_world_frame(center, pose), leaf.radius)
-            case HalfSpace():
-                return _on_rows(start, end, [leaf.row.tolist()])
-            case Aabb():
-                return _on_rows(start, end, leaf.rows.tolist())
-            case Convex():
-                return _on_rows(start, end, leaf.planes.tolist())
-            case Triangle() if leaf.dimension == 3:
-                return _on_rows(start, end, prism_walls(leaf))
-            case Polygon() | Polyhedron() | Triangle() | Surface():
-                return _on_boundary(start, end, leaf, pose, budget, locations)
-        raise unsupported(leaf)
+        profile = row_of(leaf).profile
+        if profile is None:
+            raise unsupported(leaf)
+        nodes: list[Node] = profile(line, leaf)
+        return nodes
 
     if not isinstance(solid, Csg):
         return of_leaf(solid)
@@ -170,7 +172,10 @@ def profile_of(
 
 def unsupported(solid: Solid) -> UnsupportedSolidError:
     """Return the error for a solid that no segment is cut on."""
-    return UnsupportedSolidError(f"a segment is not cut on an {solid.type}; bodies may be {TAKEN}")
+    found: UnsupportedSolidError = refused(
+        solid, "no segment is cut on", lambda row: row.profile, ", or a csg of these"
+    )
+    return found
 
 
 def check_cut(solids: Sequence[Solid]) -> bool:
@@ -179,11 +184,10 @@ def check_cut(solids: Sequence[Solid]) -> bool:
         waiting = [solid]
         while waiting:  # bound: a tree has so many leaves at most
             node = waiting.pop()
-            if isinstance(node, Implicit):
-                error: UnsupportedSolidError = unsupported(node)
-                raise UnsupportedSolidError(f"solids[{body}]: {error.message}", ("solids", body))
             if isinstance(node, Csg):
                 waiting += node.operands
+            elif row_of(node).profile is None:
+                raise UnsupportedSolidError(f"solids[{body}]: {unsupported(node).message}", ("solids", body))
     return True
 
 
@@ -200,21 +204,8 @@ def _face_offsets(solid: Csg) -> dict[int, int]:
         if isinstance(node, Csg):
             waiting += node.operands[::-1]
         else:
-            total += _n_faces(node)
+            total += row_of(node).n_faces(node)
     return offsets
-
-
-def _n_faces(leaf: Any) -> int:
-    match leaf:
-        case Aabb():
-            return 2 * leaf.dimension
-        case Convex():
-            return len(leaf.planes)
-        case Polygon() | Triangle():
-            return len(leaf.vertices)
-        case Polyhedron():
-            return leaf.n_faces
-    return 1
 
 
 def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
@@ -251,9 +242,19 @@ def _interval(a: Node, b: Node, between: int) -> list[Node]:
 _NOWHERE: Final = [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE), Node(ONE, OUTSIDE, -1, -1, OUTSIDE)]
 
 
-def _on_rows(p: Point, q: Point, rows: Sequence[Sequence[float]]) -> list[Node]:
+def on_planes(line: Line, solid: HalfSpace | Aabb | Convex) -> list[Node]:
+    """Return the profile within what planes bound."""
+    return _on_rows(line, rows_of(solid).tolist())
+
+
+def on_triangle(line: Line, solid: Triangle) -> list[Node]:
+    """Return the profile within a triangle of the plane, or the prism over one of space."""
+    return on_boundary(line, solid) if solid.dimension == 2 else _on_rows(line, prism_walls(solid))
+
+
+def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
     """Return the profile within the points for which every row (a, b, ..., d) has dot(row, (x, 1)) >= 0."""
-    n = len(p)
+    p, q, n = line.start, line.end, len(line.p)
     numbers, scale = common_integers([*p, *q])
     start, end = numbers[:n], numbers[n:]
     a = Node(ZERO, INSIDE, -1, -1, OUTSIDE)
@@ -282,10 +283,11 @@ def _on_rows(p: Point, q: Point, rows: Sequence[Sequence[float]]) -> list[Node]:
     return _NOWHERE if compare(a.t, b.t) > 0 else _interval(a, b, between)
 
 
-def _on_sphere(p: Point, q: Point, center: Point, radius: float) -> list[Node]:
+def on_sphere(line: Line, solid: Sphere) -> list[Node]:
     """Return the profile within a ball: where a t^2 + 2 b t + c <= 0; c and c_end are its values at t = 0 and t = 1."""
-    n = len(p)
-    numbers, _ = common_integers([*p, *q, *center, radius])
+    center: Point = solid.center.tolist()
+    center, n = center if line.pose is None else to_world_frame(center, line.pose), len(center)
+    numbers, _ = common_integers([*line.p, *line.q, *center, solid.radius])
     start, end, middle, r = numbers[:n], numbers[n : 2 * n], numbers[2 * n : 3 * n], numbers[-1]
     d, f = [y - x for x, y in zip(start, end)], [x - c for x, c in zip(start, middle)]
     a, b = sum(x * x for x in d), sum(x * y for x, y in zip(d, f))
@@ -303,10 +305,9 @@ def _on_sphere(p: Point, q: Point, center: Point, radius: float) -> list[Node]:
     return _interval(first, last, INSIDE)
 
 
-def _on_boundary(
-    p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget, locations: Any = None
-) -> list[Node]:
+def on_boundary(line: Line, solid: Any) -> list[Node]:
     """Return the profile within a polygon, triangle of the plane or polyhedron, or on a surface."""
+    _, _, p, q, pose, budget, locations = line
     contacts = list(_contacts(p, q, solid, pose, budget))
     if isinstance(solid, Surface):
         contacts = [contact._replace(turns=False) for contact in contacts]

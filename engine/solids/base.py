@@ -89,7 +89,7 @@ class Solid(Preparing, Immutable):
 
     dimension: int
     _pickled: ClassVar[tuple[str, ...]] = ()
-    """The fields that a pickle holds: those that the constructor takes, unless `_restored` says otherwise."""
+    """The fields that a pickle holds: those that the constructor takes, unless `restored` says otherwise."""
 
     def _set(self, **values: object) -> None:
         """Fill the fields, once; called at the end of each constructor, when every check has passed."""
@@ -114,10 +114,10 @@ class Solid(Preparing, Immutable):
         return [name for name in names if name not in _RUNTIME]
 
     def __reduce__(self) -> tuple[Callable[..., Solid], tuple[Any, ...]]:
-        return type(self)._restored, tuple(getattr(self, name) for name in self._pickled)
+        return type(self).restored, tuple(getattr(self, name) for name in self._pickled)
 
     @classmethod
-    def _restored(cls, *values: Any) -> Solid:
+    def restored(cls, *values: Any) -> Solid:
         """Return the solid of a pickle, checked as any other: kernels read what offsets and indices say."""
         return cls(*values)
 

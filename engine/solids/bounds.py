@@ -1,10 +1,10 @@
-"""Public: bounds(solid), the axis-aligned box and the minimal sphere; own_box, what posed boxes are made from."""
+"""Public: bounds(solid), the axis-aligned box and the minimal sphere; the boxes that posed ones are made from."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Unpack, overload
+from typing import Literal, TypeAlias, Unpack, overload
 
 import numpy as np
 
@@ -21,11 +21,12 @@ from engine.solids.base import Solid
 from engine.solids.convex import Convex
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
+from engine.solids.registry import Box, refused, row_of, unbounded
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import Accuracy
 
-_TAKEN = "sphere, aabb, triangle, polygon, polyhedron, surface, and a bounded convex"
+Check: TypeAlias = Callable[[], object] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,9 @@ class Bounds:
 
     aabb: Aabb  # the smallest box, each coordinate the nearest double
     sphere: Sphere  # the smallest sphere: centre the nearest double, radius the smallest double that holds the solid
+
+
+Reported: TypeAlias = tuple[Bounds, Accuracy]
 
 
 @overload
@@ -71,9 +75,7 @@ def bounds(
     (Aabb(min=[0.0, 0.0], max=[4.0, 3.0]), Sphere(center=[2.0, 1.5], radius=2.5))
     """
     if not isinstance(solid, Solid):
-        raise UnsupportedSolidError(
-            f"bounds takes a solid, got {type(solid).__name__}; make one of {_TAKEN}", ("solid",)
-        )
+        raise refused(solid, "bounds does not take", lambda row: row.bounds, where=("solid",))
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         budget.check()
@@ -83,26 +85,39 @@ def bounds(
     return (result, accuracy) if report else result
 
 
-def _bounds_of(solid: Solid, budget: Budget) -> tuple[Bounds, Accuracy]:
-    """Choose the method by the type of solid."""
-    if isinstance(solid, Sphere):
-        return Bounds(_box_of_sphere(solid), solid), _accuracy("sphere", 1)
-    if isinstance(solid, Convex):
-        return _bounds_of_convex(solid, budget)
-    if isinstance(solid, Aabb):
-        points = corners_of_box(solid.min, solid.max)
-    elif isinstance(solid, Mesh):
-        points = vertices_in_use(solid)
-    elif isinstance(solid, (Triangle, Polygon)):
-        points = solid.vertices
-    else:
-        raise UnsupportedSolidError(
-            f"a {solid.type} has no bounds here: it may reach to infinity or be empty; bounds takes {_TAKEN}",
-            ("solid",),
-        )
-    box = solid if isinstance(solid, Aabb) else Aabb(*box_of_points(points))
+def _bounds_of(solid: Solid, budget: Budget) -> Reported:
+    row = row_of(solid)
+    if row.bounds is None:
+        more = "; others may reach to infinity or be empty"
+        raise refused(solid, "bounds does not take", lambda row: row.bounds, more, ("solid",))
+    result: Reported = row.bounds(solid, budget)
+    return result
+
+
+def bounds_of_sphere(solid: Sphere, _: Budget) -> Reported:
+    """Return the bounds of a ball."""
+    return Bounds(_box_of_sphere(solid), solid), _accuracy("sphere", 1)
+
+
+def bounds_of_box(solid: Aabb, budget: Budget) -> Reported:
+    """Return the bounds of a box."""
+    return _around(corners_of_box(solid.min, solid.max), budget, solid)
+
+
+def bounds_of_mesh(solid: Mesh, budget: Budget) -> Reported:
+    """Return the bounds of faces."""
+    return _around(vertices_in_use(solid), budget)
+
+
+def bounds_of_vertices(solid: Polygon | Triangle, budget: Budget) -> Reported:
+    """Return the bounds of a polygon or triangle."""
+    return _around(solid.vertices, budget)
+
+
+def _around(points: FloatArray, budget: Budget, box: Aabb | None = None) -> Reported:
     ball = minimal_sphere(points, budget)
-    return Bounds(box, Sphere(ball.center, ball.radius)), _accuracy("farthest_point_walk", len(points), ball)
+    result = Bounds(box or Aabb(*box_of_points(points)), Sphere(ball.center, ball.radius))
+    return result, _accuracy("farthest_point_walk", len(points), ball)
 
 
 def vertices_in_use(mesh: Mesh) -> FloatArray:
@@ -112,13 +127,14 @@ def vertices_in_use(mesh: Mesh) -> FloatArray:
     return mesh.vertices if is_used.all() else mesh.vertices[is_used]
 
 
-def _bounds_of_convex(solid: Convex, budget: Budget) -> tuple[Bounds, Accuracy]:
+def bounds_of_convex(solid: Convex, budget: Budget) -> Reported:
+    """Return the bounds of what planes bound, by its exact corners."""
     corners = corners_of_half_spaces(solid.planes.tolist(), budget)
     if corners.is_empty:
         raise EmptyGeometryError("no point satisfies all rows of this convex, so it has no bounds", ("solid", "planes"))
     if not corners.is_bounded:
         raise UnsupportedSolidError(
-            f"this convex reaches to infinity; add the planes that close it; bounds takes {_TAKEN}", ("solid", "planes")
+            "this convex reaches to infinity, so it has no bounds; add the planes that close it", ("solid", "planes")
         )
     axes = range(solid.dimension)
     low = [nearest_float(min(point[axis] for point in corners.points)) for axis in axes]
@@ -142,16 +158,14 @@ def _accuracy(method: str, n_items: int, ball: MinimalSphere | None = None) -> A
     return Accuracy("exact", 0.5, n_items, n_beyond, n_rational, method)
 
 
-def own_box(solid: Solid, check: Callable[[], object] | None = None) -> tuple[FloatArray, FloatArray, float]:
-    """Return low and high ``(d,)``, of a sphere those of its centre, infinite where a solid may have no bounds; and how
-    far a point is at most from the middle as computed. check: as for `Solid.prepared`."""
-    if isinstance(solid, Sphere):
-        return solid.center, solid.center, 0.0
-    if isinstance(solid, Aabb):
-        return solid.min, solid.max, np.inf
-    if isinstance(solid, Mesh | Polygon | Triangle):
-        return solid.prepared("own_box", lambda: _box_of_vertices(solid), check)
-    return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf), np.inf
+def vertices_box(solid: Mesh | Polygon | Triangle, check: Check) -> Box:
+    """Return the box of vertices, for `Row.box`."""
+    return solid.prepared("own_box", lambda: _box_of_vertices(solid), check)
+
+
+def triangle_box(solid: Triangle, check: Check) -> Box:
+    """Return the box of a triangle of the plane; the prism over one of space has none."""
+    return vertices_box(solid, check) if solid.dimension == 2 else unbounded(solid)
 
 
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:

@@ -83,9 +83,9 @@ class Implicit(Solid):
         return solid
 
     @classmethod
-    def _restored(cls, *values: Any) -> Implicit:
-        powers, coefficients, function = values
-        if function is not None:
+    def restored(cls, *values: Any) -> Implicit:
+        powers, coefficients, *more = values
+        if more and (function := more[0]) is not None:
             return cls.from_callable(function, np.shape(powers)[-1])
         return cls(powers=powers, coefficients=coefficients)
 

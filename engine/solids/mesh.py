@@ -45,7 +45,7 @@ class Mesh(Solid):
     face_indices: IntArray
     """The vertex indices of all faces as given, one face after another."""
     _must_close: ClassVar[bool] = False
-    _pickled: ClassVar[tuple[str, ...]] = ("vertices", "face_indices", "_face_offsets")
+    _pickled: ClassVar[tuple[str, ...]] = ("vertices", "_face_offsets", "face_indices")
     _face_offsets: IntArray | None  # None: every face is a triangle
     _triangles: IntArray | None  # None: `face_indices`, three by three
     _triangle_faces: IntArray | None  # None: triangle i is face i
@@ -91,11 +91,12 @@ class Mesh(Solid):
         )
 
     @classmethod
-    def _restored(cls, *values: Any) -> Mesh:
-        vertices, indices, offsets = values
-        if offsets is None:
+    def restored(cls, *values: Any) -> Mesh:
+        vertices, offsets, indices = values
+        if offsets is not None:
+            (offsets,) = as_nested_offsets(len(indices), face_offsets=offsets)
+        if offsets is None or (np.diff(offsets) == 3).all():
             return cls(vertices, indices.reshape(-1, 3))
-        (offsets,) = as_nested_offsets(len(indices), face_offsets=offsets)
         return cls(vertices, [indices[start:stop].tolist() for start, stop in pairwise(offsets.tolist())])
 
     @property

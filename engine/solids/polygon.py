@@ -73,7 +73,7 @@ class Polygon(Solid):
         return polygon
 
     @classmethod
-    def _restored(cls, *values: Any) -> Polygon:
+    def restored(cls, *values: Any) -> Polygon:
         vertices = frozen(as_points(values[0], 2, ("vertices",)))
         (offsets,) = as_nested_offsets(len(vertices), ring_offsets=values[1])
         if len(short := np.flatnonzero(np.diff(offsets) < _LEAST)):

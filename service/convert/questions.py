@@ -35,7 +35,7 @@ class _Builder:
         self._n_nodes = 0
 
     def build(self, model: solids.Solid, where: Where, depth: int) -> Solid:
-        member = model.root
+        member: Any = model.root
         self._count(1, depth, where)
         if isinstance(member, solids.StoredSolid):
             try:
@@ -52,7 +52,7 @@ class _Builder:
                 for i_operand, operand in enumerate(member.operands)
             ]
             return _checked(where, lambda: engine.Csg(member.operation, operands))
-        return _checked(where, lambda: _BUILDERS[member.type](member))
+        return _checked(where, lambda: _made(member))
 
     def _count(self, n_nodes: int, depth: int, where: Where) -> None:
         """Count so many solids more of the whole tree, what stands in stored ones included."""
@@ -80,20 +80,18 @@ def _checked(where: Where, build: Callable[[], Solid]) -> Solid:
         raise error.at(*where) from None
 
 
-_BUILDERS: Final[dict[str, Callable[[Any], Solid]]] = {
-    "half_space": lambda m: engine.HalfSpace(m.normal, m.offset),
-    "sphere": lambda m: engine.Sphere(m.center, m.radius),
-    "aabb": lambda m: engine.Aabb(m.min, m.max),
-    "convex": lambda m: engine.Convex(m.planes),
-    "polyhedron": lambda m: engine.Polyhedron(m.vertices, m.faces),
-    "surface": lambda m: engine.Surface(m.vertices, m.faces),
-    "triangle": lambda m: engine.Triangle(m.vertices),
-    "polygon": lambda m: engine.Polygon(m.rings),
-    "implicit": lambda m: engine.Implicit(
-        [{"powers": t.powers.tolist(), "coefficient": t.coefficient} for t in m.terms]
-    ),
-}
-"""Every `type` of the union but csg and stored, which need the builder."""
+def _made(member: Any) -> Solid:
+    """Return the solid of a model whose fields are its constructor's."""
+    row = engine.SOLIDS[member.type]
+    fields = {name: getattr(member, name) for name in row.fields}
+    return row.solid(**{name: _plain(value) for name, value in fields.items()})
+
+
+def _plain(value: Any) -> Any:
+    """Return models within a list as the mappings that constructors take."""
+    if isinstance(value, list) and value and isinstance(value[0], BaseModel):
+        return [{name: getattr(item, name) for name in type(item).model_fields} for item in value]
+    return value
 
 
 def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[engine.Pose] | None]:

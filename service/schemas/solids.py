@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import Field, RootModel, WithJsonSchema
+from pydantic import Field, RootModel, WithJsonSchema, create_model
 
+import engine
 from service.schemas.arrays import DIMENSION, Array, Axis, Numbers
 from service.schemas.limits import AtMost, left_out
 from service.schemas.problem import Count, Schema, with_example
@@ -25,76 +26,6 @@ SolidId = Annotated[
 ]
 
 
-class HalfSpaceSolid(Schema):
-    """All points p with dot(normal, p) + offset >= 0; the normal points inward."""
-
-    type: Literal["half_space"]
-    normal: Position = Field(description="Points inward; of any length but zero.")
-    offset: Number = Field(description="Over the length of the normal: how far inside the origin lies.")
-
-
-class SphereSolid(Schema):
-    """All points at most `radius` away from `center` (a disc in 2D)."""
-
-    type: Literal["sphere"]
-    center: Position = Field(description="The centre.")
-    radius: Number = Field(description="Zero or more.")
-
-
-class AabbSolid(Schema):
-    """All points with min <= p <= max on each axis."""
-
-    type: Literal["aabb"]
-    min: Position = Field(description="The corner with the least coordinates.")
-    max: Position = Field(description="The corner with the greatest coordinates.")
-
-
-class ConvexSolid(Schema):
-    """All points with a x + b y + c z + d >= 0 for every row [a, b, c, d] (2D: [a, b, c]); may be unbounded
-    or empty."""
-
-    model_config = with_example({"type": "convex", "planes": [[1, 0, 1], [0, 1, 1], [-1, -1, 1]]})
-
-    type: Literal["convex"]
-    planes: Annotated[Array, Numbers(Axis(1, "max_planes"), Axis(3, 4))] = Field(description="Its rows.")
-
-
-class PolyhedronSolid(Schema):
-    """Everything within a closed, consistently oriented mesh (even-odd rule); faces by index, counter-clockwise seen
-    from outside, triangles or simple polygons."""
-
-    type: Literal["polyhedron"]
-    vertices: Vertices3 = Field(description="Positions; those at equal coordinates are one.")
-    faces: Faces = Field(description="Indices of vertices, three or more a face.")
-
-
-class SurfaceSolid(Schema):
-    """A mesh that encloses nothing, open or closed; for collision only."""
-
-    model_config = with_example(
-        {"type": "surface", "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
-    )
-
-    type: Literal["surface"]
-    vertices: Vertices3 = Field(description="Positions.")
-    faces: Faces = Field(description="Indices of vertices, three or more a face.")
-
-
-class TriangleSolid(Schema):
-    """2D: a triangle. 3D: for `contains` the prism over it, unbounded both ways; flat for bounds."""
-
-    type: Literal["triangle"]
-    vertices: Annotated[Array, Numbers(Axis(3, 3), DIMENSION)] = Field(description="Three positions, in any order.")
-
-
-class PolygonSolid(Schema):
-    """Everything within the rings (even-odd rule over all of them, any orientation); a repeated last vertex is
-    dropped."""
-
-    type: Literal["polygon"]
-    rings: Annotated[list[Vertices2], AtMost("max_rings")] = Field(description="Shells and holes alike.")
-
-
 class Term(Schema):
     """coefficient * x**powers[0] * y**powers[1] (* z**powers[2])."""
 
@@ -102,22 +33,29 @@ class Term(Schema):
     coefficient: Number = Field(description="The factor before them.")
 
 
-class ImplicitSolid(Schema):
-    """All points where the sum of the terms is >= 0; total degree at most 16."""
+_KINDS: dict[str, Any] = {
+    "number": Number,
+    "position": Position,
+    "rows": Annotated[Array, Numbers(Axis(1, "max_planes"), Axis(3, 4))],
+    "vertices": Vertices3,
+    "three": Annotated[Array, Numbers(Axis(3, 3), DIMENSION)],
+    "faces": Faces,
+    "rings": Annotated[list[Vertices2], AtMost("max_rings")],
+    "terms": Annotated[list[Term], AtMost("max_terms", low=1)],
+}
+"""What stands in a field of each kind (`engine.SOLIDS`)."""
 
-    model_config = with_example(
-        {
-            "type": "implicit",
-            "terms": [
-                {"powers": [0, 0], "coefficient": 1},
-                {"powers": [2, 0], "coefficient": -1},
-                {"powers": [0, 4], "coefficient": -1},
-            ],
-        }
-    )
 
-    type: Literal["implicit"]
-    terms: Annotated[list[Term], AtMost("max_terms", low=1)] = Field(description="What is added up.")
+def _model_of(row: Any) -> type[Schema]:
+    """Return the model of a type of solid, as its row has it."""
+    fields: dict[str, Any] = {"type": (Literal[row.name], ...)}
+    for name, field in row.fields.items():
+        fields[name] = (_KINDS[field.kind], Field(description=field.about))
+    title = "".join(part.title() for part in row.name.split("_"))
+    base: Any = Schema
+    if row.example is not None:
+        base = type(title, (Schema,), {"model_config": with_example({"type": row.name, **row.example})})
+    return create_model(f"{title}Solid", __base__=base, __module__=__name__, __doc__=row.about, **fields)
 
 
 class CsgSolid(Schema):
@@ -146,26 +84,11 @@ class StoredSolid(Schema):
     id: SolidId
 
 
-class Solid(
-    RootModel[
-        Annotated[
-            Union[  # noqa: UP007 (a named union is what code generators need)
-                HalfSpaceSolid,
-                SphereSolid,
-                AabbSolid,
-                ConvexSolid,
-                PolyhedronSolid,
-                SurfaceSolid,
-                TriangleSolid,
-                PolygonSolid,
-                ImplicitSolid,
-                CsgSolid,
-                StoredSolid,
-            ],
-            Field(discriminator="type"),
-        ]
-    ]
-):
+_MEMBERS = *(_model_of(row) for row in engine.SOLIDS.values() if row.fields), CsgSolid, StoredSolid
+_Member: Any = Union[_MEMBERS]  # noqa: UP007 (there is no other way to write a union of a tuple)
+
+
+class Solid(RootModel[Annotated[_Member, Field(discriminator="type")]]):
     """A set of points in the plane or in space, boundary included, told apart by `type`."""
 
     model_config = with_example(

@@ -33,6 +33,7 @@ FLOORS = {
     "engine.textbook": 7,
     "engine.scenes": 8,
     "engine.layers": 9,
+    "engine.registry": 9,
     "engine.compare": 10,
     "engine.distributed": 10,
     "engine.files": 10,

@@ -14,8 +14,8 @@ from engine.collision.collide import TAKEN, check_pose, pair_function
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
-from engine.solids.bounds import own_box
 from engine.solids.pose import Pose, motions_of
+from engine.solids.registry import own_box
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,8 +25,8 @@ from engine.containment.rational_locate import rational_location
 from engine.direct import entry_of
 from engine.predicates.rational import minus, squared_length
 from engine.solids.base import Solid
-from engine.solids.bounds import own_box
 from engine.solids.pose import Pose
+from engine.solids.registry import own_box
 from engine.solids.sphere import Sphere
 from engine.types import Location, Relation
 

@@ -21,8 +21,8 @@ from engine.jit import inline, kernel
 from engine.predicates.rational import sign_of
 from engine.predicates.vectors import as_point3, dot
 from engine.solids.base import Solid
-from engine.solids.bounds import own_box
 from engine.solids.half_space import HalfSpace
+from engine.solids.registry import own_box
 from engine.types import Point3, Relation
 
 _Function = tuple[FloatArray, FloatArray, float, float]

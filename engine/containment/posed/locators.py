@@ -36,27 +36,85 @@ from engine.solids.implicit import Implicit
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.registry import row_of
 from engine.solids.sphere import Sphere
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED
-
-Blurred = Callable[[FloatArray, FloatArray, Int8Array, Budget], int]
 
 
 def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
     """Return how points are located in `solid` under `pose`. Raises: UnsupportedSolidError."""
     if pose is None or pose.is_identity:
         return locator_of(solid)
-    if isinstance(solid, Csg):
-        return csg_locator(solid, lambda leaf: posed_locator(leaf, pose))
-    if isinstance(solid, Sphere):
-        return by_kernel("squared_distance", locate_in_ball, solid, *posed_center(solid, pose), solid.radius, pose=pose)
-    unposed = locator_of(solid)
-    frames = _frames(pose)
-    if isinstance(solid, Implicit) and solid.function is not None:
-        by_preimage: Fill = lambda points, *rest: unposed.fill(_moved(points, frames)[0], *rest)  # noqa: E731
-        return Locator(unposed.method, by_preimage, unposed.decisions)  # rounded: a callable decides in floats anyway
-    return Locator(unposed.method, _filtered(solid, pose, unposed, frames), unposed.decisions)
+    row = row_of(solid)
+    if row.posed is not None:
+        made: Locator = row.posed(solid, pose)
+        return made
+    return locator_of(solid)._replace(fill=rational_half(solid, pose), for_batch=None, order=None, direct=())
+
+
+def posed_csg(solid: Csg, pose: Pose) -> Locator:
+    """Return the locator in a Boolean tree under a pose."""
+    return csg_locator(solid, lambda leaf: posed_locator(leaf, pose))
+
+
+def posed_ball(solid: Sphere, pose: Pose) -> Locator:
+    """Return the locator in a ball about the image of its centre."""
+    return by_kernel("squared_distance", locate_in_ball, solid, *posed_center(solid, pose), solid.radius, pose=pose)
+
+
+def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
+    """Return the locator by the polynomial, or the caller's function, at preimages."""
+    if solid.function is None:
+        return by_filter(_terms)(solid, pose)
+    unposed, frames = locator_of(solid), _frames(pose)
+    by_preimage: Fill = lambda points, *rest: unposed.fill(_moved(points, frames)[0], *rest)  # noqa: E731
+    return Locator(unposed.method, by_preimage, unposed.decisions)  # rounded: a callable decides in floats anyway
+
+
+def by_filter(prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Callable[[Any, Pose], Locator]:
+    """Return what makes locators that try exact preimages, then a filter at rounded ones, then integers.
+
+    prepare: (solid, check) -> the filter's kernel, which takes points, bounds on the rounding of each, what follows the
+    kernel here, locations and flag.
+    """
+
+    def locator(solid: Solid, pose: Pose) -> Locator:
+        unposed = locator_of(solid)
+        return Locator(unposed.method, _filtered(solid, pose, unposed, prepare), unposed.decisions)
+
+    return locator
+
+
+def box_sides(solid: Aabb, _: Check) -> tuple[Any, ...]:
+    """Return the filter of a box."""
+    return locate_in_box, solid.min, solid.max
+
+
+def rows(solid: HalfSpace | Convex, _: Check) -> tuple[Any, ...]:
+    """Return the filter of what planes bound."""
+    return locate_in_rows_blurred, rows_in_space(rows_of(solid))
+
+
+def triangle(solid: Triangle, check: Check) -> tuple[Any, ...]:
+    """Return the filter of a triangle of the plane, or of the prism over one of space."""
+    if solid.dimension == 2:
+        return rings(solid, check)
+    return locate_in_rows_blurred, rows_in_space(prism_rows(solid)[0])
+
+
+def rings(solid: Polygon | Triangle, check: Check) -> tuple[Any, ...]:
+    """Return the filter of a polygon."""
+    return locate_in_rings, rings_of(solid, check)
+
+
+def faces(solid: Polyhedron, check: Check) -> tuple[Any, ...]:
+    """Return the filter of a polyhedron."""
+    return locate_by_tree, tree_of(solid, check)
+
+
+def _terms(solid: Implicit, _: Check) -> tuple[Any, ...]:
+    return locate_by_polynomial, solid.powers, solid.coefficients, int(solid.powers.sum(axis=1).max())
 
 
 @lru_cache(maxsize=64)
@@ -71,15 +129,13 @@ def _moved(points: FloatArray, frames: Frames) -> tuple[FloatArray, FloatArray]:
     return read_only(moved), blurs
 
 
-def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fill:
-    """Return the fill that tries exact preimages, then the blurred filter, then integers."""
-    blurred = _blurred_kernel(solid)
-    rest = rational_half(solid, pose)
+def _filtered(solid: Solid, pose: Pose, unposed: Locator, prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Fill:
+    frames, rest = _frames(pose), rational_half(solid, pose)
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
-        moved, blurs = _moved(points, frames)
+        (kernel, *prepared), (moved, blurs) = prepare(solid, budget.check), _moved(points, frames)
         with np.errstate(all="ignore"):
-            n_beyond = int(blurred(moved, blurs, locations, budget))
+            n_beyond = int(kernel(moved, blurs, *prepared, locations, budget.flag))
         budget.check()
         if not n_beyond:
             return Counts(0, 0)
@@ -91,25 +147,6 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, frames: Frames) -> Fil
         return Counts(n_beyond, n_rational)
 
     return fill
-
-
-def _blurred_kernel(solid: Solid) -> Blurred:
-    """Return the blurred kernel over the prepared structures of `solid`."""
-    prepared: Callable[[Check], tuple[Any, ...]]
-    if isinstance(solid, Aabb):
-        kernel, prepared = locate_in_box, lambda _: (solid.min, solid.max)
-    elif isinstance(solid, (HalfSpace, Convex)) or (isinstance(solid, Triangle) and solid.dimension == 3):
-        rows = rows_in_space(prism_rows(solid)[0] if isinstance(solid, Triangle) else rows_of(solid))
-        kernel, prepared = locate_in_rows_blurred, lambda _: (rows,)
-    elif isinstance(solid, (Polygon, Triangle)):
-        kernel, prepared = locate_in_rings, lambda check: (rings_of(solid, check),)
-    elif isinstance(solid, Polyhedron):
-        kernel, prepared = locate_by_tree, lambda check: (tree_of(solid, check),)
-    else:
-        assert isinstance(solid, Implicit)
-        degree = int(solid.powers.sum(axis=1).max())
-        kernel, prepared = locate_by_polynomial, lambda _: (solid.powers, solid.coefficients, degree)
-    return lambda points, blurs, out, budget: int(kernel(points, blurs, *prepared(budget.check), out, budget.flag))
 
 
 def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:

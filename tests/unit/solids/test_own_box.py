@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, HalfSpace, Polygon, Solid, Sphere, Triangle
-from engine.solids.bounds import own_box
+from engine.solids.registry import own_box
 
 
 def test_boxes_and_balls_and_bodies_without_bounds() -> None:

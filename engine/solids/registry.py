@@ -1,0 +1,132 @@
+"""The one table of solids: a row a type. `engine/registry.py` fills it; every other table is made from it.
+
+Only floors above know how points are located in a solid or segments cut on it, so a row names functions of theirs, and
+what is generic looks up the cell that it needs. An empty cell is a refusal that names the type (`refused`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.arrays import FloatArray
+from engine.errors import UnsupportedSolidError
+from engine.solids.base import Solid
+
+Where = tuple[str | int, ...]
+Box = tuple[FloatArray, FloatArray, float]
+"""Low and high (d,), of a ball those of its centre, and how far a point is at most from the middle as computed."""
+
+
+class Field(NamedTuple):
+    """A field of a solid, as its constructor, JSON and files name it."""
+
+    kind: str
+    """What stands there: number, position, rows, vertices, three, faces, rings, terms."""
+    about: str
+    """What it means, in a sentence of the API's description."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """What is known of one type of solid. The cells from `exact` on are functions, None where the type is refused."""
+
+    solid: type[Solid]
+    about: str
+    """The set of points that it is, in a sentence of the API's description."""
+    fields: Mapping[str, Field] = field(default_factory=dict)
+    """What JSON writes, by name; none where the solid is made of other solids."""
+    example: Mapping[str, Any] | None = None
+    stored: tuple[str, ...] = ()
+    """The attributes whose values, in this order, `solid.restored` takes back: what files hold."""
+    exact: Callable[[Any, Any, Any], int] | None = None
+    """(point, solid, check) -> Location; point: exact numbers, in the solid's own frame."""
+    exact_posed: Callable[[Any, Any, Any, Any], int] | None = None
+    """(point, solid, pose, check) -> Location, where a pose does not map the set: a ball keeps its radius."""
+    locator: Callable[[Any], Any] | None = None
+    """(solid) -> Locator; without it `exact` is asked about each point."""
+    posed: Callable[[Any, Any], Any] | None = None
+    """(solid, pose) -> Locator; without it `exact` is asked about each point."""
+    box: Callable[[Any, Any], Box] | None = None
+    """(solid, check) -> the box that poses move; without it the solid is taken to reach to infinity."""
+    bounds: Callable[[Any, Any], Any] | None = None
+    """(solid, budget) -> (Bounds, Accuracy)."""
+    profile: Callable[[Any, Any], Any] | None = None
+    """(line, solid) -> where a segment is in the solid, exactly: `segment_clipping/profiles.py`."""
+    n_faces: Callable[[Any], int] = lambda _: 1
+    """(solid) -> how many faces pieces of segments may name."""
+    clip: Callable[[Any], Any] | None = None
+    """(solid) -> the Method that cuts segments on it; without it `clip_segments` refuses the type."""
+    planes: Callable[[Any, Any], Any] | None = None
+    """(solid, check) -> the integer rows that polygons are clipped by."""
+    meets: Mapping[int, str] = field(default_factory=dict)
+    """By dimension, as what it collides: mesh, outline, sphere or half_space."""
+
+    @property
+    def name(self) -> str:
+        """What JSON and messages call the type."""
+        return self.solid.type
+
+
+_ROWS: Final[dict[str, Row]] = {}
+SOLIDS: Final[Mapping[str, Row]] = MappingProxyType(_ROWS)
+"""The rows by the name of their type, in the order in which messages name them."""
+_BY_CLASS: Final[dict[type, Row]] = {}
+
+
+def register(row: Row) -> None:
+    """Add a row. Raises: ValueError where its name or its class has one."""
+    if row.name in _ROWS or row.solid in _BY_CLASS:
+        raise ValueError(f"there is a row for {row.name} already")
+    _ROWS[row.name] = _BY_CLASS[row.solid] = row
+
+
+def row_of(solid: object) -> Row:
+    """Return the row of a solid, an empty one for what has none."""
+    return _BY_CLASS.get(type(solid), _NO_ROW)
+
+
+def names(takes: Callable[[Row], object]) -> str:
+    """Return the names of the types whose row has something, as a sentence lists them."""
+    taken = [row.name for row in _ROWS.values() if takes(row)]
+    return f"{', '.join(taken[:-1])} or {taken[-1]}" if len(taken) > 1 else "".join(taken)
+
+
+def kind_of(solid: object) -> str:
+    """Return what a message calls a solid, or what is given in place of one."""
+    return solid.type if isinstance(solid, Solid) else f"{type(solid).__name__}, which is no solid"
+
+
+def refused(
+    solid: object, what: str, takes: Callable[[Row], object], more: str = "", where: Where = ()
+) -> UnsupportedSolidError:
+    """Return the error for a solid that an operation does not take; what: the sentence up to the solid."""
+    kind = kind_of(solid)
+    article = "an" if kind[0] in "aeiou" else "a"
+    return UnsupportedSolidError(f"{what} {article} {kind}; give a {names(takes)}{more}", where)
+
+
+def own_box(solid: Solid, check: Callable[[], object] | None = None) -> Box:
+    """Return the box of a solid where it stands, infinite where it may have no bounds; check: as for
+    `Solid.prepared`."""
+    box = row_of(solid).box
+    return unbounded(solid) if box is None else box(solid, check)
+
+
+def unbounded(solid: Solid) -> Box:
+    """Return the box of what may reach to infinity."""
+    return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf), np.inf
+
+
+class _Nothing(Solid):
+    """What has no row."""
+
+    __slots__ = ()
+    type = "nothing"
+
+
+_NO_ROW: Final = Row(solid=_Nothing, about="")
