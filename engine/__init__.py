@@ -63,7 +63,7 @@ from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
 from engine.solids.ragged import polygons
-from engine.solids.registry import SOLIDS
+from engine.solids.registry import solid_types
 from engine.solids.sphere import Sphere
 from engine.solids.surface import Surface
 from engine.solids.triangle import Triangle
@@ -72,7 +72,6 @@ from engine.version import __version__
 from engine.warmup import warm
 
 __all__ = [
-    "SOLIDS",
     "Aabb",
     "Accuracy",
     "Bounds",
@@ -155,6 +154,7 @@ __all__ = [
     "polygons",
     "read_mesh",
     "release",
+    "solid_types",
     "union_all",
     "warm",
 ]

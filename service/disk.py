@@ -253,7 +253,7 @@ def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
 
     Csg and scenes are made of solids.
     """
-    row = engine.SOLIDS.get(kind)
+    row = engine.solid_types.get(kind)
     if row is not None and row.stored:
         return row.solid, row.stored
     raise ServiceError(

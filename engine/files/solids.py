@@ -15,7 +15,7 @@ from engine.layers.geojson import polygon_of
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
-from engine.solids.registry import SOLIDS
+from engine.solids.registry import solid_types
 
 Note = Callable[[str], object]
 
@@ -82,16 +82,16 @@ def from_json(value: Any) -> list[Solid]:
             return [Polygon(value["coordinates"])]
         if kind == "MultiPolygon":
             return [polygon_of(value)]
-        if isinstance(kind, str) and kind in SOLIDS:
+        if isinstance(kind, str) and kind in solid_types:
             fields = {name: field for name, field in value.items() if name != "type"}
             if kind == "csg":
                 fields["operands"] = [solid for operand in fields["operands"] for solid in from_json(operand)]
-            return [SOLIDS[kind].solid(**fields)]
+            return [solid_types[kind].solid(**fields)]
     except (KeyError, TypeError) as error:
         raise InvalidInputError(f"a {kind} lacks a field or has one too many: {error}", ("type",)) from None
+    names = ", ".join(solid_types)
     raise InvalidInputError(
-        f"type must be Polygon, MultiPolygon, Feature, FeatureCollection or one of {', '.join(SOLIDS)}; got {kind!r}",
-        ("type",),
+        f"type must be Polygon, MultiPolygon, Feature, FeatureCollection or one of {names}; got {kind!r}", ("type",)
     )
 
 

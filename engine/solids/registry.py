@@ -73,7 +73,7 @@ class Row:
 
 
 _ROWS: Final[dict[str, Row]] = {}
-SOLIDS: Final[Mapping[str, Row]] = MappingProxyType(_ROWS)
+solid_types: Final[Mapping[str, Row]] = MappingProxyType(_ROWS)
 """The rows by the name of their type, in the order in which messages name them."""
 _BY_CLASS: Final[dict[type, Row]] = {}
 

@@ -82,7 +82,7 @@ def _checked(where: Where, build: Callable[[], Solid]) -> Solid:
 
 def _made(member: Any) -> Solid:
     """Return the solid of a model whose fields are its constructor's."""
-    row = engine.SOLIDS[member.type]
+    row = engine.solid_types[member.type]
     fields = {name: getattr(member, name) for name in row.fields}
     return row.solid(**{name: _plain(value) for name, value in fields.items()})
 

@@ -43,7 +43,7 @@ _KINDS: dict[str, Any] = {
     "rings": Annotated[list[Vertices2], AtMost("max_rings")],
     "terms": Annotated[list[Term], AtMost("max_terms", low=1)],
 }
-"""What stands in a field of each kind (`engine.SOLIDS`)."""
+"""What stands in a field of each kind (`engine.solid_types`)."""
 
 
 def _model_of(row: Any) -> type[Schema]:
@@ -84,7 +84,7 @@ class StoredSolid(Schema):
     id: SolidId
 
 
-_MEMBERS = *(_model_of(row) for row in engine.SOLIDS.values() if row.fields), CsgSolid, StoredSolid
+_MEMBERS = *(_model_of(row) for row in engine.solid_types.values() if row.fields), CsgSolid, StoredSolid
 _Member: Any = Union[_MEMBERS]  # noqa: UP007 (there is no other way to write a union of a tuple)
 
 

@@ -5,7 +5,7 @@ import { prepared2d, prepared3d, styleColors } from "./drawing.js";
 import { KEYS, framed, readRequest } from "./given.js";
 import { readMesh } from "./mesh_files.js";
 import { QUESTIONS } from "./questions.js";
-import { SOLIDS } from "./solids.js";
+import { solid_types } from "./solids.js";
 import { View2D } from "./view2d.js";
 import { View3D } from "./view3d.js";
 
@@ -45,7 +45,7 @@ function moveCorner(corner, position) {
 // --- solids -----------------------------------------------------------------------------------------------------------
 
 function solidOf(key, dimension) {
-  loaded[dimension][key] ??= completed({ ...SOLIDS[dimension][key], ...SOLIDS[dimension][key].make() });
+  loaded[dimension][key] ??= completed({ ...solid_types[dimension][key], ...solid_types[dimension][key].make() });
   return loaded[dimension][key];
 }
 
@@ -73,7 +73,7 @@ async function open(file) {
   const placed = vertices.map((v) => v.map((x, k) => (x - middle[k]) * scale));
   const key = `file ${file.name}`, json = { type: "polyhedron", vertices: placed, faces };
   loaded[3][key] = completed({ name: `${file.name} (${faces.length.toLocaleString("en")} faces)`, json, mesh: { vertices: placed, faces } });
-  SOLIDS[3][key] = { name: loaded[3][key].name, convex: true, make: () => loaded[3][key] };
+  solid_types[3][key] = { name: loaded[3][key].name, convex: true, make: () => loaded[3][key] };
   if (state.question === "overlay" || state.question === "proof") document.querySelector("[name=question][value=contains]").click();
   document.querySelector("[name=dimension][value='3']").click();
   fillSelects(key);
@@ -87,9 +87,9 @@ function fillSelects(wanted) {
   for (const [id, allowed] of [["first", question.firsts], ["second", question.seconds]]) {
     $(`${id}-label`).hidden = !allowed;
     if (!allowed) continue;
-    const keys = Object.keys(SOLIDS[state.dimension]).filter((key) => allowed(SOLIDS[state.dimension][key]));
+    const keys = Object.keys(solid_types[state.dimension]).filter((key) => allowed(solid_types[state.dimension][key]));
     const kept = id === "first" && keys.includes(wanted) ? wanted : question.preferred && id === "first" ? question.preferred : keys.includes($(id).value) ? $(id).value : keys[id === "second" ? 1 : 0];
-    $(id).replaceChildren(...keys.map((key) => new Option(SOLIDS[state.dimension][key].name, key, false, key === kept)));
+    $(id).replaceChildren(...keys.map((key) => new Option(solid_types[state.dimension][key].name, key, false, key === kept)));
   }
 }
 
@@ -271,7 +271,7 @@ function saveLink() {  // browsers take some hundred of these in half a minute
 function takeRequest(text) {
   const given = readRequest(text);
   for (const key of KEYS) delete loaded[given.dimension][key];
-  Object.assign(SOLIDS[given.dimension], given.examples);
+  Object.assign(solid_types[given.dimension], given.examples);
   for (const [name, value] of [["question", given.question], ["dimension", given.dimension]]) document.querySelector(`[name=${name}][value="${value}"]`).checked = true;
   chooseQuestion();
   for (const [i, key] of Object.keys(given.examples).entries()) $(["first", "second"][i]).value = key;

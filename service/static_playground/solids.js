@@ -66,7 +66,7 @@ const floor = () => ({
 const rings = (...list) => ({ json: { type: "polygon", rings: list } });
 const round = (n, radius, phase = 0, squeeze = 1) => Array.from({ length: n }, (_, i) => [radius(i) * Math.cos(at(i, n) + phase), squeeze * radius(i) * Math.sin(at(i, n) + phase)]);
 
-export const SOLIDS = {
+export const solid_types = {
   3: {
     torus: { name: "torus (2,304 faces)", make: torus },
     knot: { name: "trefoil knot (6,400 faces)", make: knot },

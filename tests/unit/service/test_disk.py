@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 
 import engine
-from service import disk, mesh_reader
+from engine.solids import registry
+from service import mesh_reader
 from service.disk import Folder
 from service.errors import ServiceError
 from service.store import Store, solid_id
@@ -97,7 +98,7 @@ def test_a_file_of_another_version_is_refused_and_stays(
 ) -> None:
     """Replicas of two versions share a folder: what the older one cannot read is no damage."""
     with monkeypatch.context() as later:
-        later.setitem(disk.CODECS, "torus", disk.Codec((), Torus))
+        later.setitem(registry._ROWS, "torus", registry.Row(solid=Torus, about="", stored=("dimension",)))
         name, _ = Store(10**6, tmp_path).put(behind(Torus()))
     store = Store(10**6, tmp_path)
     for get in (store.get, store.get_scene):
