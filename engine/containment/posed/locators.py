@@ -66,7 +66,7 @@ def posed_ball(solid: Sphere, pose: Pose) -> Locator:
 def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
     """Return the locator by the polynomial, or the caller's function, at preimages."""
     if solid.function is None:
-        return by_filter(_terms)(solid, pose)
+        return by_filter(terms)(solid, pose)
     unposed, frames = locator_of(solid), _frames(pose)
     by_preimage: Fill = lambda points, *rest: unposed.fill(_moved(points, frames)[0], *rest)  # noqa: E731
     return Locator(unposed.method, by_preimage, unposed.decisions)  # rounded: a callable decides in floats anyway
@@ -113,7 +113,8 @@ def faces(solid: Polyhedron, check: Check) -> tuple[Any, ...]:
     return locate_by_tree, tree_of(solid, check)
 
 
-def _terms(solid: Implicit, _: Check) -> tuple[Any, ...]:
+def terms(solid: Implicit, _: Check) -> tuple[Any, ...]:
+    """Return the filter of a polynomial."""
     return locate_by_polynomial, solid.powers, solid.coefficients, int(solid.powers.sum(axis=1).max())
 
 

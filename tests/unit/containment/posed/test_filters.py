@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Solid, locate
+from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Polyhedron, Solid, locate
 from engine.arrays import read_only
 from engine.budget import Budget
-from engine.containment.posed.locators import _blurred_kernel
+from engine.containment.posed import locators as posed
 from engine.containment.rational_locate import rational_location
 from tests.unit.containment.scenes import box_mesh, made
 
+FILTERS: dict[type[Solid], Callable[..., Any]] = {
+    Aabb: posed.box_sides, HalfSpace: posed.rows, Convex: posed.rows, Polygon: posed.rings, Polyhedron: posed.faces,
+    Implicit: posed.terms,
+}  # fmt: skip
 SOLIDS: list[Callable[[], Solid]] = [
     lambda: Aabb([0, 0, 0], [2, 1, 3]),
     lambda: Aabb([0, 0], [2, 1]),
@@ -34,7 +38,8 @@ def test_an_answer_holds_all_over_the_blur(make: Callable[[], Any]) -> None:
     blurs = np.where(np.arange(len(points)) % 2, 0.25, 2.0**-40)
     found = np.empty(len(points), np.int8)
     with np.errstate(all="ignore"), Budget() as budget:
-        _blurred_kernel(solid)(read_only(points), blurs, found, budget)
+        kernel, *prepared = FILTERS[type(solid)](solid, budget.check)
+        kernel(read_only(points), blurs, *prepared, found, budget.flag)
     assert (np.abs(found) == 1).mean() > 0.2
     corners = np.stack(np.meshgrid(*[[-0.5, 0.0, 0.5]] * solid.dimension), axis=-1).reshape(-1, solid.dimension)
     for point, blur, location in zip(points, blurs, found.tolist()):
