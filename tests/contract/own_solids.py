@@ -119,7 +119,6 @@ def engine_questions(solid: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
             yield f"overlay {both[0].type}", lambda b=both: engine.overlay(*b)
             yield f"overlay_batch {both[0].type}", lambda b=both: engine.overlay_batch([b[0]], [b[1]])
         yield "union_all", lambda: engine.union_all([solid])
-        yield "filled", lambda: engine.filled(solid, "non_zero")
     yield "compare contains", lambda: engine.compare("contains", points, solid)
     yield "compare clip_segments", lambda: engine.compare("clip_segments", segments, solid)
     yield "compare clip_polygons", lambda: engine.compare("clip_polygons", [SQUARE[d]], solid)

@@ -238,9 +238,9 @@ def test_nothing_is_welcome() -> None:
 def test_says_what_is_wrong() -> None:
     segments = [[[-2, 0], [2, 0]]]
     waves = Implicit([{"powers": [2, 0], "coefficient": 1.0}])
-    with pytest.raises(UnsupportedSolidError, match=r"solids\[1\]: a segment is not cut on an implicit; bodies may be"):
+    with pytest.raises(UnsupportedSolidError, match=r"solids\[1\]: no segment is cut on an implicit; give a half_space"):
         Scene([Sphere([0, 0], 1), waves]).clip_segments(segments)
-    with pytest.raises(UnsupportedSolidError, match=r"solids\[0\]: a segment is not cut on an implicit"):
+    with pytest.raises(UnsupportedSolidError, match=r"solids\[0\]: no segment is cut on an implicit"):
         Scene([Csg("union", [waves, waves])]).clip_segments(segments, keep="any")
     scene = Scene([Sphere([0, 0], 1)])
     with pytest.raises(InvalidOperationError, match="keep must be all, first or any, got 'last'"):

@@ -161,7 +161,7 @@ def test_numbers_that_are_none_are_found_in_large_batches() -> None:
 
 def test_refuses_what_it_cannot_take() -> None:
     box = Aabb([0, 0], [1, 1])
-    with pytest.raises(UnsupportedSolidError, match="half_space, aabb, convex, sphere, polygon or polyhedron"):
+    with pytest.raises(UnsupportedSolidError, match="half_space, sphere, aabb, convex, polyhedron or polygon"):
         clip_segments([[[0, 0], [1, 1]]], Triangle([[0, 0], [1, 0], [0, 1]]))
     with pytest.raises(WrongDimensionError):
         clip_segments([[[0, 0, 0], [1, 1, 1]]], box)

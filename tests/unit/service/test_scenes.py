@@ -176,7 +176,7 @@ async def test_names_what_is_not_taken(client: httpx.AsyncClient) -> None:
     )
     problem = check_problem(refused, 422, "unsupported_solid")
     assert problem["errors"][0]["pointer"] == "/bodies/2/solid"
-    assert problem["detail"].startswith("bodies[2].solid: a segment is not cut on an implicit")
+    assert problem["detail"].startswith("bodies[2].solid: no segment is cut on an implicit")
     path = await put(client)
     check_problem(await client.post(f"{path}/contains", json={"points": [[0, 0, 0]]}), 422, "wrong_dimension")
 
