@@ -238,7 +238,7 @@ def test_nothing_is_welcome() -> None:
 def test_says_what_is_wrong() -> None:
     segments = [[[-2, 0], [2, 0]]]
     waves = Implicit([{"powers": [2, 0], "coefficient": 1.0}])
-    with pytest.raises(UnsupportedSolidError, match=r"solids\[1\]: no segment is cut on an implicit; give a half_space"):
+    with pytest.raises(UnsupportedSolidError, match=r"solids\[1\]: no segment is cut on an implicit; give a"):
         Scene([Sphere([0, 0], 1), waves]).clip_segments(segments)
     with pytest.raises(UnsupportedSolidError, match=r"solids\[0\]: no segment is cut on an implicit"):
         Scene([Csg("union", [waves, waves])]).clip_segments(segments, keep="any")
