@@ -19,8 +19,8 @@ from engine.polygon_overlay.found import Found, one_pair, put_together, ring_siz
 from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
 from engine.polygon_overlay.polygon_arrays import PolygonArrays
-from engine.polygon_overlay.result import Output, Overlay, made_overlay
-from engine.polygon_overlay.rounds import leave_nearest, settle_rings
+from engine.polygon_overlay.result import Overlay, made_overlay
+from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.solids.ragged import summed
@@ -75,8 +75,8 @@ def run_kernel(
 
 
 def overlay_compiled(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
-    nesting: Nesting = UNNAMED, grid: Grid | None = None,
+    subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
+    grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
     """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
 
@@ -99,18 +99,15 @@ def overlay_compiled(
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
     known = None
     if found.status == DONE and grid is None:
-        result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact, output)
+        result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact)
     elif found.status == DONE and grid is not None:
         known = snap_vertices(found.vertices, found.ring_offsets, found.piece_offsets, budget)
         result = as_it_stays(found, known, grid, len(subject.vertices))
     if result is None:
         rings = found.ring_offsets, found.piece_offsets
         rounded = one_pair(found.vertices, *rings, found.displacement, found.n_exact, found.sources, found.status)
-        if output == "nearest":
-            result = leave_nearest(rounded, exact, budget)
-        else:
-            snap = grid and functools.partial(snapped_to_units, known=known)
-            result = settle_rings(rounded, exact, arranged_again, exponent == 0, budget, snap)
+        snap = grid and functools.partial(snapped_to_units, known=known)
+        result = settle_rings(rounded, exact, arranged_again, exponent == 0, budget, snap)
         if result is None:
             return None
         if grid is not None:
@@ -136,10 +133,7 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     return run_kernel(subjects, none, KEPT_ARRAYS["union"], budget, nesting)
 
 
-def as_overlay(
-    vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings, output: Output
-) -> Overlay:
+def as_overlay(vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings) -> Overlay:
     """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
-    has_moved = displacement > 0.0
-    told = {"output": output, "may_be_invalid": output == "nearest" and has_moved, "rounds": int(has_moved)}
-    return made_overlay(vertices, exact.offsets, piece_offsets, exact, largest_displacement=displacement, **told)
+    told = {"largest_displacement": displacement, "rounds": int(displacement > 0.0)}
+    return made_overlay(vertices, exact.offsets, piece_offsets, exact, **told)

@@ -20,7 +20,7 @@ from engine.polygon_overlay.compiled.boundary.ring_nesting import PAIR, Nesting
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
-from engine.polygon_overlay.compiled.ring_order import Output as Written
+from engine.polygon_overlay.compiled.ring_order import Output
 from engine.polygon_overlay.compiled.workspace import (
     FEW_VERTICES,
     first_contacts,
@@ -31,7 +31,7 @@ from engine.polygon_overlay.compiled.workspace import (
     spare,
 )
 from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
-from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.result import Overlay
 from engine.solids.polygon import Polygon
 
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
@@ -142,7 +142,7 @@ def run_blocks(
     return made
 
 
-def _expanded(output: Written, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
+def _expanded(output: Output, n: int, n_rings: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> _Rings:
     """Return vertices, sources and offsets of rings, n vertices in all, with what was left out of them."""
     made: Any = np.empty((n, 2)), np.empty((n, 2), _INT32), np.empty(n_rings + 1, _INT64)
     entry_of(expand_rings)(
@@ -161,7 +161,7 @@ def _copied(array: npt.NDArray[Any], n: int) -> npt.NDArray[Any]:
     return cast("npt.NDArray[Any]", made)
 
 
-def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray, output: Output) -> Overlay | None:
+def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray) -> Overlay | None:
     """Return the overlay of two polygons, without a limit; None of more vertices, or where the kernel leaves doubt."""
     first, second = RingArrays(subject.vertices, subject.ring_offsets), RingArrays(clip.vertices, clip.ring_offsets)
     if len(first.vertices) + len(second.vertices) > FEW_VERTICES:
@@ -179,12 +179,9 @@ def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray, output: Output
     spare.append(scratch)
     if not is_done:
         return None
-    told: dict[str, Any] = {
-        "output": output,
-        "_later": functools.partial(_fields, first, second, vertices, sources, rings),
-    }
+    told: dict[str, Any] = {"_later": functools.partial(_fields, first, second, vertices, sources, rings)}
     if moved_by > 0.0:
-        told |= {"may_be_invalid": output == "nearest", "rounds": 1, "largest_displacement": moved_by}
+        told |= {"rounds": 1, "largest_displacement": moved_by}
     result = object.__new__(Overlay)
     object.__setattr__(result, "__dict__", told)
     return result
