@@ -34,8 +34,7 @@ from engine.polygon_overlay.found import Found, one_pair, ring_sizes
 from engine.polygon_overlay.grid import snapped_to_units
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.rounds import settle_rings
-from engine.polygon_overlay.run import KEPT, Operation
-from engine.polygon_overlay.run_pair import UNNAMED
+from engine.polygon_overlay.run import KEPT, UNNAMED, Operation
 
 _Sources = frozenset[int]
 

@@ -26,8 +26,15 @@ from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.result import Overlay, OverlayOptions
-from engine.polygon_overlay.run import KEPT, KEPT_ARRAYS, Operation, arranged_again, overlay_compiled
-from engine.polygon_overlay.run_pair import UNNAMED, overlay_few
+from engine.polygon_overlay.run import (
+    KEPT,
+    KEPT_ARRAYS,
+    UNNAMED,
+    Operation,
+    arranged_again,
+    overlay_compiled,
+    overlay_few,
+)
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon

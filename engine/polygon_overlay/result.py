@@ -134,7 +134,7 @@ class Overlay:
     largest_displacement: proven bound on the distance between an edge of the exact result and its image.
     snapped: the coarser lattice of snap rounding was needed.
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
-    _later: makes fields that are not there yet (run_pair.py); missing: all are.
+    _later: makes fields that are not there yet (run.py); missing: all are.
     _lost: of what `collapsed` is made when asked for; None where rounding lost nothing.
     _edges: by vertex the input edge along which its ring goes on, by its first vertex; or sources, as
         ``exact`` has them, that tell; None: those.
