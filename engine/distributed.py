@@ -30,7 +30,6 @@ from engine.errors import InvalidArrayError, InvalidInputError
 from engine.parallel import Progress, check_options
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
-from engine.polygon_overlay.result import Output
 from engine.polygon_overlay.run import Operation
 from engine.scenes.ends import ScenePieces
 from engine.scenes.scene import Keep, Scene
@@ -123,18 +122,16 @@ def overlay_batch(
     clips: Sequence[Solid],
     operation: Operation = "intersection",
     *,
-    output: Output = "valid",
     part: int = 1_000,
     progress: Progress | None = None,
 ) -> OverlayBatch:
     """Combine pairs of polygons, see `engine.overlay_batch`."""
-    options: dict[str, Any] = {"operation": operation, "output": output}
-    none: Any = overlay_pairs(subjects[:0], clips[:0], **options)  # checks the options here, not on a worker
+    none: Any = overlay_pairs(subjects[:0], clips[:0], operation)  # checks the operation here, not on a worker
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
-    function = partial(_about_rows, overlay_pairs, **options)
+    function = partial(_about_rows, overlay_pairs, operation=operation)
     found = _in_order(_answers(client, function, (), (subjects, clips), part, progress))
     return join_batches([none, *(batch for _, batch in found)])
 

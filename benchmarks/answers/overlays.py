@@ -14,9 +14,7 @@ from benchmarks.answers.asking import Drawn, Question, drawn_by, family, same
 from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Array, Draw, Place, around, put, turned
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
-Output = Literal["valid", "nearest"]
 OPERATIONS: tuple[Operation, ...] = ("intersection", "union", "difference", "symmetric_difference")
-OUTPUTS: tuple[Output, ...] = ("valid", "valid", "nearest")
 Rings = list[Array]
 Pair = tuple[Rings, Rings]
 
@@ -29,26 +27,26 @@ def said(found: engine.Overlay | None) -> Any:
         found.vertices, found.ring_offsets, found.piece_offsets, found.area_exact, found.n_pieces_exact,
         found.n_holes_exact, [(part.kind, part.area, list(part.near)) for part in found.collapsed],
         found.pieces_joined, found.pieces_parted, found.holes_joined, found.holes_parted, found.rounds,
-        found.vertices_moved, found.snapped, found.may_be_invalid,
+        found.vertices_moved, found.snapped,
     ]  # fmt: skip
 
 
-def overlaid(pair: Pair, output: Output, workers: int | None) -> tuple[int, Any]:
+def overlaid(pair: Pair, workers: int | None) -> tuple[int, Any]:
     subject, clip = (engine.Polygon(rings) for rings in pair)
-    return 4, [said(engine.overlay(subject, clip, name, output=output, workers=workers)) for name in OPERATIONS]
+    return 4, [said(engine.overlay(subject, clip, name, workers=workers)) for name in OPERATIONS]
 
 
 def overlaid_in_order(pair: Pair, other: Pair, workers: int | None) -> tuple[int, Any]:
     """Ask also with rings and vertices named in another order: the same rings."""
-    n, found = overlaid(pair, "valid", workers)
-    return 2 * n, same(overlaid(other, "valid", workers)[1], found, "rings and vertices")
+    n, found = overlaid(pair, workers)
+    return 2 * n, same(overlaid(other, workers)[1], found, "rings and vertices")
 
 
-def batch_overlaid(pairs: list[Pair], output: Output, workers: int | None) -> tuple[int, Any]:
+def batch_overlaid(pairs: list[Pair], workers: int | None) -> tuple[int, Any]:
     subjects, clips = ([engine.Polygon(rings) for rings in side] for side in zip(*pairs))
     answers = []
     for name in OPERATIONS:
-        found = engine.overlay_batch(subjects, clips, name, output=output, workers=workers)
+        found = engine.overlay_batch(subjects, clips, name, workers=workers)
         flat = [found.status, found.vertices, found.ring_offsets, found.piece_offsets, found.pair_offsets]
         answers.append([*flat, [said(found[pair]) for pair in range(0, len(found), 9)]])
     return 4 * len(pairs), answers
@@ -128,7 +126,7 @@ def _drawn(draw: Draw, places: tuple[Place, ...], kind: Callable[[Draw], Pair] |
 
 
 def _of_each_kind(places: tuple[Place, ...], times: int) -> Drawn:
-    return lambda draw: (partial(overlaid, _drawn(draw, places, kind), draw.pick(OUTPUTS)) for kind in KINDS * times)
+    return lambda draw: (partial(overlaid, _drawn(draw, places, kind)) for kind in KINDS * times)
 
 
 family("overlay", "pairs_of_all_kinds", 24, _of_each_kind(NEAR_PLACES, 3))
@@ -159,30 +157,30 @@ family("displacements", "bounds_on_displacement", 10,
 def large_rings(draw: Draw) -> Iterator[Question]:
     """Rings of thousands of vertices, of which most are near nothing; hundreds of rings; dense crossings."""
     coasts = [shapes.coast(draw, 3000), shapes.coast(draw, 2500) + draw.pick([0.1, 1.0, 3.5])]
-    yield partial(overlaid, (coasts[:1], coasts[1:]), "valid")
-    yield partial(overlaid, (coasts[:1], [shapes.star(draw, 9)]), "valid")
+    yield partial(overlaid, (coasts[:1], coasts[1:]))
+    yield partial(overlaid, (coasts[:1], [shapes.star(draw, 9)]))
     holes = shapes.many_holes(draw)
-    yield partial(overlaid, (holes, [ring + draw.pick([0.0, 0.1, 0.25]) for ring in holes]), draw.pick(OUTPUTS))
-    yield partial(overlaid, (holes, coasts[1:]), "valid")
-    yield partial(overlaid, ([shapes.star(draw, 60)], [shapes.star(draw, 80)]), draw.pick(OUTPUTS))
+    yield partial(overlaid, (holes, [ring + draw.pick([0.0, 0.1, 0.25]) for ring in holes]))
+    yield partial(overlaid, (holes, coasts[1:]))
+    yield partial(overlaid, ([shapes.star(draw, 60)], [shapes.star(draw, 80)]))
 
 
 @drawn_by("overlay_batch", 20)
 def batches_of_all_kinds(draw: Draw) -> Iterator[Question]:
     places = draw.pick([NEAR_PLACES, ((1.0, 0.0),), ((1 / 3, 1e6),)])
-    yield partial(batch_overlaid, [_drawn(draw, places) for _ in range(draw.pick([3, 40, 150]))], draw.pick(OUTPUTS))
+    yield partial(batch_overlaid, [_drawn(draw, places) for _ in range(draw.pick([3, 40, 150]))])
 
 
 @drawn_by("overlay_batch", 10)
 def batches_of_one_kind(draw: Draw) -> Iterator[Question]:
     kind = draw.pick([convex_pair, stars, lattice, turned_lattice])
-    yield partial(batch_overlaid, [_drawn(draw, NEAR_PLACES, kind) for _ in range(500)], draw.pick(OUTPUTS))
+    yield partial(batch_overlaid, [_drawn(draw, NEAR_PLACES, kind) for _ in range(500)])
 
 
 @drawn_by("overlay_batch", 6)
 def batches_far_away(draw: Draw) -> Iterator[Question]:
     pairs = [_drawn(draw, FAR_PLACES + NEAR_PLACES[:2]) for _ in range(10)]
-    yield partial(batch_overlaid, [*pairs, *[_drawn(draw, NEAR_PLACES) for _ in range(10)]], draw.pick(OUTPUTS))
+    yield partial(batch_overlaid, [*pairs, *[_drawn(draw, NEAR_PLACES) for _ in range(10)]])
 
 
 def layers_overlaid(layers: list[Any], workers: int | None) -> tuple[int, Any]:
@@ -233,9 +231,9 @@ def _said_of_many(found: engine.Overlay) -> list[Any]:
     return [*said(found), found.sources]
 
 
-def united(layer: list[Rings], output: Output, grid: float | None, workers: int | None) -> tuple[int, Any]:
+def united(layer: list[Rings], grid: float | None, workers: int | None) -> tuple[int, Any]:
     polygons = [engine.Polygon(rings) for rings in layer]
-    return 1, _said_of_many(engine.union_all(polygons, output=output, grid=grid, workers=workers))
+    return 1, _said_of_many(engine.union_all(polygons, grid=grid, workers=workers))
 
 
 def filled_by(rings: Rings, workers: int | None) -> tuple[int, Any]:
@@ -252,8 +250,8 @@ def overlaid_on_grid(pair: Pair, grid: float, workers: int | None) -> tuple[int,
 @drawn_by("union_all", 12)
 def layers_of_all_kinds(draw: Draw) -> Iterator[Question]:
     for _ in range(12):
-        yield partial(united, _layer(draw), draw.pick(OUTPUTS), None)
-        yield partial(united, _layer(draw), "valid", draw.pick([0.125, 0.1, 1e-6]))
+        yield partial(united, _layer(draw), None)
+        yield partial(united, _layer(draw), draw.pick([0.125, 0.1, 1e-6]))
 
 
 family("filled", "rings_under_fill_rules", 8, lambda draw: (

@@ -108,8 +108,7 @@ def _good(draw: Draw, dimension: int) -> Iterator[Request]:
         {"type": "polygon", "rings": [ring.tolist() for ring in side]} for side in overlays.any_rings(draw)
     )
     for name in overlays.OPERATIONS:
-        how = {"operation": name, "output": draw.pick(overlays.OUTPUTS)}
-        yield "/v1/overlay", {"subject": subject, "clip": clip, **how}
+        yield "/v1/overlay", {"subject": subject, "clip": clip, "operation": name}
     yield "/v1/bounds", {"solid": region if draw.chance(0.3) else first}
     yield "/v1/solids", solid
 

@@ -23,7 +23,7 @@ from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.found import chained, places_of
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
-from engine.polygon_overlay.result import Output, Overlay
+from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, joined_touching, touching
 from engine.polygon_overlay.union_all import less_all, union_all
@@ -236,7 +236,7 @@ def _overlapping(others: Layer, rivals: IntArray, groups: IntArray, seconds: Int
 def _overlap(arrays: PolygonArrays, pairs: IntArray, limits: Limits) -> BoolArray:
     """Tell of pairs of polygons whether they have common area, however little."""
     sides = Chosen(arrays, pairs[:, 0]), Chosen(arrays, pairs[:, 1])
-    return _overlaid(*sides, "intersection", limits, "nearest").n_pieces_exact > 0
+    return _overlaid(*sides, "intersection", limits).n_pieces_exact > 0
 
 
 def united(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
@@ -270,10 +270,8 @@ def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, lim
     return Layer(arrays, is_missing, parts.taken(kept), owner[kept])
 
 
-def _overlaid(
-    subjects: Chosen, clips: Chosen, operation: Operation, limits: Limits, output: Output = "valid"
-) -> OverlayBatch:
-    found: Any = overlay_batch(subjects, clips, operation, output=output, **limits.options())
+def _overlaid(subjects: Chosen, clips: Chosen, operation: Operation, limits: Limits) -> OverlayBatch:
+    found: Any = overlay_batch(subjects, clips, operation, **limits.options())
     return cast(OverlayBatch, limits.noted(found))
 
 

@@ -16,10 +16,10 @@ from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of, check_sources
-from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
+from engine.polygon_overlay.overlay import accuracy_of, check_operation, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathered
-from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.rounds import SettledPairs, nearest_pairs, settle_pairs
+from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
 from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets
@@ -60,7 +60,6 @@ class OverlayBatch(Ragged):
     _subjects: Sequence[Solid] = field(repr=False)
     _clips: Sequence[Solid] = field(repr=False)
     _operation: Operation = field(repr=False)
-    _output: Output = field(repr=False)
     _exact: Found = field(repr=False)
     _is_rounded_again: BoolArray = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
@@ -93,10 +92,10 @@ class OverlayBatch(Ragged):
             return self._apart[pair]
         subject, clip = rings_of(self._subjects[pair]), rings_of(self._clips[pair])
         if self._is_rounded_again[pair]:
-            return overlay_rings(subject, clip, self._operation, self._output, Budget())[0]
+            return overlay_rings(subject, clip, self._operation, Budget())[0]
         one = taken(self._exact, np.array([pair]))
         exact = ImplicitRings(subject, clip, read_only(one.sources), one.ring_offsets)
-        return as_overlay(read_only(one.vertices), one.piece_offsets, float(one.displacement[0]), exact, self._output)
+        return as_overlay(read_only(one.vertices), one.piece_offsets, float(one.displacement[0]), exact)
 
     @property
     def areas(self) -> FloatArray:
@@ -150,7 +149,6 @@ def overlay_batch(
     clips: Sequence[Solid],
     operation: Operation = "intersection",
     *,
-    output: Output = "valid",
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -165,7 +163,7 @@ def overlay_batch(
     Raises: as `overlay`, and InvalidArrayError where the lengths differ. Every solid is checked before the first is
     overlaid.
     """
-    check_words(operation, output)
+    check_operation(operation)
     check_options(workers, progress, report=report)
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
         if not isinstance(solids, (list, tuple, Chosen)):
@@ -195,13 +193,13 @@ def overlay_batch(
         status, is_rounded_again, apart = rest
         ulps, n_rational = 0.5, 0
         if found.status.any():
-            found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, output, workers, budget)
+            found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, workers, budget)
     for array in (status, *found, *(first_found if first_found is not found else ())):
         array.setflags(write=False)
     batch = OverlayBatch(
         status=status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
         pair_offsets=summed(found.counts[:, 0]), displacement=found.displacement,
-        _subjects=subjects, _clips=clips, _operation=operation, _output=output, _exact=first_found,
+        _subjects=subjects, _clips=clips, _operation=operation, _exact=first_found,
         _is_rounded_again=is_rounded_again, _apart=apart,
     )  # fmt: skip
     if not report:
@@ -212,7 +210,7 @@ def overlay_batch(
 
 def _settled(
     found: Found, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
-    clips: Sequence[Solid], operation: Operation, output: Output, workers: int | None, budget: Budget,
+    clips: Sequence[Solid], operation: Operation, workers: int | None, budget: Budget,
 ) -> tuple[Found, float, int]:  # fmt: skip
     """Return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals.
 
@@ -226,7 +224,7 @@ def _settled(
     def settle(start: int, stop: int) -> None:
         some = doubtful[start * _DOUBTFUL : stop * _DOUBTFUL]
         pairs = taken(found, some)
-        more = settle_pairs(pairs, arranged_again, budget) if output == "valid" else nearest_pairs(pairs, budget)
+        more = settle_pairs(pairs, arranged_again, budget)
         settled[start] = more._replace(pairs=some[more.pairs])
 
     def overlay_alone(start: int, stop: int) -> None:
@@ -234,7 +232,7 @@ def _settled(
             budget.check()
             both = rings_of(subjects[pair]), rings_of(clips[pair])
             try:
-                alone[pair] = overlay_rings(*both, operation, output, budget)
+                alone[pair] = overlay_rings(*both, operation, budget)
             except NotRepresentableError:
                 status[pair] = NOT_REPRESENTABLE
 
@@ -272,6 +270,6 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
         displacement=read_only(np.concatenate([part.displacement for part in batches])),
         _subjects=tuple(solid for part in batches for solid in part._subjects),
         _clips=tuple(solid for part in batches for solid in part._clips), _operation=batches[0]._operation,
-        _output=batches[0]._output, _exact=joined([part._exact for part in batches]),
+        _exact=joined([part._exact for part in batches]),
         _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]), _apart=apart,
     )  # fmt: skip

@@ -27,7 +27,6 @@ from engine.polygon_overlay.compiled.workspace import keep, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, ring_numbers
 from engine.polygon_overlay.implicit_rings import ImplicitRings, rings_alone
 from engine.polygon_overlay.result import Overlay, made_overlay
-from engine.polygon_overlay.run_pair import FoundPair
 from engine.solids.checks import shown
 from engine.solids.ragged import next_in_rings, summed
 
@@ -164,7 +163,7 @@ def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None)
     return one_pair(snapped, ends, rings.piece_offsets, HALF_DIAGONAL, 0, _along(edges), status)
 
 
-def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> Overlay | None:
+def as_it_stays(found: Found, snapped: _OnGrid, grid: Grid, start: int) -> Overlay | None:
     """Return the overlay of a pair whose rings stay what they are on the grid, in the units of its input.
 
     start: of the vertices of the clip among all. The same as `settle_rings` and `from_units`; None where they do not,
@@ -177,11 +176,12 @@ def as_it_stays(found: FoundPair, snapped: _OnGrid, grid: Grid, start: int) -> O
         return None
     places, largest = grid.places_of(snapped.vertices)
     has_moved = snapped.n_moved > 0 or snapped.edges is not None
-    displacement = nextafter(found.displacement + HALF_DIAGONAL, inf) if has_moved else found.displacement
+    moved = found.displacement.item()
+    displacement = nextafter(moved + HALF_DIAGONAL, inf) if has_moved else moved
     return made_overlay(
         places, snapped.offsets, found.piece_offsets, rings_alone(places, snapped.offsets),
         largest_displacement=_displacement(displacement, grid, largest),
-        rounds=int(found.displacement > 0.0) + int(has_moved), snapped=has_moved, vertices_moved=snapped.n_moved,
+        rounds=int(moved > 0.0) + int(has_moved), snapped=has_moved, vertices_moved=snapped.n_moved,
         _edges=found.sources if snapped.edges is None else found.sources[snapped.edges], _starts=np.array([start]),
     )  # fmt: skip
 

@@ -32,17 +32,16 @@ from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import Found, one_pair, ring_sizes
 from engine.polygon_overlay.grid import snapped_to_units
-from engine.polygon_overlay.result import Output, Overlay
-from engine.polygon_overlay.rounds import leave_nearest, settle_rings
-from engine.polygon_overlay.run import KEPT, Operation
-from engine.polygon_overlay.run_pair import UNNAMED
+from engine.polygon_overlay.result import Overlay
+from engine.polygon_overlay.rounds import settle_rings
+from engine.polygon_overlay.run import KEPT, UNNAMED, Operation
 
 _Sources = frozenset[int]
 
 
 def overlay_exactly(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
-    nesting: Nesting = UNNAMED, is_on_grid: bool = False,
+    subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
+    is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:  # fmt: skip
     """Return the overlay of checked rings (either may be empty), and how many pairs of edges the filter left open."""
     subdivision, inside = _labelled(subject, clip, KEPT[operation], budget, nesting)
@@ -52,15 +51,11 @@ def overlay_exactly(
     corners = [[arrangement.origin(half_edge) for half_edge in ring] for ring in rings_of(pieces)]
     exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in corners), nodes.exponent)
     first = rounded(arrangement, pieces)
-    if output == "nearest":
-        result = leave_nearest(first, exact, budget)
-    else:
-        moved = first.displacement
-        first = first._replace(displacement=np.where(moved, np.nextafter(moved, np.inf), 0.0))
-        settled = settle_rings(first, exact, arranged_again, True, budget, snapped_to_units if is_on_grid else None)
-        if settled is None:
-            raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
-        result = settled
+    moved = first.displacement
+    first = first._replace(displacement=np.where(moved, np.nextafter(moved, np.inf), 0.0))
+    result = settle_rings(first, exact, arranged_again, True, budget, snapped_to_units if is_on_grid else None)
+    if result is None:
+        raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
     return replace(result, _starts=np.array([len(subject.vertices)])), arrangement.n_exact
 
 

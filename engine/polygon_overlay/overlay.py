@@ -14,7 +14,7 @@ M. Sharir, Arrangements, Handbook of Discrete and Computational Geometry, 2018.
 
 from __future__ import annotations
 
-from typing import Final, Literal, Unpack, overload
+from typing import Literal, Unpack, overload
 
 import numpy as np
 
@@ -25,15 +25,20 @@ from engine.polygon_overlay.compiled.boundary.ring_nesting import Nesting
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.result import Output, Overlay, OverlayOptions
-from engine.polygon_overlay.run import KEPT, KEPT_ARRAYS, Operation, arranged_again, overlay_compiled
-from engine.polygon_overlay.run_pair import UNNAMED, overlay_few
+from engine.polygon_overlay.result import Overlay, OverlayOptions
+from engine.polygon_overlay.run import (
+    KEPT,
+    KEPT_ARRAYS,
+    UNNAMED,
+    Operation,
+    arranged_again,
+    overlay_compiled,
+    overlay_few,
+)
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.types import Accuracy
-
-_OUTPUTS: Final = ("valid", "nearest")
 
 
 @overload
@@ -54,7 +59,6 @@ def overlay(
     clip: Solid,
     operation: Operation = "intersection",
     *,
-    output: Output = "valid",
     grid: float | None = None,
     workers: int | None = None,
     deadline: float | None = None,
@@ -68,15 +72,14 @@ def overlay(
     have no area. For a convex region, a connected result and 3D there is `clip_polygons`.
 
     Parameters: subject, clip: `Polygon`, even-odd over all rings. operation: "intersection", "union", "difference"
-    (subject without clip) or "symmetric_difference". output: "valid" (default): simple rings that cross nowhere, holes
-    inside their shells; "nearest": every vertex the correctly rounded one and no more, which may be invalid. grid: snap
-    the valid result to multiples of a power of two or ten (the doubles nearest to these), so that borders that nearly
-    coincide do; no edge moves by more than 0.71 of it and a unit in the last place; with it `area` is the output's,
-    counts and `collapsed` go from the overlay before it to the output. deadline in seconds; cancel: a switch for other
-    threads; workers is accepted and not used, one overlay runs in one thread; progress is called with 1 at the end.
-    Returns: `Overlay`; with report=True also an `Accuracy`, whose items are the edges of the input, and whose
-    coordinates_ulp is 0.5 unless vertices were moved to keep rings valid: then it is the largest displacement in units
-    in the last place of the largest coordinate.
+    (subject without clip) or "symmetric_difference". grid: snap the result to multiples of a power of two or ten (the
+    doubles nearest to these), so that borders that nearly coincide do; no edge moves by more than 0.71 of it and a unit
+    in the last place; with it `area` is the output's, counts and `collapsed` go from the overlay before it to the
+    output. deadline in seconds; cancel: a switch for other threads; workers is accepted and not used, one overlay runs
+    in one thread; progress is called with 1 at the end.
+    Returns: `Overlay`: simple rings that cross nowhere, holes inside their shells; with report=True also an `Accuracy`,
+    whose items are the edges of the input, and whose coordinates_ulp is 0.5 unless vertices were moved to keep rings
+    valid: then it is the largest displacement in units in the last place of the largest coordinate.
     Boundary: pieces are the connected parts of the open interior. Parts that meet in one point are separate, a hole
     that touches its shell in a point stays a hole, walls between parts, spikes and shared edges vanish.
     Degenerate input: rings without area add nothing; an empty result has no pieces. Vertices on a straight stretch of
@@ -96,17 +99,16 @@ def overlay(
     (4.0, [[2.0, 2.0], [4.0, 2.0], [4.0, 4.0], [2.0, 4.0]])
     """
     if type(subject) is Polygon and type(clip) is Polygon and report is False and grid is None:
-        is_known = isinstance(operation, str) and isinstance(output, str) and output in _OUTPUTS
-        kept = KEPT_ARRAYS.get(operation) if is_known else None
+        kept = KEPT_ARRAYS.get(operation) if isinstance(operation, str) else None
         if kept is not None and is_unlimited(workers, deadline, cancel, progress):
-            few = overlay_few(subject, clip, kept, output)
+            few = overlay_few(subject, clip, kept)
             if few is not None:
                 return few
-    check_words(operation, output)
+    check_operation(operation)
     first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
     check_options(workers, progress, report=report)
     with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
-        result, n_exact, n_rational = overlay_rings(first, second, operation, output, budget, UNNAMED, grid)
+        result, n_exact, n_rational = overlay_rings(first, second, operation, budget, UNNAMED, grid)
     if progress is not None:
         progress(1)
     if not report:
@@ -115,11 +117,11 @@ def overlay(
     return result, accuracy_of(ulps_moved(result), n_edges, n_exact, n_rational)
 
 
-def check_words(operation: str, output: str) -> None:
-    if not (isinstance(operation, str) and operation in KEPT and isinstance(output, str) and output in _OUTPUTS):
-        for value, known, name in ((operation, KEPT, "operation"), (output, _OUTPUTS, "output")):
-            if not isinstance(value, str) or value not in known:
-                raise InvalidOperationError(f"{name} must be one of {', '.join(known)}; got {shown(value)}", (name,))
+def check_operation(operation: str) -> None:
+    if not isinstance(operation, str) or operation not in KEPT:
+        raise InvalidOperationError(
+            f"operation must be one of {', '.join(KEPT)}; got {shown(operation)}", ("operation",)
+        )
 
 
 def rings_of(solid: object, *where: str | int) -> RingArrays:
@@ -135,8 +137,8 @@ def rings_of(solid: object, *where: str | int) -> RingArrays:
 
 
 def overlay_rings(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
-    nesting: Nesting = UNNAMED, grid: float | None = None,
+    subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
+    grid: float | None = None,
 ) -> tuple[Overlay, int, int]:  # fmt: skip
     """Return the overlay of checked rings (either may be empty), pairs of edges beyond the filter, and in rationals.
 
@@ -145,15 +147,13 @@ def overlay_rings(
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
     if units is not None:
-        if output != "valid":
-            raise InvalidOperationError(f'a grid goes with output="valid" only; got {shown(output)}', ("output",))
         first = RingArrays(units.units_of(subject.vertices), subject.offsets)
         second = RingArrays(units.units_of(clip.vertices), clip.offsets)
-    compiled = overlay_compiled(first, second, operation, output, budget, nesting, units)
+    compiled = overlay_compiled(first, second, operation, budget, nesting, units)
     if compiled is not None:
         result, n_exact, n_rational = *compiled, 0
     else:
-        result, n_exact = overlay_exactly(first, second, operation, output, budget, nesting, units is not None)
+        result, n_exact = overlay_exactly(first, second, operation, budget, nesting, units is not None)
         n_rational = n_exact
         if units is not None:
             result = from_units(result, units, len(subject.vertices), arranged_again, budget)

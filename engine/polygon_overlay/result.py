@@ -21,13 +21,10 @@ from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.solids.checks import as_nested_offsets
 from engine.solids.ragged import as_geojson
 
-Output = Literal["valid", "nearest"]
-
 
 class OverlayOptions(Options, total=False):
     """What overlays take by keyword beside."""
 
-    output: Output
     grid: float | None
 
 
@@ -128,7 +125,6 @@ class Overlay:
     piece_offsets: (n_pieces + 1,) int64 into the rings; the first ring of a piece is its shell, counter-clockwise, the
         others its holes, clockwise. Each ring begins at its leftmost, then lowest vertex; pieces and holes are in
         lexicographic order.
-    output: "valid" or "nearest", as asked for; may_be_invalid: "nearest" was asked for and rounding moved a vertex.
     n_pieces_exact, n_holes_exact: how many the exact result has, before rounding.
     pieces_joined, holes_joined: by how many the count fell because parts closer than rounding grew together.
     pieces_parted, holes_parted: by how many it rose because parts fell apart, or rounding enclosed a new hole.
@@ -138,7 +134,7 @@ class Overlay:
     largest_displacement: proven bound on the distance between an edge of the exact result and its image.
     snapped: the coarser lattice of snap rounding was needed.
     exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
-    _later: makes fields that are not there yet (run_pair.py); missing: all are.
+    _later: makes fields that are not there yet (run.py); missing: all are.
     _lost: of what `collapsed` is made when asked for; None where rounding lost nothing.
     _edges: by vertex the input edge along which its ring goes on, by its first vertex; or sources, as
         ``exact`` has them, that tell; None: those.
@@ -151,8 +147,6 @@ class Overlay:
     n_pieces_exact: int
     n_holes_exact: int
     exact: Exact
-    output: Output = "valid"
-    may_be_invalid: bool = False
     _lost: Lost | None = field(default=None, repr=False)
     _edges: npt.NDArray[np.signedinteger] | None = field(default=None, repr=False)
     _starts: IntArray | None = field(default=None, repr=False)

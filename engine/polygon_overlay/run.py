@@ -1,28 +1,43 @@
-"""Runs the compiled overlay on pairs of polygons, and gathers what it leaves as flat arrays."""
+"""Runs the compiled overlay on pairs of polygons, and gathers what it leaves as flat arrays.
+
+Small overlays are called so often that what stands around the kernel counts, of which an array made, or a tuple with
+names, takes a tenth of the whole call: `overlay_few` calls the kernel directly for two small polygons, and what it
+leaves stays bytes until it is asked for.
+"""
 
 from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray, read_only
-from engine.budget import Budget
+from engine.budget import UNLIMITED, Budget
 from engine.direct import entry_of
-from engine.polygon_overlay.compiled.boundary.ring_nesting import AGAIN, Nesting
-from engine.polygon_overlay.compiled.kernel import DONE, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
-from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.workspace import Outcomes, first_contacts, keep, more_contacts, scratch_for
-from engine.polygon_overlay.found import Found, one_pair, put_together, ring_sizes
+from engine.polygon_overlay.compiled.boundary.ring_nesting import AGAIN, PAIR, Nesting
+from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
+from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
+from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
+from engine.polygon_overlay.compiled.workspace import (
+    FEW_VERTICES,
+    Outcomes,
+    first_contacts,
+    keep,
+    more_contacts,
+    scratch_for,
+    scratch_for_few,
+    spare,
+)
+from engine.polygon_overlay.found import Found, put_together, ring_sizes
 from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
-from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings
+from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings, one_polygon
 from engine.polygon_overlay.polygon_arrays import PolygonArrays
-from engine.polygon_overlay.result import Output, Overlay, made_overlay
-from engine.polygon_overlay.rounds import leave_nearest, settle_rings
-from engine.polygon_overlay.run_pair import BY_CONTACT, NOT_REDUCED, UNNAMED, run_pair
+from engine.polygon_overlay.result import Overlay, made_overlay
+from engine.polygon_overlay.rounds import settle_rings
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
 from engine.types import OPEN
 
@@ -37,6 +52,23 @@ KEPT: Final = {  # by the label of a face: in neither, in the subject, in the cl
 KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
 EACH_PART: Final = np.arange(4, dtype=np.uint8)
 """Keeps what lies in the subject alone, in the clip alone and in both, as parts 1, 2 and 3 of one result."""
+NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
+"""What stands in the place of the result of reduce_pair."""
+UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), PAIR)
+"""That of two polygons."""
+_MANY: Final = 500
+"""Vertices of a pair from which on blocks of edges are looked at first."""
+_MANY_IN_RING: Final = 64
+"""The same by ring: blocks of small rings are no better than their edges."""
+_BLOCK: Final = 16
+_BLOCKS_GROW: Final = 10_000
+"""Edges of a block, and vertices from which on it has twice as many: less to look at, and more around a crossing."""
+_MOST: Final = 0.5
+"""Part of all edges that may be looked at one by one so that leaving out the others pays."""
+_BY_CONTACT: Final = 300
+_BY_VERTEX: Final = 200
+"""Bytes of scratch and answer for each of them, at most."""
+_FEW_CONTACTS: Final = 1024
 
 
 def run_kernel(
@@ -47,20 +79,49 @@ def run_kernel(
     kept: as `overlay_pairs` takes it, one of `KEPT_ARRAYS`, or `EACH_PART`.
     nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
     """
-    n = len(subjects.polygon_offsets) - 1
     n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
-    sides = RingArrays(*subjects[:2]), subjects.polygon_offsets, RingArrays(*clips[:2]), clips.polygon_offsets
+    is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == PAIR and kept[3] < 2
+    if is_plain and n_vertices >= max(_MANY, _MANY_IN_RING * n_rings):
+        size = _BLOCK if n_vertices < _BLOCKS_GROW else 2 * _BLOCK
+        found = run_blocks(subjects, clips, (n_vertices, n_rings), kept, budget, UNNAMED, size)
+        if found is not None:
+            return found
+    return cast("Found", run_blocks(subjects, clips, (n_vertices, n_rings), kept, budget, nesting))
+
+
+def run_blocks(
+    subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], kept: FlagArray, budget: Budget,
+    nesting: Nesting = UNNAMED, size: int = 0, most: float = _MOST,
+) -> Found | None:  # fmt: skip
+    """Overlay polygons pair by pair; with a size one pair in blocks of so many edges, of which fewer than a part `most`
+    may be looked at one by one. largest: the most vertices, and rings, of a pair.
+
+    Then None where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for
+    are to be arranged again, with all their vertices.
+    """
+    n, (n_vertices, n_rings) = len(subjects.polygon_offsets) - 1, largest
+    first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
-    reached = 0
+    reached, reduced = 0, NOT_REDUCED
     parts: list[list[Any]] = []
-    n_contacts = first_contacts(n_vertices)
-    n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
+    n_contacts, n_out, n_out_rings = _FEW_CONTACTS, 0, 0
+    if not size:
+        n_contacts = first_contacts(n_vertices)
+        n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
     while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
+        if size:
+            n_most = int(most * n_vertices)
+            reduced = entry_of(reduce_pair)(first, second, size, n_most, kept, budget.flag, scratch.words)
+            if reduced.n == 0:
+                budget.check()
+                keep(scratch)
+                return None
         n_known = sum(len(part[2]) - 1 for part in parts)
-        reached, needs, filled, n_filled, n_pieces, n_evidence, _ = entry_of(overlay_pairs)(
-            *sides, reached, NOT_REDUCED, kept, nesting, budget.flag, scratch.words, outcomes
-        )
+        reached, needs, filled, n_filled, n_pieces, n_evidence, n_left_out = entry_of(overlay_pairs)(
+            first, subjects.polygon_offsets, second, clips.polygon_offsets, reached, reduced, kept, nesting,
+            budget.flag, scratch.words, outcomes,
+        )  # fmt: skip
         budget.check()
         sizes = filled, filled, n_filled + 1, n_pieces + 1, n_evidence
         parts.append([array[:size].copy() for array, size in zip(scratch.output, sizes, strict=True)])
@@ -68,23 +129,44 @@ def run_kernel(
         keep(scratch)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
-            budget.take(BY_CONTACT * n_contacts)
+            budget.take(_BY_CONTACT * n_contacts)
         elif needs == NEEDS_OUTPUT:
             n_out_rings, n_out = (max(m, int(outcomes.counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
+        elif size and outcomes.status[0] != DONE:
+            return None
+        elif n_left_out:
+            outcomes.counts[0, 2] += n_left_out
+            parts[-1][:3] = _expanded(parts[-1], n_left_out, first, second, budget)
     return Found(*outcomes, *(parts[0] if len(parts) == 1 else put_together(parts)))
 
 
+def _expanded(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> list[Any]:
+    """Return vertices, sources and offsets of rings with what was left out of them."""
+    n = len(part[0]) + n_left_out
+    made = [np.empty((n, 2)), np.empty((n, 2), np.int32), np.empty_like(part[2])]
+    entry_of(expand_rings)(*part[:3], subject.vertices, clip.vertices, budget.flag, *made)
+    budget.check()
+    return made
+
+
+def _run_pair(subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting) -> Found:
+    if (n_vertices := len(subject.vertices) + len(clip.vertices)) >= _MANY:
+        budget.take(_BY_VERTEX * n_vertices)
+    first, second = (PolygonArrays(*side, one_polygon(len(side.offsets) - 1)) for side in (subject, clip))
+    return run_kernel(first, second, KEPT_ARRAYS[operation], budget, nesting)
+
+
 def overlay_compiled(
-    subject: RingArrays, clip: RingArrays, operation: Operation, output: Output, budget: Budget,
-    nesting: Nesting = UNNAMED, grid: Grid | None = None,
+    subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
+    grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
     """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
 
     grid: whose units coordinates are in; those of the overlay are not. A scene outside of the kernel's range is brought
     into it by a power of two where that is exact.
     """
-    found, exponent = run_pair(subject, clip, KEPT_ARRAYS[operation], budget, nesting), 0
-    if found.status == OPEN:
+    found, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
+    if found.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0 or grid is not None:
             return None
@@ -92,25 +174,23 @@ def overlay_compiled(
         if first is None or second is None:
             return None
         near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
-        found = run_pair(*near, KEPT_ARRAYS[operation], budget, nesting)
-        if found.status == OPEN:
+        found = _run_pair(*near, operation, budget, nesting)
+        if found.status[0] == OPEN:
             return None
     result: Overlay | None = None
+    arrays: Any = found[3:7]
+    for array in arrays:
+        array.setflags(False)  # write: by its name it takes twice as long
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
     known = None
-    if found.status == DONE and grid is None:
-        result = as_overlay(found.vertices, found.piece_offsets, found.displacement, exact, output)
-    elif found.status == DONE and grid is not None:
+    if found.status[0] == DONE and grid is None:
+        result = as_overlay(found.vertices, found.piece_offsets, found.displacement.item(), exact)
+    elif found.status[0] == DONE and grid is not None:
         known = snap_vertices(found.vertices, found.ring_offsets, found.piece_offsets, budget)
         result = as_it_stays(found, known, grid, len(subject.vertices))
     if result is None:
-        rings = found.ring_offsets, found.piece_offsets
-        rounded = one_pair(found.vertices, *rings, found.displacement, found.n_exact, found.sources, found.status)
-        if output == "nearest":
-            result = leave_nearest(rounded, exact, budget)
-        else:
-            snap = grid and functools.partial(snapped_to_units, known=known)
-            result = settle_rings(rounded, exact, arranged_again, exponent == 0, budget, snap)
+        snap = grid and functools.partial(snapped_to_units, known=known)
+        result = settle_rings(found, exact, arranged_again, exponent == 0, budget, snap)
         if result is None:
             return None
         if grid is not None:
@@ -122,7 +202,7 @@ def overlay_compiled(
         moved = result.largest_displacement
         displacement = float(np.nextafter(np.ldexp(moved, exponent), np.inf)) if moved else 0.0
         result = replace(result, vertices=read_only(vertices), largest_displacement=displacement)
-    return result, found.n_exact
+    return result, int(found.counts[0, 3])
 
 
 def arranged_again(rings: Found, budget: Budget) -> Found:
@@ -136,10 +216,49 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     return run_kernel(subjects, none, KEPT_ARRAYS["union"], budget, nesting)
 
 
-def as_overlay(
-    vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings, output: Output
-) -> Overlay:
+def as_overlay(vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings) -> Overlay:
     """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
-    has_moved = displacement > 0.0
-    told = {"output": output, "may_be_invalid": output == "nearest" and has_moved, "rounds": int(has_moved)}
-    return made_overlay(vertices, exact.offsets, piece_offsets, exact, largest_displacement=displacement, **told)
+    told = {"largest_displacement": displacement, "rounds": int(displacement > 0.0)}
+    return made_overlay(vertices, exact.offsets, piece_offsets, exact, **told)
+
+
+def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray) -> Overlay | None:
+    """Return the overlay of two polygons, without a limit; None of more vertices, or where the kernel leaves doubt."""
+    first, second = RingArrays(subject.vertices, subject.ring_offsets), RingArrays(clip.vertices, clip.ring_offsets)
+    if len(first.vertices) + len(second.vertices) > FEW_VERTICES:
+        return None
+    scratch = scratch_for_few()
+    items = one_polygon(len(first.offsets) - 1), one_polygon(len(second.offsets) - 1)
+    _, needs, n, n_rings, n_pieces, _, _ = entry_of(overlay_pairs)(
+        first, items[0], second, items[1], 0, NOT_REDUCED, kept, UNNAMED, UNLIMITED.flag, scratch.words, scratch.outcome
+    )
+    status, _, displacement = scratch.outcome
+    is_done, moved_by, left = needs == FINISHED and status.item(0) == DONE, displacement.item(0), scratch.output
+    vertices, sources, rings = left.vertices[:n].tobytes(), left.sources[:n].tobytes(), None
+    if n_rings != 1:
+        rings = left.rings[: n_rings + 1].tobytes(), left.pieces[: n_pieces + 1].tobytes()
+    spare.append(scratch)
+    if not is_done:
+        return None
+    told: dict[str, Any] = {"_later": functools.partial(_fields, first, second, vertices, sources, rings)}
+    if moved_by > 0.0:
+        told |= {"rounds": 1, "largest_displacement": moved_by}
+    result = object.__new__(Overlay)
+    object.__setattr__(result, "__dict__", told)
+    return result
+
+
+def _fields(
+    subject: RingArrays, clip: RingArrays, vertices: bytes, sources: bytes, rings: tuple[bytes, bytes] | None
+) -> dict[str, Any]:
+    """Return the fields of an `Overlay` that are made when one of them is asked for."""
+    places = np.frombuffer(vertices).reshape(-1, 2)
+    ring_offsets, piece_offsets = one_polygon(len(places)), one_polygon(1)
+    if rings is not None:
+        ring_offsets, piece_offsets = (np.frombuffer(each, np.int64) for each in rings)
+    exact = ImplicitRings(subject, clip, np.frombuffer(sources, np.int32).reshape(-1, 2), ring_offsets)
+    n_pieces = len(piece_offsets) - 1
+    return {
+        "vertices": places, "ring_offsets": ring_offsets, "piece_offsets": piece_offsets, "exact": exact,
+        "n_pieces_exact": n_pieces, "n_holes_exact": len(ring_offsets) - 1 - n_pieces,
+    }  # fmt: skip

@@ -26,9 +26,9 @@ from engine.polygon_overlay.compiled.boundary.ring_nesting import (
 )
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.implicit_rings import NOTHING
-from engine.polygon_overlay.overlay import accuracy_of, check_words, overlay_rings, rings_of, ulps_moved
+from engine.polygon_overlay.overlay import accuracy_of, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import gathered
-from engine.polygon_overlay.result import Output, Overlay, OverlayOptions
+from engine.polygon_overlay.result import Overlay, OverlayOptions
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -49,7 +49,6 @@ def union_all(
 def union_all(
     polygons: Sequence[Solid],
     *,
-    output: Output = "valid",
     grid: float | None = None,
     workers: int | None = None,
     deadline: float | None = None,
@@ -72,12 +71,11 @@ def union_all(
     >>> union_all(squares).pieces[0].shell.tolist()
     [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]]
     """
-    check_words("union", output)
     check_options(workers, progress, report=report)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(f"polygons must be a list of polygons, got {type(polygons).__name__}", ("polygons",))
     with Budget(deadline, cancel) as budget:
-        result, accuracy = _arranged(polygons, ANY, output, budget, grid)
+        result, accuracy = _arranged(polygons, ANY, budget, grid)
     if progress is not None:
         progress(1)
     return (result, accuracy) if report else result
@@ -85,7 +83,7 @@ def union_all(
 
 def less_all(subject: Polygon, clips: Sequence[Polygon], budget: Budget) -> tuple[Overlay, Accuracy]:
     """Return what is left of a polygon, which has rings, without any of some others, which may overlap each other."""
-    return _arranged([subject, *clips], FIRST_ALONE, "valid", budget)
+    return _arranged([subject, *clips], FIRST_ALONE, budget)
 
 
 def filled(rings: object, rule: FillRule, *, deadline: float | None = None, cancel: Cancel | None = None) -> Polygon:
@@ -96,7 +94,7 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
     within.
     Returns: a valid polygon: simple rings that cross nowhere, shells counter-clockwise, holes clockwise. No rings where
     nothing is enclosed. Points without area (spikes, rings there and back) are not kept.
-    Accuracy: decisions exact; crossings are rounded as those of `overlay` with output="valid".
+    Accuracy: decisions exact; crossings are rounded as those of `overlay`.
     Cost: that of `union_all`. Raises: as `Polygon`, InvalidOperationError, DeadlineExceededError, CancelledError.
 
     >>> twice = [[(0, 0), (2, 0), (2, 2), (0, 2)], [(1, 1), (3, 1), (3, 3), (1, 3)]]
@@ -108,17 +106,17 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
     given = rings_of(Polygon(rings))
     nesting = Nesting(np.zeros(len(given.offsets) - 1, np.int64), np.zeros(0), _RULES[rule])
     with Budget(deadline, cancel) as budget:
-        result, _, _ = overlay_rings(given, NOTHING, "union", "valid", budget, nesting)
+        result, _, _ = overlay_rings(given, NOTHING, "union", budget, nesting)
     return Polygon(result.rings)
 
 
 def _arranged(
-    polygons: Sequence[Solid], rule: int, output: Output, budget: Budget, grid: float | None = None
+    polygons: Sequence[Solid], rule: int, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
     """Arrange the rings of all polygons, each a source of its own."""
     rings, sources, starts = _together(polygons)
     nesting = Nesting(sources, np.zeros(0), rule)
-    result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", output, budget, nesting, grid)
+    result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", budget, nesting, grid)
     object.__setattr__(result, "_starts", starts)
     return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
 

@@ -23,13 +23,14 @@ from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS, near_triangles
 from engine.predicates.cut_point import T_BOUND
 from engine.predicates.double_double import dd_div, dd_sub
-from engine.scenes.posed_cut import in_frame, put_point, slack_of
+from engine.scenes.posed_cut import in_frame
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_streams import local_segment, shear_of
 from engine.segment_clipping.on_boundary.touching_cut import Crossings, sort_crossings
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact, triangle_at
+from engine.segment_clipping.pieces import put_point, slack_of
 from engine.types import UNDECIDED, Point3
 
 UNSURE: Final = -1

@@ -28,13 +28,13 @@ from engine.scenes.near_boxes import (
     tree_in,
     way_of,
 )
-from engine.scenes.posed_cut import between_planes, in_ball, put_piece
+from engine.scenes.posed_cut import between_planes, in_ball
 from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
 from engine.scenes.scratch import MOST_MET, scratch_at
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_streams import AHEAD
-from engine.segment_clipping.pieces import Pieces
+from engine.segment_clipping.pieces import Pieces, put_piece
 from engine.types import OPEN
 
 UNREADY: Final = -1

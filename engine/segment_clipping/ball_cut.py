@@ -1,140 +1,209 @@
-"""The points where segments enter and leave a ball, each coordinate the nearest double.
+"""Segments on a closed ball, in the plane too: the interval between two roots of a quadratic, 2D and 3D.
 
-A point is found from t in doubles by one step of Newton whose residual F(t) is taken in double-double: the root lies
-within (E_F + s E_G + A s^2) / |F'| of t - F / F', where E bounds the errors of F and F' and s the step. F is convex
-and quadratic, so that is a proof for whatever t came in, and no square root has to be precise.
+With d = q - p and f = p - c the points of the ball have
 
-What is not sure goes to integers and their square roots (profiles.py).
+    a t^2 + 2 b t + c' <= 0,     a = d.d,  b = d.f,  c' = f.f - r^2,     t = (-b -+ sqrt(D)) / a,     D = b^2 - a c'
+
+The signs of c' and of a + 2 b + c' say which ends are within. With both without, the ball is met exactly if D >= 0 and
+the foot of the centre lies between the ends: b < 0 < a + b. Doubles with a bound settle most segments, double-doubles
+those that are nearly tangent or nearly end on the sphere. What is still open (tangents, ends on the sphere, a
+coordinate that may round either way) goes to integers and their square roots (profiles.py).
+
+blur: the centre of a ball that is placed is off by so much a coordinate. Sums of products in doubles lose 6 u of their
+size, in double-doubles 12 u^2 (u = 2^-53).
+
+Source: the textbook's exercise, a segment on a sphere.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from engine.jit import called, inline, kernel, merged
-from engine.predicates.cut_point import TINY as CUT_TINY
-from engine.predicates.cut_point import point_along
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul
-from engine.predicates.error_free import fast_two_sum, two_diff, two_prod, two_sum
-from engine.segment_clipping.ball_interval import (
-    DOT_BOUND,
-    TINY,
-    axis_terms,
-    center_of,
-    dd_dot,
-    discriminant,
-    is_ball_safe,
+from engine.jit import called, inline, kernel
+from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub
+from engine.predicates.error_free import fma, two_diff, two_prod
+from engine.segment_clipping.on_boundary.crossing_values import Vector
+from engine.segment_clipping.pieces import (
+    OWN_END,
+    OWN_START,
+    End,
+    Pieces,
+    Triple,
+    point_of,
+    put_piece,
+    slack_of,
 )
-from engine.segment_clipping.pieces import Pieces, Triple, point_of, put_end, put_own_end
+from engine.types import UNDECIDED
 
-RESIDUAL_BOUND: Final = 48.0 * U2
-"""Of F, times the sum of (|p - c| + |t d|)^2 and r^2: a place carries 8 u^2 of its size, from three roundings of tails,
-its square twice that and 5 u^2; four sums have 4 u^2 each."""
-RESIDUAL_TINY: Final = 2.0**-1060
-"""Products of F that underflow."""
-SLOPE_BOUND: Final = 16.0 * 2.0**-53
-"""Of F' = 2 d.(x - c) in doubles, times the sum of absolute terms."""
+_LOST: Final = 2.0**-1060
+"""What sums of products lose where these underflow."""
+
+Pair = tuple[float, float]
 
 
-@merged
-def root_in_doubles(p: Triple, q: Triple, c: Triple, rr: float, side: int) -> float:
-    """Return one root of the quadratic in doubles, by the form of it that does not cancel."""
-    fx, _, dx = axis_terms(p[0], q[0], c[0])
-    fy, _, dy = axis_terms(p[1], q[1], c[1])
-    fz, _, dz = axis_terms(p[2], q[2], c[2])
-    x, y, z = dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx
-    dd, df, cross = dx * dx + dy * dy + dz * dz, dx * fx + dy * fy + dz * fz, x * x + y * y + z * z
-    root = math.sqrt(max(0.0, dd * rr - cross))
-    outer = -df - root if df > 0.0 else root - df  # the root of larger size, times A
-    if (side == 1) == (df <= 0.0):
-        return outer / dd
-    return (fx * fx + fy * fy + fz * fz - rr) / outer
+class _Quadratic(NamedTuple):
+    """a, 2 b and c' of the quadratic, its value at 1, D, and how far each may be off."""
+
+    a: Pair
+    b: Pair
+    c: float
+    at_q: float
+    gap: Pair
+    a_bound: float
+    b_bound: float
+    c_bound: float
+    q_bound: float
+    gap_bound: float
 
 
 @inline
-def place_on(p: float, q: float, c: float, t: float) -> tuple[float, float, float, float]:
-    """Return one coordinate of p + t (q - p) - c as a double-double, its size |p - c| + |t (q - p)|, and q - p."""
-    dh, dl = two_diff(q, p)
-    mh, ml = two_prod(t, dh)
-    fh, fl = two_diff(p, c)
-    h, low = two_sum(fh, mh)
-    h, low = fast_two_sum(h, low + ((fl + ml) + t * dl))
-    return h, low, abs(fh) + abs(mh), dh
+def difference(p: Triple, q: Triple) -> Vector:
+    """Return q - p."""
+    return two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2])
 
 
 @inline
-def coordinate_at(p: float, q: float, t: float, step: float, slack: float) -> tuple[float, bool]:
-    """Return p + (t + step) (q - p) and whether it is surely the nearest double; the step is known within `slack`."""
-    if p == q:
-        return p, True
-    sh, low, mh, dh = point_along(p, q, t, step)
-    bound = 24.0 * U2 * (abs(p) + abs(mh)) + (1.01 * slack + 4.0 * 2.0**-53 * abs(step)) * abs(dh) + CUT_TINY
-    return sh + low, sh + (low - bound) == sh + (low + bound)
+def sign_of(value: float, bound: float) -> int:
+    """Return the sign of what a value is that may be off by a bound, or UNDECIDED."""
+    if value > bound:
+        return 1
+    return -1 if value < -bound else UNDECIDED
 
 
 @inline
-def newton_step(p: Triple, q: Triple, c: Triple, radius: float, t: float, side: int) -> tuple[float, float, bool]:
-    """Return the step from `t` to the root where the ball is entered (side 0) or left, its bound, and if that holds.
-
-    Caller guarantees that there are roots. With the sign of F' that the root has, it is at most 2 |F / F'| away.
-    """
-    x, xl, x_size, dx = place_on(p[0], q[0], c[0], t)
-    y, yl, y_size, dy = place_on(p[1], q[1], c[1], t)
-    z, zl, z_size, dz = place_on(p[2], q[2], c[2], t)
-    h, low = two_prod(-radius, radius)
-    size = -h
-    for place, tail in ((x, xl), (y, yl), (z, zl)):
-        sh, sl = dd_mul(place, tail, place, tail)
-        h, low = dd_add(h, low, sh, sl)
-    size += x_size * x_size + y_size * y_size + z_size * z_size
-    slope = 2.0 * (dx * x + dy * y + dz * z)
-    slope_bound = SLOPE_BOUND * (abs(dx) * x_size + abs(dy) * y_size + abs(dz) * z_size) + TINY
-    steepness = -slope if side == 0 else slope
-    bound = RESIDUAL_BOUND * size + RESIDUAL_TINY
-    step = -h / slope
-    away = 4.2 * (abs(h) + bound) / abs(slope)
-    curve = 1.01 * (dx * dx + dy * dy + dz * dz)
-    slack = 1.01 * (bound + away * (slope_bound + away * curve)) / abs(slope) + 4.0 * 2.0**-53 * abs(step)
-    return step, slack, steepness > 2.0 * slope_bound
+def _size(v: Vector) -> float:
+    return abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0])
 
 
-@merged
-def cut_by_ball(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tuple[float, float, float, float, bool]:
-    """Return where p q enters the ball (side 0) or leaves it, t there, and whether all is surely nearest."""
-    guess = root_in_doubles(p, q, c, radius * radius, side)
-    step, slack, sure = newton_step(p, q, c, radius, guess, side)
-    x, is_x = coordinate_at(p[0], q[0], guess, step, slack)
-    y, is_y = coordinate_at(p[1], q[1], guess, step, slack)
-    z, is_z = coordinate_at(p[2], q[2], guess, step, slack)
-    is_t = guess + (step - slack) == guess + (step + slack)
-    return x, y, z, guess + step + 0.0, sure & is_x & is_y & is_z & is_t
+@inline
+def _dot(a: Vector, b: Vector) -> Pair:
+    xh, xl = dd_mul(a[0][0], a[0][1], b[0][0], b[0][1])
+    yh, yl = dd_mul(a[1][0], a[1][1], b[1][0], b[1][1])
+    zh, zl = dd_mul(a[2][0], a[2][1], b[2][0], b[2][1])
+    xh, xl = dd_add(xh, xl, yh, yl)
+    return dd_add(xh, xl, zh, zl)
+
+
+@inline
+def _in_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
+    """Return the quadratic by the heads of the pairs."""
+    d_size, f_size = _size(d), _size(f)
+    a = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[2][0] * d[2][0]
+    b = d[0][0] * f[0][0] + d[1][0] * f[1][0] + d[2][0] * f[2][0]
+    c = f[0][0] * f[0][0] + f[1][0] * f[1][0] + f[2][0] * f[2][0] - radius * radius
+    a_bound, b_bound = 2.0**-50 * a + _LOST, (2.0**-50 * f_size + 1.01 * blur) * d_size + _LOST
+    c_bound = 2.0**-50 * (f_size * f_size + radius * radius) + 2.02 * blur * (f_size + 2.0 * blur) + _LOST
+    q_bound = 1.01 * (a_bound + 2.0 * b_bound + c_bound) + 2.0**-50 * (a + 2.0 * abs(b) + abs(c))
+    gap_bound = 1.01 * ((2.0 * abs(b) + b_bound) * b_bound + a * c_bound + (abs(c) + c_bound) * a_bound)
+    gap_bound += 2.0**-50 * (b * b + a * abs(c)) + _LOST
+    at_q, gap = a + 2.0 * b + c, b * b - a * c
+    return _Quadratic((a, 0.0), (b, 0.0), c, at_q, (gap, 0.0), a_bound, b_bound, c_bound, q_bound, gap_bound)
+
+
+@inline
+def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
+    d_size, f_size = _size(d), _size(f)
+    ah, al = _dot(d, d)
+    bh, bl = _dot(d, f)
+    ch, cl = _dot(f, f)
+    rh, rl = two_prod(radius, radius)
+    a_bound, b_bound = 16.0 * U2 * ah + _LOST, (16.0 * U2 * f_size + 1.01 * blur) * d_size + _LOST
+    c_bound = 16.0 * U2 * (f_size * f_size + rh) + 2.02 * blur * (f_size + 2.0 * blur) + _LOST
+    ch, cl = dd_sub(ch, cl, rh, rl)
+    qh, ql = dd_add(ah, al, 2.0 * bh, 2.0 * bl)
+    qh, ql = dd_add(qh, ql, ch, cl)
+    q_bound = 1.01 * (a_bound + 2.0 * b_bound + c_bound) + 16.0 * U2 * (ah + 2.0 * abs(bh) + abs(ch))
+    bbh, bbl = dd_mul(bh, bl, bh, bl)
+    ach, acl = dd_mul(ah, al, ch, cl)
+    gh, gl = dd_sub(bbh, bbl, ach, acl)
+    gap_bound = 1.01 * ((2.0 * abs(bh) + b_bound) * b_bound + ah * c_bound + (abs(ch) + c_bound) * a_bound)
+    gap_bound += 32.0 * U2 * (bbh + abs(ach)) + _LOST
+    return _Quadratic((ah, al), (bh, bl), ch, qh, (gh, gl), a_bound, b_bound, c_bound, q_bound, gap_bound)
+
+
+@inline
+def _verdict(e: _Quadratic) -> tuple[int, int, int]:
+    """Return what `meets_ball` does, as far as a quadratic says."""
+    a, b, gap = e.a[0], e.b[0], e.gap[0]
+    past = e.a_bound + e.b_bound + 2.0**-50 * (a + abs(b))
+    of_p, of_q = sign_of(e.c, e.c_bound), sign_of(e.at_q, e.q_bound)
+    if of_p == -1 or of_q == -1 or (gap > e.gap_bound and b < -e.b_bound and a + b > past):
+        return 1, of_p, of_q
+    is_out = of_p == 1 and of_q == 1 and (b > e.b_bound or a + b < -past or gap < -e.gap_bound)
+    return (-1 if is_out else UNDECIDED), of_p, of_q
 
 
 @called
-def cut_by_root(p: Triple, q: Triple, c: Triple, radius: float, side: int) -> tuple[float, float, float, float, bool]:
-    """Return what `cut_by_ball` does, by t = (-B -+ sqrt(D)) / A in double-doubles: a line that is nearly tangent.
+def _meets_closely(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
+    return _verdict(_in_double_doubles(d, f, blur, radius))
 
-    A and B are within `DOT_BOUND`, the root within half the bound of D over itself and the 8 u^2 that it is rounded by;
-    their sum has 4 u^2, the quotient 16 u^2 of t and what A has.
-    """
-    h, low, bound = discriminant(p, q, c, radius)
-    ah, al, _ = dd_dot(p, q, p, q)
-    bh, bl, size = dd_dot(p, q, c, p)
-    sign = -1.0 if side == 0 else 1.0
-    root = math.sqrt(max(h, 0.0))
-    rh, rl = two_prod(root, root)
-    tail = 0.0 if root == 0.0 else ((h - rh) + (low - rl)) / (2.0 * root)
-    nh, nl = dd_add(-bh, -bl, sign * root, sign * tail)
-    th, tl = dd_div(nh, nl, ah, al)
-    slack = DOT_BOUND * size + 8.0 * U2 * root + (0.0 if bound == 0.0 else bound / root)
-    slack = 1.01 * slack / ah + 64.0 * U2 * abs(th)
-    x, is_x = coordinate_at(p[0], q[0], th, tl, slack)
-    y, is_y = coordinate_at(p[1], q[1], th, tl, slack)
-    z, is_z = coordinate_at(p[2], q[2], th, tl, slack)
-    is_t = th + (tl - slack) == th + (tl + slack)
-    sure = is_ball_safe(p, q, c, radius) & ((h > bound) | (bound == 0.0))
-    return x, y, z, th + tl + 0.0, sure & is_x & is_y & is_z & is_t
+
+@inline
+def meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
+    """Return 1, -1 or UNDECIDED for a segment that meets a ball, or not, or may, and whether either end lies within
+    (-1) or without (1), or UNDECIDED."""
+    meets, of_p, of_q = _verdict(_in_doubles(d, f, blur, radius))
+    if meets == UNDECIDED or (meets == 1 and (of_p == UNDECIDED or of_q == UNDECIDED)):
+        return _meets_closely(d, f, blur, radius)
+    return meets, of_p, of_q
+
+
+@inline
+def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, of_q: int) -> tuple[int, End, End]:
+    """Return the ends of the piece of a segment that meets the ball, its ends without it where of_p and of_q are 1, as
+    `put_piece` takes them, after a 1, or UNDECIDED if they are not known well enough."""
+    first, last = OWN_START, OWN_END
+    if of_p < 0 and of_q < 0:
+        return 1, first, last
+    e = _in_double_doubles(d, f, blur, radius)
+    dh, dl = e.gap
+    if not dh > 1024.0 * e.gap_bound:
+        return UNDECIDED, first, last
+    sh = math.sqrt(dh)
+    sl = (fma(-sh, sh, dh) + dl) / (2.0 * sh)
+    s_bound = e.gap_bound / (1.9 * sh) + 16.0 * U2 * sh
+    for end in range(2):
+        if (of_p if end == 0 else of_q) < 0:
+            continue
+        way = -1.0 if end == 0 else 1.0
+        nh, nl = dd_add(-e.b[0], -e.b[1], way * sh, way * sl)
+        slack = slack_of(nh, e.b_bound + s_bound + 4.0 * U2 * (abs(e.b[0]) + sh), e.a[0], e.a_bound)
+        t, t_low = dd_div(nh, nl, e.a[0], e.a[1])
+        if end == 0:
+            first = (t, t_low, slack, 0)
+        else:
+            last = (t, t_low, slack, 0)
+    return 1, first, last
+
+
+@inline
+def _ball_of(segments: Any, item: int, center: Any) -> tuple[Vector, Vector]:
+    """Return d and f of a segment; in the plane z is 0."""
+    is_flat = segments.shape[2] == 2
+    p, c = point_of(segments, item, 0, is_flat), (center[0], center[1], 0.0 if is_flat else center[2])
+    return difference(p, point_of(segments, item, 1, is_flat)), difference(c, p)
+
+
+@kernel
+def decide_on_sphere(
+    segments: Any, center: Any, radius: float, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any,
+    n: Any,
+) -> None:  # fmt: skip
+    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the closed ball: see `decide_on_boxes`."""
+    kept, n_open = 0, 0
+    for i in range(first, last):
+        if stop[0]:
+            return
+        d, f = _ball_of(segments, i, center)
+        meets, of_p, of_q = meets_ball(d, f, 0.0, radius)
+        if meets == UNDECIDED or (meets == 1 and (of_p == UNDECIDED or of_q == UNDECIDED)):
+            still[n_open] = i
+            n_open += 1
+        elif meets == 1:
+            items[kept], planes[kept, 0], planes[kept, 1] = i, min(of_p, 0), min(of_q, 0)
+            kept += 1
+    n[0], n[1], n[2] = kept, n_open, 0
 
 
 @kernel
@@ -143,27 +212,14 @@ def fill_on_sphere(
     pieces: Pieces, still: Any, n: Any,
 ) -> None:  # fmt: skip
     """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
-    is_flat = center.size == 2
-    n_open, c = 0, center_of(center, is_flat)
+    n_open = 0
     for place in range(size):
         if stop[0]:
             return
         i, row = items[place], begin + place
-        pieces.source[row] = i
-        all_sure = True
-        p, q = point_of(segments, i, 0, is_flat), point_of(segments, i, 1, is_flat)
-        for end in range(2):
-            if planes[place, end] < 0:
-                put_own_end(pieces, row, end, segments, i, is_flat)
-                continue
-            pieces.faces[row, end] = planes[place, end]
-            x, y, z, t, sure = cut_by_ball(p, q, c, radius, end)
-            if not sure:
-                x, y, z, t, sure = cut_by_root(p, q, c, radius, end)
-            pieces.t[row, end] = t
-            put_end(pieces, row, end, (x, y, z), is_flat)
-            all_sure &= sure
-        if not all_sure:
+        d, f = _ball_of(segments, i, center)
+        found, first, last = between_roots(d, f, 0.0, radius, 1 + 2 * planes[place, 0], 1 + 2 * planes[place, 1])
+        if not put_piece(pieces, row, i, segments, i, first, last) or found == UNDECIDED:
             still[n_open] = row
             n_open += 1
     n[0], n[1] = n_open, n_open

@@ -12,8 +12,7 @@ from engine.arrays import FloatArray, IntArray
 from engine.budget import Budget, Cancel
 from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.predicates.scaling import balanced_rows
-from engine.segment_clipping.ball_cut import fill_on_sphere
-from engine.segment_clipping.ball_interval import decide_on_sphere
+from engine.segment_clipping.ball_cut import decide_on_sphere, fill_on_sphere
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import FEW, Method, Scaled, clip_few, clip_on_convex, scaled

@@ -9,9 +9,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.budget import concatenated
-from engine.jit import merged
+from engine.jit import inline, merged
+from engine.predicates.cut_point import T_BOUND, point_at
 
 Triple = tuple[float, float, float]
+End = tuple[float, float, float, int]
+"""Of a piece to be written: parameter, its low part, its relative error, and the face, -1 for the segment's own."""
+OWN_START, OWN_END = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
+"""The ends of a segment."""
 DROPPED: Final = 0
 KEPT: Final = 1
 """States of a segment, beside OPEN."""
@@ -93,3 +98,38 @@ def put_own_end(pieces: Pieces, row: int, end: int, segments: Any, item: int, is
     """Write an end of a piece that is the segment's own."""
     pieces.t[row, end], pieces.faces[row, end] = end, -1
     put_end(pieces, row, end, point_of(segments, item, end, is_flat), is_flat)
+
+
+@inline
+def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
+    """Return the relative error that s / d has from its parts; infinite where their sizes have no range for it."""
+    if not (2.0**-400 <= abs(d) <= 2.0**400 and abs(s) >= 2.0**-500):
+        return np.inf
+    return 1.01 * (s_bound / abs(s) + d_bound / abs(d))
+
+
+@inline
+def put_point(point: Any, segments: Any, item: int, t: float, low: float, slack: float) -> bool:
+    """Write the point at t, known within slack of itself; tell whether that and t are surely nearest."""
+    bound = (T_BOUND + slack) * abs(t)
+    sure = (slack < 0.001) & (t + (low - bound) == t + (low + bound))
+    for k in range(segments.shape[2]):
+        x, is_x = point_at(segments[item, 0, k], segments[item, 1, k], t, low, slack)
+        point[k] = x + 0.0
+        sure &= is_x
+    return sure
+
+
+@inline
+def put_piece(out: Pieces, row: int, source: int, segments: Any, item: int, first: End, last: End) -> bool:
+    """Write a piece between two ends; tell whether all numbers are surely the nearest."""
+    sure = True
+    out.source[row] = source
+    for end in range(2):
+        t, low, slack, face = first if end == 0 else last
+        if face < 0:
+            put_own_end(out, row, end, segments, item, segments.shape[2] == 2)
+        else:
+            sure &= put_point(out.ends[end, row], segments, item, t, low, slack)
+            out.t[row, end], out.faces[row, end] = t + low, face
+    return sure

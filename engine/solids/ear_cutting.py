@@ -12,10 +12,10 @@ the middle of a straight side are kept.
 
 Every simple polygon has such an ear: in a triangulation that uses all its vertices the dual tree has leaves, and no
 vertex lies in or on the triangle of a leaf but its own corners; what is left is simple again. A projection that is not
-simple (crossing or touching sides, repeated positions, no area) is refused; every other face is cut, in n log n.
+simple (crossing or touching sides, repeated positions, no area) is refused; every other face is cut, in n^2 at most.
 
 Strictly convex faces, nearly all of real meshes, are certified by floating-point signs with a proven bound; the others
-are looked at one by one (`simple_ring.py`) and cut (`ears.py`). Where rounding leaves open along which axis the area of
+are looked at one by one and cut (`ears.py`). Where rounding leaves open along which axis the area of
 a face is largest, it must be convex along each that may be: the fan is the same. A ring turns strictly one way at every
 corner and around once if every turn has that sign and the first coordinate rises and falls once (comparisons of floats
 are exact).
@@ -41,21 +41,13 @@ from engine.direct import entry_of
 from engine.errors import FaceNotSimpleError
 from engine.jit import inline, kernel
 from engine.predicates.rational import orient2d_rational, scaled_integers
-from engine.solids import ears as ears_of
-from engine.solids import simple_ring
 from engine.solids.checks import digits
-from engine.solids.ears import cut_ears
-from engine.solids.simple_ring import ENDED_EARLY, SIMPLE, TURNS_BACK, Ring, find_meeting
+from engine.solids.ears import ENDED_EARLY, SIMPLE, TURNS_BACK, Corners, Ring, cut_ears, find_meeting
 
 CONVEX, UNSURE = 0, 4
 _TINY: Final = 1e-300  # far above what underflow takes from a sum of products (a few times 2^-1075)
 _ROUNDOFF: Final = 2.0**-53
 _POLL: Final = 0x3FF
-_SPREAD: Final = (
-    (16, 0x0000FFFF0000FFFF), (8, 0x00FF00FF00FF00FF), (4, 0x0F0F0F0F0F0F0F0F), (2, 0x3333333333333333),
-    (1, 0x5555555555555555),
-)  # fmt: skip
-"""How the bits of a number are moved apart, half the way at a time, and which are kept."""
 
 
 def cut_faces(
@@ -93,18 +85,13 @@ def cut_ring(points: FloatArray, projection: int, face: int, names: IntArray, bu
         raise _not_simple(points, face, names, "has no area in any projection")
     n, flat = len(points), points[:, axes]
     x, y = np.ascontiguousarray(flat[:, 0]), np.ascontiguousarray(flat[:, 1])
-    by_x, ranks = np.lexsort((y, x)), np.empty((2, n), np.int64)
-    ranks[0, by_x] = ranks[1, np.argsort(y, kind="stable")] = np.arange(n)
     found, ears = np.zeros(2, np.int64), np.empty((n - 2, 3), np.int64)
-    numbers = np.random.default_rng(0).permutation(n)
     settled = np.empty((0, 4), np.int64)
     while True:  # bound: each turn settles a sign that is asked for once
         ring = Ring(x, y, settled, np.zeros(4, np.int64))
-        result = find_meeting(ring, by_x, ranks[0], *simple_ring.room_for(n), found, budget.flag)
-        if result == SIMPLE:
-            tree, links = ears_of.room_for(flat, np.argsort(_morton(ranks)))
-            if cut_ears(ring, tree, links, numbers, np.empty((3, n), np.int64), ears, budget.flag) == n - 2:
-                return ears
+        result = find_meeting(ring, found, budget.flag)
+        if result == SIMPLE and cut_ears(ring, Corners(*np.empty((6, n), np.int64)), ears, budget.flag) == n - 2:
+            return ears
         budget.check()
         if ring.wanted[0] == 0:
             break
@@ -128,13 +115,6 @@ def _not_simple(points: FloatArray, face: int, names: IntArray, problem: str) ->
         f"its first vertex is {digits(points[0])}; cut it into triangles",
         ("faces", face),
     )
-
-
-def _morton(ranks: IntArray) -> IntArray:
-    """Return the bits of two rows (2, n) of numbers below 2^31 in turn."""
-    for shift, mask in _SPREAD:
-        ranks = (ranks | ranks << shift) & mask
-    return ranks[0] << 1 | ranks[1]
 
 
 def _projection_of_largest_area(points: FloatArray) -> int:

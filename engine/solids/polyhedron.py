@@ -19,7 +19,7 @@ class Polyhedron(Mesh):
     stand at one position). A face of four or more vertices must be simple in its projection, so no two at one position.
     Boundary: the points on any face, even on one that another face cancels under even-odd.
     deadline: seconds, None for no limit; cancel: a switch.
-    Cost: linear in vertices and edges, a face of n vertices is cut in n log n.
+    Cost: linear in vertices and edges, a face of n vertices is cut in n^2 at most: 1,000 in some milliseconds.
     1.4 million triangles take about a second and 36 bytes each, vertices included.
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, RingTooShortError,
     IndexOutOfRangeError, RepeatedIndexError, NotClosedError, InconsistentOrientationError, FaceNotSimpleError,

@@ -209,7 +209,6 @@ def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy, area: bool |
             for part in result.collapsed
         ],
         rounding=overlay.OverlayRounding.made(
-            may_be_invalid=result.may_be_invalid,
             rounds=result.rounds,
             snapped=result.snapped,
             vertices_moved=result.vertices_moved,

@@ -16,8 +16,7 @@ def overlay(question: OverlayRequest, call: CallOf) -> OverlayResponse:
     """Combine two polygons into separate pieces with holes, concave on concave."""
     subject = questions.to_solid(question.subject, call, ("subject",))
     clip = questions.to_solid(question.clip, call, ("clip",))
-    output = question.output or "valid"
-    found = call.compute(engine.overlay, subject, clip, question.operation, output=output, grid=question.grid)
+    found = call.compute(engine.overlay, subject, clip, question.operation, grid=question.grid)
     return answers.from_overlay(*found, question.area)
 
 
@@ -28,6 +27,5 @@ def overlay_batch(question: OverlayBatchRequest, call: CallOf) -> OverlayBatchRe
         [questions.to_solid(model, call, (name, k)) for k, model in enumerate(models)]
         for name, models in (("subjects", question.subjects), ("clips", question.clips))
     )
-    output = question.output or "valid"
-    found = call.compute(engine.overlay_batch, subjects, clips, question.operation, output=output)
+    found = call.compute(engine.overlay_batch, subjects, clips, question.operation)
     return answers.from_overlays(*found)

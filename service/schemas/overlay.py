@@ -28,7 +28,6 @@ class OverlayRequest(Schema):
             "subject": {"type": "polygon", "rings": [[[0, 0], [1, 0], [1, 1], [0, 1]]]},
             "clip": {"type": "polygon", "rings": [[[0.9999999999999999, 0.3], [2, 0.2], [2, 0.4]]]},
             "operation": "intersection",
-            "output": "valid",
             "area": True,
         },
         {
@@ -44,14 +43,10 @@ class OverlayRequest(Schema):
     operation: Literal["intersection", "union", "difference", "symmetric_difference"] = Field(
         description="How the two are combined; difference is the subject without the clip."
     )
-    output: Literal["valid", "nearest"] = left_out(
-        "valid (if left out): rings that are simple and cross nowhere; nearest: every vertex correctly rounded and no "
-        "more, which may be invalid."
-    )
     area: bool = left_out("Compute the area; if left out, where it costs next to nothing: up to 100 vertices.")
     grid: Number = left_out(
         "Snap the result to multiples of this power of two or ten, so that borders that nearly coincide do; no edge "
-        "moves by more than 0.71 of it. With output valid only; area is then that of the output."
+        "moves by more than 0.71 of it. `area` is then that of the output."
     )
 
 
@@ -66,7 +61,6 @@ class OverlayBatchRequest(Schema):
                 {"type": "polygon", "rings": [_SQUARE]},
             ],
             "operation": "union",
-            "output": "valid",
         }
     )
 
@@ -74,10 +68,6 @@ class OverlayBatchRequest(Schema):
     clips: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="As many polygons, each for one subject.")
     operation: Literal["intersection", "union", "difference", "symmetric_difference"] = Field(
         description="How the two of each pair are combined; difference is the subject without the clip."
-    )
-    output: Literal["valid", "nearest"] = left_out(
-        "valid (if left out): rings that are simple and cross nowhere; nearest: every vertex correctly rounded and no "
-        "more, which may be invalid."
     )
 
 
@@ -102,7 +92,6 @@ class OverlayRounding(Schema):
     The output has `pieces_exact` - collapsed pieces - `pieces_joined` + `pieces_parted` pieces; likewise for holes.
     """
 
-    may_be_invalid: bool = Field(description="`nearest` was asked for, and rounding moved a vertex.")
     rounds: Count = Field(description="How often the rings were rounded; 0 if the exact result is made of float64.")
     snapped: bool = Field(description="The coarser lattice of snap rounding was needed.")
     vertices_moved: Count = Field(description="Vertices that are not correctly rounded vertices of the exact result.")

@@ -155,7 +155,6 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "overlay(subject)": lambda x: engine.overlay(x, POLYGON),
     "overlay(clip)": lambda x: engine.overlay(POLYGON, x),
     "overlay(operation)": lambda x: engine.overlay(POLYGON, POLYGON, x),
-    "overlay(output)": lambda x: engine.overlay(POLYGON, POLYGON, output=x),
     "collide(second)": lambda x: engine.collide(engine.Surface(VERTICES, FACES), x),
     "collide(first_pose)": lambda x: engine.collide(BOX, BOX, first_pose=x),
     "collide_poses(rotations)": lambda x: engine.collide_poses(BOX, BOX, x, np.zeros((0, 3))),
@@ -245,11 +244,11 @@ ASKED: dict[str, dict[str, Any]] = {
     "layers.polygon_of": {"geometry": SQUARE},
     "locate": {"points": POINT, "solid": BOX},
     "locate_scene": {"points": POINT, "solids": [BOX], "poses": [None]},
-    "overlay": {"subject": POLYGON, "clip": POLYGON, "operation": "union", "output": "valid", "grid": None},
-    "overlay_batch": {"subjects": [POLYGON], "clips": [POLYGON], "operation": "union", "output": "valid"},
+    "overlay": {"subject": POLYGON, "clip": POLYGON, "operation": "union", "grid": None},
+    "overlay_batch": {"subjects": [POLYGON], "clips": [POLYGON], "operation": "union"},
     "polygons": {"coordinates": [[0, 0], [1, 0], [0, 1]], "ring_offsets": [0, 3], "polygon_offsets": [0, 1]},
     "read_mesh": {"file": OFF, "file_format": "off"},
-    "union_all": {"polygons": [POLYGON], "output": "valid", "grid": None},
+    "union_all": {"polygons": [POLYGON], "grid": None},
 }
 """A good question of everything that is public, options left out that many have: those are below."""
 SHARED = {"workers", "deadline", "cancel", "progress", "report", *FLAGS, "others", "options"}

@@ -180,5 +180,3 @@ def test_refusals() -> None:
     unit = engine.Polygon([square(0, 0, 1)])
     with pytest.raises(engine.InvalidInputError, match=r"2\^-51"):
         engine.overlay(unit, unit, grid=2.0**-60)
-    with pytest.raises(engine.InvalidOperationError, match="valid"):
-        engine.union_all([unit], grid=1.0, output="nearest")

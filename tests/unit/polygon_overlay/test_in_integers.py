@@ -18,10 +18,10 @@ from tests.unit.polygon_overlay.compiled.test_kernel import arrays
 def test_areas_add_up(seed: int, scale: float) -> None:
     random = np.random.default_rng(seed)
     subject, clip = (arrays([ring]) for ring in random.integers(0, 7, (2, 8, 2)) * scale)
-    parts = [overlay_exactly(subject, clip, operation, "nearest", Budget())[0] for operation in OPERATIONS]
+    parts = [overlay_exactly(subject, clip, operation, Budget())[0] for operation in OPERATIONS]
     area = dict(zip(OPERATIONS, (part.area_exact for part in parts), strict=True))
     assert area["union"] == area["intersection"] + area["symmetric_difference"]
-    other = overlay_exactly(clip, subject, "difference", "nearest", Budget())[0].area_exact
+    other = overlay_exactly(clip, subject, "difference", Budget())[0].area_exact
     assert area["symmetric_difference"] == area["difference"] + other
 
 

@@ -112,7 +112,7 @@ def test_third_is_rounded_once() -> None:
     result = overlay(Polygon([[(0, 0), (3, 1), (3, 0)]]), Polygon([box(1, -1, 1, 3)]))
     assert shape(result) == [([(1, 0), (2, 0), (2, 2 / 3), (1, 1 / 3)], [])]
     assert result.area_exact == Fraction(1, 2)
-    assert (result.rounds, result.vertices_moved, result.snapped, result.may_be_invalid) == (1, 0, False, False)
+    assert (result.rounds, result.vertices_moved, result.snapped) == (1, 0, False)
     assert 0 < result.largest_displacement <= 2.0**-53
 
 
@@ -203,24 +203,13 @@ def test_rounding_up_to_the_smallest_normal_number() -> None:
     assert result.vertices[1].tolist() == [math.nextafter(least, 0), 0]
 
 
-@pytest.mark.parametrize("output", ["valid", "nearest"])
-def test_collapsed_sliver_is_listed(output: Any) -> None:
+def test_collapsed_sliver_is_listed() -> None:
     sliver = [(1.0, 1.0), (2.0, 1.0), (2.0, 1.0 + 2.0**-52)]
-    result = overlay(Polygon([sliver]), Polygon([box(1.25, 0, 2.0**-30, 4)]), output=output)
+    result = overlay(Polygon([sliver]), Polygon([box(1.25, 0, 2.0**-30, 4)]))
     assert result.n_pieces == 0
     assert [part.kind for part in result.collapsed] == ["piece"]
     assert result.collapsed[0].area == result.area_exact > 0
     assert result.collapsed[0].near == (1.25, 1.0)
-
-
-def test_nearest_only_rounds() -> None:
-    subject, clip = Polygon(random_rings(3, 1 << 20)), Polygon(random_rings(4, 1 << 20))
-    valid, nearest = overlay(subject, clip, "union"), overlay(subject, clip, "union", output="nearest")
-    assert nearest.may_be_invalid
-    assert not valid.may_be_invalid
-    assert shape(valid) == shape(nearest)
-    exact = overlay(Polygon([box(0, 0, 4)]), Polygon([box(1, 1, 9)]), output="nearest")
-    assert (exact.rounds, exact.may_be_invalid) == (0, False)
 
 
 def test_empty_result() -> None:
@@ -292,8 +281,6 @@ def test_refusals() -> None:
     assert caught.value.where == ("subjects", 1)
     with pytest.raises(InvalidOperationError, match="intersection, union"):
         overlay(square, square, "xor")  # type: ignore[call-overload]
-    with pytest.raises(InvalidOperationError, match="valid, nearest"):
-        overlay(square, square, output="fast")  # type: ignore[call-overload]
     with pytest.raises(DeadlineExceededError):
         overlay(square, square, deadline=0.0)
     cancel.set()

@@ -66,7 +66,7 @@ def run(pair: Pair, operation: Any, swapped: bool = False) -> Overlay:
     subject, clip = arrays(pair[1]), arrays(pair[2])
     if swapped:
         subject, clip = clip, subject
-    return overlay_rings(subject, clip, operation, "valid", Budget())[0]
+    return overlay_rings(subject, clip, operation, Budget())[0]
 
 
 def n_vertices(pair: Pair) -> int:

@@ -1,9 +1,8 @@
-"""Rounds of the compiled overlay, and rings left as they were rounded: what they tell is what the integers say."""
+"""Rounds of the compiled overlay: what they tell is what the integers say."""
 
 from __future__ import annotations
 
 from collections import Counter
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from engine.polygon_overlay.found import Found, joined, taken
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.polygon_arrays import gathered
-from engine.polygon_overlay.rounds import NearestRings, nearest_pairs, nearest_rings, settle_pairs
+from engine.polygon_overlay.rounds import settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, arranged_again, overlay_compiled, run_kernel
 from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay import families as families
@@ -28,6 +27,7 @@ WORD = 62
 """Rings that would each have a bit of a label of one word."""
 HARD = (
     families.rotated_lattice,
+    families.nearly_lattice,
     families.nearly_coincident,
     families.far_lattice,
     families.pencils,
@@ -44,7 +44,7 @@ def test_compiled_rounds_equal_those_in_integers(family: Any) -> None:
         for operation in OPERATIONS:
             if agree(*pair, operation):
                 told["settled"] += 1
-                found = overlay_compiled(*map(arrays, pair), operation, "valid", Budget())
+                found = overlay_compiled(*map(arrays, pair), operation, Budget())
                 assert found is not None
                 told["rounded"] += found[0].rounds > 0
                 told["changed"] += bool(found[0].collapsed or found[0].pieces_joined or found[0].pieces_parted)
@@ -69,7 +69,7 @@ def test_more_rings_than_a_word_has_bits() -> None:
     for subject, clip in (([border], [version]), ([frame, border], [version]), ([frame, border], [frame, version])):
         for operation in ("union", "difference", "symmetric_difference"):
             assert agree(subject, clip, operation)
-    found = overlay_compiled(arrays([border]), arrays([version]), "symmetric_difference", "valid", Budget())
+    found = overlay_compiled(arrays([border]), arrays([version]), "symmetric_difference", Budget())
     assert found is not None
     assert found[0].n_pieces_exact > WORD
 
@@ -92,7 +92,7 @@ def test_many_rings_that_join_and_are_snapped(n: int) -> None:
         moved = [ring + random.choice([-1, 0, 1], ring.shape) * np.spacing(ring) for ring in rings]
         for operation in ("intersection", "difference", "symmetric_difference"):
             assert agree(rings, moved, operation)
-            found = overlay_compiled(arrays(rings), arrays(moved), operation, "valid", Budget())
+            found = overlay_compiled(arrays(rings), arrays(moved), operation, Budget())
             assert found is not None
             n_pieces, n_snapped = max(n_pieces, found[0].n_pieces_exact), n_snapped + found[0].snapped
     assert n_pieces > WORD
@@ -107,7 +107,7 @@ def test_rounds_that_do_not_end_are_snapped(monkeypatch: pytest.MonkeyPatch) -> 
         pair = families.drawn(families.slivers, seed)
         for operation in OPERATIONS:
             assert agree(*pair, operation)
-            found = overlay_compiled(*map(arrays, pair), operation, "valid", Budget())
+            found = overlay_compiled(*map(arrays, pair), operation, Budget())
             assert found is not None
             n_snapped += found[0].snapped
     assert n_snapped >= 5
@@ -121,17 +121,16 @@ def test_crossings_next_to_an_axis_are_rounded(family: Any, seed: int) -> None:
     assert all(agree(*families.drawn(family, seed), operation) for operation in OPERATIONS)
 
 
-@pytest.mark.parametrize("output", ["valid", "nearest"])
 @pytest.mark.parametrize("n", [4, pytest.param(100, marks=pytest.mark.full)])
-def test_a_batch_equals_single_calls(output: Any, n: int) -> None:
+def test_a_batch_equals_single_calls(n: int) -> None:
     """Rings arranged again together are those arranged pair by pair, and the objects made of them later too."""
     pairs = [families.drawn(family, seed) for seed in range(n) for family in HARD]
     subjects, clips = ([Polygon(pair[k]) for pair in pairs] for k in (0, 1))
     for operation in OPERATIONS:
-        batch, accuracy = overlay_batch(subjects, clips, operation, output=output, workers=1, report=True)
+        batch, accuracy = overlay_batch(subjects, clips, operation, workers=1, report=True)
         ulps = 0.5
         for number, (subject, clip) in enumerate(zip(subjects, clips, strict=True)):
-            single, told = overlay(subject, clip, operation, output=output, report=True)
+            single, told = overlay(subject, clip, operation, report=True)
             ulps = max(ulps, told.coordinates_ulp)
             rings = batch.piece_offsets[batch.pair_offsets[number] : batch.pair_offsets[number + 1] + 1]
             stops = batch.ring_offsets[rings[0] : rings[-1] + 1]
@@ -142,7 +141,7 @@ def test_a_batch_equals_single_calls(output: Any, n: int) -> None:
             found = batch[number]
             assert found is not None
             assert found.vertices.tolist() == single.vertices.tolist()
-            assert (found.collapsed, found.rounds, found.output) == (single.collapsed, single.rounds, output)
+            assert (found.collapsed, found.rounds) == (single.collapsed, single.rounds)
             assert found.area_exact == single.area_exact
         assert accuracy.coordinates_ulp == ulps
 
@@ -156,7 +155,7 @@ def test_pieces_in_holes_stay_what_they_are_where_a_round_is_taken() -> None:
         crossed = [*rings, [(-20, 0.1), (-8.5, 0.2), (-20, 0.3)]]
         for operation in OPERATIONS:
             assert agree(crossed, [*clip, [(0.1, -0.1), (0.4, 0.2), (0.5, 0.1)]], operation)
-    result, _ = overlay_exactly(arrays(frames), arrays(clip), "difference", "valid", Budget())
+    result, _ = overlay_exactly(arrays(frames), arrays(clip), "difference", Budget())
     assert (result.n_holes, result.holes_joined, result.holes_parted) == (result.n_holes_exact, 0, 0)
 
 
@@ -173,96 +172,10 @@ def test_pairs_together_are_pairs_alone() -> None:
     found = doubtful()
     n_doubtful = int((found.status == MAY_CROSS).sum())
     assert n_doubtful > 3
-    for settle in (
-        lambda some: settle_pairs(some, arranged_again, Budget()),
-        lambda some: nearest_pairs(some, Budget()),
-    ):
-        together = settle(found)
-        assert len(together.pairs) <= n_doubtful
-        for k, pair in enumerate(together.pairs.tolist()):
-            alone, now = settle(taken(found, np.array([pair]))).found, taken(together.found, np.array([k]))
-            for name in ("vertices", "ring_offsets", "piece_offsets", "displacement"):
-                assert getattr(alone, name).tolist() == getattr(now, name).tolist()
-
-
-CROWDED = (families.rotated_lattice, families.nearly_lattice, families.slivers, families.pencils, families.combs)
-
-
-def agree_as_nearest(family: Any, seed: int, told: Counter[str]) -> None:
-    """Hold the results of a pair against those in integers, field by field."""
-    first, second = map(arrays, families.drawn(family, seed))
-    for operation in OPERATIONS:
-        compiled = overlay_compiled(first, second, operation, "nearest", Budget())
-        if compiled is None:
-            continue
-        result, (exact, _) = compiled[0], overlay_exactly(first, second, operation, "nearest", Budget())
-        for name in ("vertices", "ring_offsets", "piece_offsets"):
-            assert getattr(result, name).tolist() == getattr(exact, name).tolist(), name
-        for name in ("output", "may_be_invalid", "n_pieces_exact", "n_holes_exact", "rounds", "collapsed", "snapped"):
-            assert getattr(result, name) == getattr(exact, name), name
-        assert (result.vertices_moved, result.pieces_joined, result.holes_parted) == (0, 0, 0)
-        assert result.largest_displacement >= exact.largest_displacement * (1 - 2.0**-50)
-        assert result.area_exact == exact.area_exact
-        told["settled"] += 1
-        told["collapsed"] += bool(result.collapsed)
-
-
-@pytest.mark.parametrize("family", CROWDED, ids=lambda family: family.__name__)
-def test_nearest_equals_that_in_integers(family: Any) -> None:
-    told: Counter[str] = Counter()
-    for seed in range(5):
-        agree_as_nearest(family, seed, told)
-    assert told["settled"] == 20
-    assert told["collapsed"] > 0
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("family", families.FAMILIES, ids=lambda family: family.__name__)
-def test_nearest_equals_that_in_integers_many_times(family: Any) -> None:
-    told: Counter[str] = Counter()
-    for seed in range(300):
-        agree_as_nearest(family, seed, told)
-    assert told["settled"] > 0
-
-
-def nearest(*pieces: list[list[tuple[float, float]]]) -> Any:
-    rings = [ring for piece in pieces for ring in piece]
-    vertices = np.array([vertex for ring in rings for vertex in ring], float)
-    return nearest_rings(vertices, np.cumsum([0, *map(len, rings)]), np.cumsum([0, *map(len, pieces)]), Budget())
-
-
-def places(found: NearestRings) -> list[Any]:
-    rings = np.split(found.vertices, found.ring_offsets[1:-1])
-    pieces = [rings[start:stop] for start, stop in zip(found.piece_offsets, found.piece_offsets[1:])]
-    return [[list(map(tuple, ring.tolist())) for ring in piece] for piece in pieces]
-
-
-def test_rings_without_area_are_left_out() -> None:
-    """Points, segments, eights whose halves cancel, and flat rings that floating point cannot tell from slivers."""
-    square: list[tuple[float, float]] = [(0, 0), (8, 0), (8, 8), (0, 8)]
-    eight: list[tuple[float, float]] = [(1, 1), (2, 2), (1, 2), (2, 1)]
-    flat: list[tuple[float, float]] = [(0.1 * k, 0.3 * k) for k in (1, 2, 4)]
-    sliver = [(x, float(np.nextafter(y, 9))) if k == 1 else (x, y) for k, (x, y) in enumerate(flat)]
-    assert Fraction(flat[1][1]) * 1 == 2 * Fraction(flat[0][1])
-    found = nearest([square, eight, sliver, [(1, 1), (1, 1), (1, 1)]], [flat], [eight, sliver], [[(3, 3), (4, 4)]])
-    assert places(found) == [[square, sliver]]
-    assert found.numbers.tolist() == [0, 1, 2, 3, 8, 9, 10]
-    assert (found.lost_pieces, found.lost_holes) == ([4, 5, 7], [1, 3, 6])
-
-
-def test_a_ring_that_passes_its_first_vertex_twice_begins_where_it_comes_first() -> None:
-    twice: list[tuple[float, float]] = [(3, 0), (3, 1), (0, 0), (0, 0), (2, 1), (2, 2), (0, 0)]
-    found = nearest([twice], [[(0, 0), (1, 0), (0, 1)]])
-    assert places(found) == [[[(0, 0), (1, 0), (0, 1)]], [[(0, 0), (2, 1), (2, 2), (0, 0), (3, 0), (3, 1)]]]
-    assert (len(found.vertices), found.ring_offsets.tolist()) == (9, [0, 3, 9])
-    assert (found.piece_offsets.tolist(), found.numbers.tolist()) == ([0, 1, 2], [7, 8, 9, 3, 4, 5, 6, 0, 1])
-
-
-def test_holes_stay_with_their_shell_where_pieces_change_places() -> None:
-    """What is exactly left of another piece need not be any more once both are rounded."""
-    square: list[tuple[float, float]] = [(1, 0), (9, 0), (9, 9), (1, 9)]
-    hole: list[tuple[float, float]] = [(3, 3), (3, 4), (4, 3)]
-    left: list[tuple[float, float]] = [(0, 0), (1, 0), (0, 1)]
-    found = nearest([square, hole], [left])
-    assert places(found) == [[left], [square, hole]]
-    assert (found.piece_offsets.tolist(), found.numbers.tolist()) == ([0, 1, 3], [7, 8, 9, 0, 1, 2, 3, 4, 5, 6])
+    together = settle_pairs(found, arranged_again, Budget())
+    assert len(together.pairs) <= n_doubtful
+    for k, pair in enumerate(together.pairs.tolist()):
+        alone = settle_pairs(taken(found, np.array([pair])), arranged_again, Budget()).found
+        now = taken(together.found, np.array([k]))
+        for name in ("vertices", "ring_offsets", "piece_offsets", "displacement"):
+            assert getattr(alone, name).tolist() == getattr(now, name).tolist()

@@ -178,7 +178,7 @@ def test_integers_agree(draw: Callable[[Random], list[Rings]], seed: int) -> Non
     layer = draw(np.random.default_rng(seed))
     sources = np.repeat(np.arange(len(layer)), [len(rings) for rings in layer])
     rings = arrays([ring for rings in layer for ring in rings])
-    exact, _ = overlay_exactly(rings, NOTHING, "union", "valid", Budget(), Nesting(sources, np.zeros(0), ANY))
+    exact, _ = overlay_exactly(rings, NOTHING, "union", Budget(), Nesting(sources, np.zeros(0), ANY))
     result = engine.union_all([engine.Polygon(rings) for rings in layer])
     for name in ("vertices", "ring_offsets", "piece_offsets", "area_exact", "n_pieces_exact", "n_holes_exact"):
         assert np.array_equal(getattr(exact, name), getattr(result, name)), name
@@ -211,7 +211,7 @@ def assert_filled(rule: str, number: int, seed: int | list[int]) -> None:
         rings = [ring for layer in far([rings]) for ring in layer]
     found, body = engine.filled(rings, rule), [[ring.tolist() for ring in rings]]
     nesting = Nesting(np.zeros(len(rings), np.int64), np.zeros(0), code)
-    exact, _ = overlay_exactly(arrays(rings), NOTHING, "union", "valid", Budget(), nesting)
+    exact, _ = overlay_exactly(arrays(rings), NOTHING, "union", Budget(), nesting)
     check(exact, body, lambda windings: is_inside(windings[0]))
     assert np.array_equal(found.vertices, exact.vertices)
     assert found.ring_offsets.tolist() == exact.ring_offsets.tolist()
@@ -241,11 +241,11 @@ def test_nothing_and_what_is_empty() -> None:
         assert [one.area for one in batch if one] == batch.areas.tolist()
 
 
-def test_nearest_has_sources() -> None:
+def test_rounded_rings_have_sources() -> None:
     random = np.random.default_rng(3)
     stars = [engine.Polygon([random.random((9, 2))]) for _ in range(4)]
-    result = engine.union_all(stars, output="nearest")
-    assert result.may_be_invalid
+    result = engine.union_all(stars)
+    assert result.rounds > 0
     assert len(result.sources) == len(result.vertices)
     assert set(result.sources.tolist()) <= {0, 1, 2, 3}
 
@@ -255,7 +255,6 @@ def test_nearest_has_sources() -> None:
     [
         (lambda: engine.union_all(engine.Polygon([])), engine.InvalidArrayError, ("polygons",)),  # type: ignore[arg-type]
         (lambda: engine.union_all([engine.Sphere([0, 0], 1)]), engine.UnsupportedSolidError, ("polygons", 0)),
-        (lambda: engine.union_all([], output="fast"), engine.InvalidOperationError, ("output",)),  # type: ignore
         (lambda: engine.filled([], "even_odd"), engine.InvalidOperationError, ("rule",)),  # type: ignore[arg-type]
         (lambda: engine.filled([[]], "positive"), engine.RingTooShortError, ("rings", 0)),
         (lambda: engine.union_all([engine.Polygon([])], deadline=-1.0), engine.DeadlineExceededError, ()),

@@ -115,7 +115,7 @@ def test_the_certificate_for_many_faces_changes_nothing() -> None:
 def test_a_pentagram_is_not_taken_for_convex() -> None:
     order = [0, 2, 4, 1, 3]  # turns left at every corner, twice around
     ring = [[math.cos(2 * math.pi * i / 5), math.sin(2 * math.pi * i / 5), 0.0] for i in order]
-    with pytest.raises(engine.FaceNotSimpleError, match="side 1-2 meets side 3-4"):
+    with pytest.raises(engine.FaceNotSimpleError, match="side 0-1 meets side 2-3"):
         cut(ring)
 
 

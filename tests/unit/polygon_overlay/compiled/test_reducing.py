@@ -12,9 +12,9 @@ from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.reducing import count_left_out, expand_rings
-from engine.polygon_overlay.implicit_rings import ImplicitRings
-from engine.polygon_overlay.run import KEPT_ARRAYS, Operation
-from engine.polygon_overlay.run_pair import run_blocks
+from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
+from engine.polygon_overlay.polygon_arrays import PolygonArrays
+from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, run_blocks
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.families import FAMILIES
 
@@ -105,14 +105,14 @@ MAKERS = (smooth, with_holes, damaged, shared, lattice_walk, parallels, apart)
 
 def compare(subject: Rings, clip: Rings, operation: Operation, size: int, has_area: bool = False) -> bool:
     """Compare with the ordinary way; tell whether edges were left out."""
-    sides = arrays(subject), arrays(clip)
-    expected = run_blocks(*sides, 0, 0, KEPT_ARRAYS[operation], Budget())
+    sides = tuple(PolygonArrays(*arrays(rings), one_polygon(len(rings))) for rings in (subject, clip))
+    largest = sum(len(each.vertices) for each in sides), len(subject) + len(clip)
+    expected = run_blocks(*sides, largest, KEPT_ARRAYS[operation], Budget())
     assert expected is not None
-    n_vertices = sum(len(each.vertices) for each in sides)
-    found = run_blocks(*sides, size, n_vertices + 1, KEPT_ARRAYS[operation], Budget())
+    found = run_blocks(*sides, largest, KEPT_ARRAYS[operation], Budget(), size=size, most=2.0)
     if found is None:
         return False
-    if expected.status == DONE:
+    if expected.status[0] == DONE:
         for name in ("vertices", "ring_offsets", "piece_offsets"):
             assert getattr(found, name).tobytes() == getattr(expected, name).tobytes()
         if has_area:
