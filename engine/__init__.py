@@ -2,8 +2,7 @@
 
 from engine import layers
 from engine.budget import Cancel
-from engine.collision.clearance.clearance import clearance
-from engine.collision.clearance.clearance_poses import clearance_poses
+from engine.collision.clearance.clearance import clearance, clearance_poses
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.result import Clearance, Collision, Feature, Witness

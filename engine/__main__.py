@@ -27,7 +27,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.clearance_poses import clearance_poses
+from engine.collision.clearance.clearance import clearance_poses
 from engine.collision.collide_poses import collide_poses
 from engine.containment.locate import locate
 from engine.errors import EngineError, InvalidInputError

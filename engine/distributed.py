@@ -23,7 +23,7 @@ from distributed import Client, Future, as_completed
 
 from engine.arrays import BoolArray, FloatArray, Int8Array
 from engine.collision import collide_poses as poses
-from engine.collision.clearance import clearance_poses as clearances
+from engine.collision.clearance import clearance as clearances
 from engine.collision.clearance.clearance import checked_distance
 from engine.containment import locate as containment
 from engine.errors import InvalidArrayError, InvalidInputError

@@ -17,7 +17,7 @@ from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.collision.meshes.mesh_detail import mesh_parts
+from engine.collision.meshes.mesh_mesh import mesh_parts
 from engine.collision.planar.outline import live_edges, outline_of
 from engine.collision.planar.outline_batch import outline_parts
 from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work

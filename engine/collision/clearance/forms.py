@@ -16,10 +16,10 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
-from engine.collision.clearance.bodies import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.collision.clearance.closed_forms import UNSURE, ends_of_shared, nearest_of_forms, nearest_of_plane, touched
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_of_outlines, nearest_under_poses
+from engine.collision.clearance.spreads import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.collision.exact_images import Vector, as_vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.boundary import pulled_back

@@ -21,18 +21,25 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.clearance.blocks import (
+from engine.collision.clearance.boxes import (
     CLOSER,
     DONE,
     FULL,
     INTERRUPTED,
+    ROOT,
+    Search,
+    View,
     block_reach,
+    fix,
     keep_below,
+    margin_of,
     measure_blocks,
+    scaled,
+    set_line,
+    size_of,
+    way_of,
 )
-from engine.collision.clearance.boxes import ROOT, Search, View, fix, margin_of, scaled, set_line, size_of, way_of
-from engine.collision.clearance.certified import certify
-from engine.collision.clearance.refined import refine
+from engine.collision.clearance.refined import certify, refine
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
 from engine.jit import inline, kernel, merged

@@ -4,7 +4,7 @@ Two trees are descended together: a pair of nodes is replaced by those pairs of 
 (`box_lanes.meeting`) and discs (`lanes/discs.py`) may meet, two blocks of faces by the pairs of faces that neither
 boxes nor planes part (`lanes/faces.py`); those are classified by signs. All of these are conservative under a pose, so
 no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again,
-and of the faces that meet in a common corner only (`common_corners.py`) gets no more than say all.
+and of the faces that meet in a common corner only (`contact_kinds.py`) gets no more than say all.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ import numpy as np
 
 from engine.arrays import FlagArray
 from engine.bounding.bvh import MAX_DEPTH
-from engine.collision.meshes.common_corners import common_corner, keep_first
-from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS
+from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, keep_first
 from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
@@ -61,7 +60,7 @@ Found = namedtuple("Found", "pairs kinds met")
 """Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1.
 
 met: empty, or of all faces of the first, then of the second, whether a listed pair has them. Then
-`common_corners.py` chooses, and there are N_NAMED rows more.
+`contact_kinds.py` chooses, and there are N_NAMED rows more.
 """
 
 
@@ -301,7 +300,7 @@ def search(s: Search) -> tuple[int, int]:
                 return how, n_pairs
     pairs, kinds, _ = s.found
     room = room_of(s.found)
-    for kept in range(room, kinds.shape[0]):  # what `common_corners.py` keeps
+    for kept in range(room, kinds.shape[0]):  # what `contact_kinds.py` keeps
         if pairs[kept, 0] >= 0:
             if n_pairs < room:
                 pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = pairs[kept, 0], pairs[kept, 1], kinds[kept]

@@ -1,4 +1,5 @@
-"""Polyhedra, surfaces and boxes against each other in 3D: the relation, by contacts, then locations, then regions.
+"""Polyhedra, surfaces and boxes against each other in 3D: the relation, by contacts, then locations, then regions; and
+of two that overlap, which sticks out of the other and whether their boundaries meet.
 
 1. **Contacts**: every pair of faces with a common point. A strict crossing that `face_state.py` accepts proves that the
    open interiors meet, and ends the search.
@@ -11,6 +12,12 @@
    both insides on one side of it.
 
 Faces that cancel under even-odd (stacked) have nothing to show for themselves; their patches go through step 3 too.
+
+**Parts.** A body A sticks out of B if A's open interior meets the outside of B: beside some region of a face of either,
+on one side, A is inside and B is not. A crossing that proves overlapping shows all four combinations around it; a patch
+has one status of the other body on both sides; of each face in contact either side of each region tells, and one with
+nothing of the other body beside it but faces of its own plane is one region. The search ends as soon as each body is
+known to stick out.
 """
 
 from __future__ import annotations
@@ -19,17 +26,25 @@ from functools import lru_cache
 
 import numpy as np
 
-from engine.arrays import IntArray
+from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
 from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
 from engine.collision.meshes.exact_body import as_simplex
-from engine.collision.meshes.exact_regions import pieces_of_segment, regions_of, side_of_clean, sides_at
+from engine.collision.meshes.exact_regions import (
+    Sides,
+    pieces_of_segment,
+    points_within,
+    regions_of,
+    side_of_clean,
+    sides_at,
+    sides_over,
+)
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, unless_identity, what_to_seek
-from engine.collision.meshes.parity import INSIDE
-from engine.collision.meshes.pose_batch import ONE_SETTLES, RELATION
-from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Poses, Witness, Work
+from engine.collision.meshes.parity import INSIDE, OUTSIDE
+from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, RELATION, SAME_SIDE
+from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Parts, Poses, Witness, Work
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
 from engine.types import Relation
@@ -172,3 +187,94 @@ def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, p
     face = int(pair.meshes[own].faces[patch].min())
     answer = answer_of(relation, CONTAINED, *((face, -1), (-1, face))[own], piercing)
     return answer if pair.work.witness and answer is not None else UNNAMED[relation]
+
+
+_BOTH, _NEITHER = Sides(True, True, True), Sides(False, False, False)
+_ABOVE, _BELOW = Sides(True, False, False), Sides(False, True, False)
+
+
+def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+    """Return what of two overlapping polyhedra or boxes lies outside the other."""
+    with np.errstate(all="ignore"):  # kernels, where they run uncompiled
+        a, b, poses = mesh_body_of(first), mesh_body_of(second), unless_identity(poses)
+        if poses == (None, None) and _have_equal_faces(a, b):
+            return Parts(False, False, True)
+        return _OverlappingPair(a, b, poses, Work(work.budget, witness=False), DETAIL).parts()
+
+
+def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
+    """Tell whether two meshes have the same triangles, in any order and orientation."""
+    if first is second:
+        return True
+    if len(first.faces) != len(second.faces) or first.arrays.extent.reach != second.arrays.extent.reach:
+        return False
+    return bool((_sorted_faces(first) == _sorted_faces(second)).all())
+
+
+def _sorted_faces(mesh: MeshBody) -> FloatArray:
+    """Return the triangles (n, 9), corners in ascending order, rows too."""
+    corners = mesh.arrays.vertices[mesh.arrays.triangles]
+    order = np.lexsort(tuple(np.moveaxis(corners, 2, 0)[::-1]), axis=1)
+    rows = np.take_along_axis(corners, order[:, :, None], axis=1).reshape(-1, 9)
+    return rows[np.lexsort(rows.T[::-1])]
+
+
+class _OverlappingPair(MeshPair):
+    """Two bodies whose open interiors are known to meet, and which of them has been seen to stick out."""
+
+    def parts(self) -> Parts:
+        """Return the answer; what is not needed for it is left out."""
+        self._sticks_out = [False, False]
+        self.find_contacts()
+        if self.is_settled:  # by a crossing: overlapping is known
+            return Parts(True, True, True)
+        self._search(self.contacts)
+        first, second = self._sticks_out
+        return Parts(first, second, len(self.contacts) > 0)
+
+    def _search(self, contacts: IntArray) -> None:
+        for own in (0, 1):
+            for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
+                for patch in self.patches(own, contacts[:, own], place):
+                    for ours in self.sides_beside(own, patch):
+                        self._see(own, ours, theirs)
+                    if all(self._sticks_out):
+                        return
+        for own in (0, 1):
+            order = np.argsort(contacts[:, own], kind="stable")
+            faces, firsts = np.unique(contacts[order, own], return_index=True)
+            for face, kinds in zip(faces.tolist(), np.split(self.kinds[order], firsts[1:])):
+                self.work.budget.check()
+                self._see_face(own, face, set(kinds.tolist()))
+                if all(self._sticks_out):
+                    return
+
+    def _see(self, own: int, ours: Sides, theirs: Sides) -> None:
+        """Take note of what lies on either side of a region of body `own`."""
+        for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
+            if mine and not other:
+                self._sticks_out[own] = True
+            if other and not mine:
+                self._sticks_out[1 - own] = True
+
+    def _see_face(self, own: int, face: int, kinds: set[int]) -> None:
+        """Take note of what lies beside a face whose contacts are of some kinds (`in_detail`)."""
+        body, other = self.exact[own], self.exact[1 - own]
+        axis = body.axis(face)
+        if axis < 0:
+            return
+        is_clean = self.state(own, face) == STATE_CLEAN
+        is_cut = any(kind < SAME_SIDE and kind >> own & 1 for kind in kinds)
+        if is_clean and not is_cut:  # one region, and its own body on one side of it: call that above
+            if not kinds.isdisjoint((SAME_SIDE, OPPOSITE)):
+                self._see(own, _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW)
+                return
+            for q in points_within(body.corners(face)):
+                theirs = sides_over(other, q, axis, body.plane(face))
+                if theirs is not None and theirs.above == theirs.below:
+                    self._see(own, _ABOVE, theirs)
+                    return
+        for q in regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
+            self._see(own, sides_at(body, q, axis), sides_at(other, q, axis))
+            if all(self._sticks_out):
+                return

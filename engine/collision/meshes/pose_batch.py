@@ -30,11 +30,10 @@ from engine.collision.meshes.dual_traversal import (
     room_of,
     search,
 )
-from engine.collision.meshes.free_faces import JUDGED
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
-from engine.collision.meshes.touching import flush, relate_by_contacts
+from engine.collision.meshes.touching import JUDGED, flush, relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.vectors import as_point3

@@ -14,11 +14,10 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.budget import Budget
-from engine.collision.clearance.bodies import in_space
 from engine.collision.clearance.clearance import has_plane
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
 from engine.collision.clearance.forms import are_small, gap_of_planes, told_under_poses
-from engine.collision.clearance.spreads import SpreadPair
+from engine.collision.clearance.spreads import SpreadPair, in_space
 from engine.collision.convex.body import pooled
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.scenes.batches import SceneBatches

@@ -9,8 +9,7 @@ import pytest
 
 from engine import Aabb, Polyhedron, Sphere, Triangle
 from engine.budget import Budget
-from engine.collision.clearance.bodies import in_space
-from engine.collision.clearance.spreads import SpreadPair
+from engine.collision.clearance.spreads import SpreadPair, in_space
 from engine.collision.clearance.traversal import TOLD, Asked
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.result import Feature

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, Pose, Relation, Surface, collide
-from engine.collision.meshes.common_corners import common_corner
+from engine.collision.meshes.contact_kinds import common_corner
 from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_found
 from engine.collision.meshes.exact_body import kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of

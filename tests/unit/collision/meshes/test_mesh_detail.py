@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from engine import Pose
-from engine.collision.meshes.mesh_detail import mesh_parts
+from engine.collision.meshes.mesh_mesh import mesh_parts
 from engine.collision.result import Parts, Work
 from tests.unit.collision.meshes.bodies import TURN, brick
 
