@@ -142,7 +142,7 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
         closed = between_form_and_plane(first, second, poses, least)
     else:
         closed = between_forms(first, second, poses, least)
-        if closed is None and first.dimension == 2:
+        if closed is None:
             closed = between_outlines(first, second, poses, least)
     if closed is not None:
         return closed

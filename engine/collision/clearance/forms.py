@@ -18,7 +18,7 @@ from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
 from engine.collision.clearance.closed_forms import UNSURE, ends_of_shared, nearest_of_forms, nearest_of_plane, touched
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
-from engine.collision.clearance.outlines import nearest_of_outlines, nearest_under_poses
+from engine.collision.clearance.outlines import nearest_under_poses
 from engine.collision.clearance.spreads import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.collision.exact_images import Vector, as_vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
@@ -101,23 +101,18 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
 
 def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return what `between_forms` does, of two bodies of the plane; None where that is not sure, or they are large."""
-    vertices, following, radius, names = outline_of(first)
-    others, their_following, their_radius, their_names = outline_of(second)
-    if len(vertices) * len(others) > _MOST_PAIRS:
+    if not are_small(first, second):
         return None
     points = np.empty((2, 2))
-    if poses[0] is None and poses[1] is None:
-        distance, own, theirs = entry_of(nearest_of_outlines)(
-            vertices, following, radius, others, their_following, their_radius, points
-        )
-    else:
-        own_pose, their_pose = (STILL2 if at is None else (at.rotation[None], at.translation[None]) for at in poses)
-        (found,) = under_poses(first, second, (*own_pose, *their_pose), UNLIMITED, points).tolist()
-        distance, own, theirs = found[0], int(found[1]), int(found[2])
+    at, there = poses
+    motion = STILL2 if at is None else (at.rotation[None], at.translation[None])
+    their_motion = STILL2 if there is None else (there.rotation[None], there.translation[None])
+    distance, *ends = under_poses(first, second, (*motion, *their_motion), UNLIMITED, points)[0].tolist()
+    own, theirs = map(int, ends)
     if own < 0 or least is not None:
         return _told(distance, least)
     points.setflags(write=False)
-    return Clearance(distance, points, (names[own], their_names[theirs]))
+    return Clearance(distance, points, (outline_of(first)[3][own], outline_of(second)[3][theirs]))
 
 
 def under_poses(

@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.collision.clearance.closed_forms import UNSURE
 from engine.collision.clearance.outline_search import MOST_NEAR, ROOM, Look, line_of, look_for, row_of, search, way_to
-from engine.collision.clearance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, minus2, place, point, still
+from engine.collision.clearance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, minus2, place, point
 from engine.collision.clearance.wide import Wide, less, over, plus, times
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.planar.outline_batch import inside, n_blocks, relate_placed
@@ -89,7 +89,11 @@ def _write(
 
 @inline
 def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: Any) -> tuple[float, int, int]:
-    """Return what `nearest_of_outlines` does, of placed bodies."""
+    """Return the distance of two bodies, 0.0 where they surely meet, or UNSURE; of each body the vertex, or the number
+    of vertices + the edge, that the points (2, 2) written lie on; -1 where these are not sure.
+
+    A ball is one vertex and a radius.
+    """
     near = workspace(ROOM)
     look = look_for(a, b, near)
     are_apart = _are_apart(a, b, near, look)
@@ -124,31 +128,12 @@ def _n_rows(following: Any) -> int:
 
 
 @allocating_kernel
-def nearest_of_outlines(
-    vertices: Any, following: Any, radius: float, other: Any, their_following: Any, their_radius: float, points: Any
-) -> tuple[float, int, int]:
-    """Return the distance of two bodies, 0.0 where they surely meet, or UNSURE; of each body the vertex, or the number
-    of vertices + the edge, that the points (2, 2) written lie on; -1 where these are not sure.
-
-    A ball is one vertex and a radius.
-    """
-    n, m, k = len(following), len(their_following), _n_rows(following)
-    room = np.empty((k + _n_rows(their_following), 4))
-    at, boxes, their_at, their_boxes = room[:n], room[n:k], room[k : k + m], room[k + m :]
-    error, reach = still(vertices, following, at, boxes)
-    their_error, their_reach = still(other, their_following, their_at, their_boxes)
-    a = Placed(at, following, boxes, error, reach)
-    b = Placed(their_at, their_following, their_boxes, their_error, their_reach)
-    return _nearest(a, b, radius, their_radius, points)
-
-
-@allocating_kernel
 def nearest_under_poses(
     vertices: Any, following: Any, radius: float, turns: Any, moves: Any, other: Any, their_following: Any,
     their_radius: float, their_turns: Any, their_moves: Any, found: Any, points: Any, flag: Any,
 ) -> None:  # fmt: skip
-    """Fill found (n, 3) with what `nearest_of_outlines` returns for each pose of the second; the first has as many
-    poses, or one. The points are those of the last. Returns early when the flag is raised."""
+    """Fill found (n, 3) with what `_nearest` returns for each pose of the second; the first has as many poses, or one.
+    The points are those of the last. Returns early when the flag is raised."""
     n, m, k = len(following), len(their_following), _n_rows(following)
     room = np.empty((k + _n_rows(their_following), 4))
     at, boxes, their_at, their_boxes = room[:n], room[n:k], room[k : k + m], room[k + m :]

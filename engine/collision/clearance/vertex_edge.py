@@ -43,15 +43,6 @@ Found = namedtuple("Found", "distance bound is_first first second face their_fac
 bodies the vertex, or the number of vertices + the edge, and the least edge that this lies on."""
 
 
-@inline
-def still(vertices: Any, following: Any, points: Any, boxes: Any) -> tuple[float, float]:
-    """Write the points and boxes of an outline where it is; return the last two of `Placed`."""
-    for vertex in range(len(vertices)):
-        points[vertex, 0], points[vertex, 1] = vertices[vertex, 0], vertices[vertex, 1]
-        points[vertex, 2] = points[vertex, 3] = 0.0
-    return 0.0, _reach(points, following, boxes, 0.0)
-
-
 @called
 def place(vertices: Any, following: Any, turn: Any, move: Any, points: Any, boxes: Any) -> tuple[float, float]:
     """Write the points and boxes of an outline under a pose; return the last two of `Placed`.
@@ -63,11 +54,14 @@ def place(vertices: Any, following: Any, turn: Any, move: Any, points: Any, boxe
     for k in range(2):
         reach = max(reach, abs(move[k]))
         is_given = is_given and (turn[k, k] == 0.0 or abs(turn[k, k]) == 1.0) and turn[0, k] * turn[1, k] == 0.0
+    is_still = is_given and turn[0, 0] == 1.0 and turn[1, 1] == 1.0 and reach == 0.0
     for vertex in range(len(vertices)):
         p = as_point2(vertices, vertex)
         reach = max(reach, abs(p.x), abs(p.y))
         for k in range(2):
-            x = plus(plus(product(turn[k, 0], p.x), product(turn[k, 1], p.y)), Wide(move[k], 0.0))
+            x = Wide(p.x if k == 0 else p.y, 0.0)
+            if not is_still:
+                x = plus(plus(product(turn[k, 0], p.x), product(turn[k, 1], p.y)), Wide(move[k], 0.0))
             is_given = is_given and x.low == 0.0
             points[vertex, k], points[vertex, 2 + k] = x.h, x.low
     error = 0.0 if is_given else 2.0**-100 * reach + 2.0**-1000
