@@ -22,7 +22,7 @@ from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.result import MESHES, RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work
-from engine.collision.scenes.batches import convex_poses
+from engine.collision.scenes.batches import posed_batch
 from engine.collision.simple.against_ball import centers_in_frame, named
 from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.closed_forms import told_by_forms
@@ -169,19 +169,20 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
     """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
-    if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
-        return None
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
     is_named = witnesses is not None  # then a search for contacts has to follow, and tells all relations
-    convex = convex_poses(first, second, poses, relations, budget, answers.boolean or is_named)
+    has_detail = answers.details is not None
+    batch = posed_batch(first, second, poses, relations, answers.boolean or is_named, has_detail, budget)
+    if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
+        return batch
     a, b = mesh_body_of(first), mesh_body_of(second)
     seek = what_to_seek(a, b, Work(budget, is_named, answers.boolean))
 
     def fill(start: int, stop: int) -> None:
-        if convex is not None:
-            convex(start, stop)
+        if batch is not None:
+            batch(start, stop)
         items: IntArray | slice = slice(start, stop)
-        if convex is not None:  # those apart are told, and without witnesses more
+        if batch is not None:  # those apart are told, and without witnesses more
             items = start + np.flatnonzero(relations[items] != DISJOINT if is_named else relations[items] == UNSETTLED)
         some = PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), True)
         rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)
@@ -192,7 +193,7 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
             budget.flag,
         )  # fmt: skip
         budget.check()
-        if answers.details is not None:  # those speak of overlaps that a crossing proves
+        if has_detail:  # those speak of overlaps that a crossing proves
             rows[(rows[:, RELATION] == OVERLAPPING) & (rows[:, N_CONTACTS] != ONE_SETTLES), RELATION] = UNSETTLED
         relations[items] = rows[:, RELATION]
         if witnesses is not None:

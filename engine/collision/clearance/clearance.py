@@ -226,7 +226,7 @@ class _Batch:
 
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
         """Answer the poses of a range as `SpreadPair.fill`; threads may answer different ranges."""
-        if self.relate is not None:
+        if self.relate is not None and not self.is_small:
             self.relate(start, stop)
         if self.is_small:
             turns, moves = read_only(self.poses.rotations[start:stop]), read_only(self.poses.translations[start:stop])

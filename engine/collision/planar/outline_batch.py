@@ -3,9 +3,9 @@ other.
 
 One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
 outside, for no other edge comes near. Where edges meet and none cross, every such place has a vertex: about it either
-interior is a sector, and three comparisons of sectors say whether the interiors meet there and which sticks out of the
-other. A ring that meets nothing lies where a vertex of it does. Together that is all: an edge that enters the other's
-interior does so at a contact, or its whole ring lies there. What rounded poses leave open stays UNSETTLED.
+interior is a sector (sectors.py). A ring that meets nothing lies where a vertex of it does. Together that is all: an
+edge that enters the other's interior does so at a contact, or its whole ring lies there. What rounded poses leave open
+stays UNSETTLED.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
 from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement, rings_of
+from engine.collision.planar.sectors import IN_BOTH, OUT_OF_FIRST, OUT_OF_SECOND, at_contact, is_in_box
 from engine.collision.result import (
     FIRST_WITHIN,
     OUTLINES,
@@ -34,7 +35,7 @@ from engine.collision.result import (
     Work,
 )
 from engine.direct import entry_of
-from engine.jit import allocating_kernel, called, inline, kernel
+from engine.jit import allocating_kernel, inline, kernel
 from engine.predicates.error_free import two_sum
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
@@ -52,9 +53,6 @@ APART, CROSSING, UNSURE, _VERTEX_EDGE, _VERTEX_VERTEX = range(5)
 _KINDS: dict[int, Kind] = {CROSSING: "edge_edge", _VERTEX_EDGE: "vertex_edge", _VERTEX_VERTEX: "vertex_vertex"}
 ON_EDGE = 3
 """Of a point: neither inside, 1, nor outside, 0."""
-IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
-"""Bits: where the open interiors meet; where that of the first lies outside the second; that of the second outside the
-first."""
 _IN, _OUT, _MAYBE = 1, 2, 4
 """Bits: of the rings of a body some inside another, some outside, some maybe."""
 _SMALLEST, _LARGEST = 2.0**-480, 2.0**480
@@ -128,12 +126,6 @@ def find_sides(vertices: Any, following: Any, sides: Any) -> None:
 
 
 @inline
-def _is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
-    """Tell whether a point lies in the box of an edge."""
-    return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
-
-
-@inline
 def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
     """Return CROSSING if two open edges surely cross in one point, APART, a contact, or UNSURE."""
     slack = 2.0 * error
@@ -151,8 +143,8 @@ def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
         return CROSSING
     if UNDECIDED in (by_a, by_b, by_c, by_d):
         return UNSURE
-    is_met = (by_a == 0 and _is_in_box(a, c, d)) or (by_b == 0 and _is_in_box(b, c, d))
-    is_met = is_met or (by_c == 0 and _is_in_box(c, a, b)) or (by_d == 0 and _is_in_box(d, a, b))
+    is_met = (by_a == 0 and is_in_box(a, c, d)) or (by_b == 0 and is_in_box(b, c, d))
+    is_met = is_met or (by_c == 0 and is_in_box(c, a, b)) or (by_d == 0 and is_in_box(d, a, b))
     if not is_met:
         return APART
     return _VERTEX_VERTEX if a in (c, d) or b in (c, d) else _VERTEX_EDGE
@@ -178,19 +170,17 @@ def is_simple(vertices: Any, following: Any) -> bool:
 
 
 @inline
-def _place(vertices: Any, turn: Any, move: Any, is_posed: bool, placed: Any) -> float:
+def _place(vertices: Any, turn: Any, move: Any, placed: Any) -> float:
     """Write the rounded posed vertices of a body; return a bound on the error of each coordinate (`placement.py`)."""
     reach, is_exact = 0.0, True
     for axis in range(2):  # a turn by the lattice
         x, y = turn[axis, 0], turn[axis, 1]
-        is_exact = is_exact and (not is_posed or (x * y == 0.0 and abs(x + y) == 1.0))
+        is_exact = is_exact and x * y == 0.0 and abs(x + y) == 1.0
     for vertex in range(len(vertices)):
         x, y = vertices[vertex, 0], vertices[vertex, 1]
         reach = max(reach, abs(x), abs(y))
         for axis in range(2):
-            value, lost = (x if axis == 0 else y), 0.0
-            if is_posed:
-                value, lost = two_sum(turn[axis, 0] * x + turn[axis, 1] * y, move[axis])
+            value, lost = two_sum(turn[axis, 0] * x + turn[axis, 1] * y, move[axis])
             is_exact = is_exact and lost == 0.0
             placed[vertex, axis] = value
     if is_exact:
@@ -260,53 +250,6 @@ def _rings_inside(points: Any, following: Any, vertices: Any, their_following: A
 
 
 @inline
-def _is_from(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
-    """Tell whether the direction from p to x is that to s, or lies strictly between s and e, counter-clockwise."""
-    by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
-    if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
-        if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
-            return True
-    if turn == 0:
-        return by_s > 0
-    return (by_s > 0 and by_e > 0) if turn > 0 else (by_s > 0 or by_e > 0)
-
-
-@called
-def _have_common(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
-    """Tell whether the open sectors about p from s to e, and from t to f, counter-clockwise, have common points."""
-    return _is_from(p, s, e, t) or _is_from(p, t, f, s)
-
-
-@inline
-def _of_sectors(
-    p: Point2, before: Point2, after: Point2, side: int, their_before: Point2, their_after: Point2, their_side: int
-) -> int:
-    """Return what holds about a vertex of one boundary on another, as bits."""
-    s, e = (after, before) if side > 0 else (before, after)
-    t, f = (their_after, their_before) if their_side > 0 else (their_before, their_after)
-    found = IN_BOTH if _have_common(p, s, e, t, f) else 0
-    found |= OUT_OF_SECOND if _have_common(p, s, e, f, t) else 0
-    return found | (OUT_OF_FIRST if _have_common(p, t, f, e, s) else 0)
-
-
-@called
-def _of_contact(
-    points: Any, following: Any, edge: int, side: int, vertices: Any, theirs: Any, other: int, their_side: int
-) -> int:
-    """Return what holds where two edges meet, as bits; of the start of an edge the one before it says that."""
-    a, b = as_point2(points, edge), as_point2(points, following[edge])
-    c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
-    found = 0
-    if b != c and _is_in_box(b, c, d) and orient2d(c, d, b) == 0:
-        after = as_point2(points, following[following[edge]])
-        their_after = as_point2(vertices, theirs[theirs[other]]) if b == d else d
-        found = _of_sectors(b, a, after, side, c, their_after, their_side)
-    if d != a and d != b and _is_in_box(d, a, b) and orient2d(a, b, d) == 0:
-        found |= _of_sectors(d, a, b, side, c, as_point2(vertices, theirs[theirs[other]]), their_side)
-    return found
-
-
-@inline
 def relate_placed(
     points: Any, following: Any, sides: Any, vertices: Any, theirs: Any, their_sides: Any, boxes: Any, error: float
 ) -> tuple[int, int, int, int, int]:
@@ -336,7 +279,7 @@ def relate_placed(
                 if how > UNSURE:
                     if len(sides) == 0 or len(their_sides) == 0 or sides[edge] == 0 or their_sides[other] == 0:
                         return UNSETTLED, 0, -1, -1, kind
-                    found |= _of_contact(
+                    found |= at_contact(
                         points, following, edge, sides[edge], vertices, theirs, other, their_sides[other]
                     )
     if is_unsure:
@@ -358,32 +301,39 @@ def relate_placed(
     return (DISJOINT if kind == APART else TOUCHING), found, first, second, kind
 
 
+@inline
+def _relate_under(
+    vertices: Any, following: Any, sides: Any, turn: Any, move: Any, other: Any, theirs: Any, their_sides: Any,
+    their_turn: Any, their_move: Any, room: tuple[Any, Any, Any],
+) -> tuple[int, int, int, int, int]:  # fmt: skip
+    """Return what `relate_placed` does, of two bodies under poses; room: for the vertices of both, and for boxes."""
+    placed, others, boxes = room
+    error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
+    box_blocks(others, theirs, boxes)
+    return relate_placed(placed, following, sides, others, theirs, their_sides, boxes, error)
+
+
 @allocating_kernel
 def relate_outline_pairs(
-    pool: OutlineArrays, bodies: Any, rows: Any, poses: PoseArrays, pairs: Any, has_detail: bool, relations: Any,
-    flag: Any,
-) -> None:  # fmt: skip
-    """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of bodies of a scene.
+    pool: OutlineArrays, bodies: Any, poses: PoseArrays, pairs: Any, has_detail: bool, relations: Any, flag: Any
+) -> None:
+    """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
 
-    bodies: of each its number in the pool, or -1; rows: of each the row of its pose, 0 for none. has_detail: overlaps
-    that are no PO stay UNSETTLED. Returns early when the flag is raised.
+    has_detail: overlaps that are no PO stay UNSETTLED. Returns early when the flag is raised.
     """
-    placed, boxes = np.empty((2, MOST_EDGES, 2)), np.empty((n_blocks(MOST_EDGES), 4))
+    room = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2)), np.empty((n_blocks(MOST_EDGES), 4))
+    r, t = poses.rotations, poses.translations
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
             return
-        i, j = bodies[pairs[item, 0]], bodies[pairs[item, 1]]
-        if relations[item] != UNSETTLED or i < 0 or j < 0:
+        i, j = pairs[item, 0], pairs[item, 1]
+        if relations[item] != UNSETTLED or bodies[i] < 0 or bodies[j] < 0:
             continue
-        i_row, j_row = rows[pairs[item, 0]], rows[pairs[item, 1]]
-        own, their = slice(pool.firsts[i], pool.firsts[i + 1]), slice(pool.firsts[j], pool.firsts[j + 1])
-        r, t = poses.rotations, poses.translations
-        error = _place(pool.vertices[own], r[i_row], t[i_row], i_row != 0, placed[0])
-        error = max(error, _place(pool.vertices[their], r[j_row], t[j_row], j_row != 0, placed[1]))
-        box_blocks(placed[1], pool.following[their], boxes)
-        relation, found, _, _, _ = relate_placed(
-            placed[0], pool.following[own], pool.sides[own], placed[1], pool.following[their], pool.sides[their], boxes,
-            error,
+        own = slice(pool.firsts[bodies[i]], pool.firsts[bodies[i] + 1])
+        their = slice(pool.firsts[bodies[j]], pool.firsts[bodies[j] + 1])
+        relation, found, _, _, _ = _relate_under(
+            pool.vertices[own], pool.following[own], pool.sides[own], r[i], t[i],
+            pool.vertices[their], pool.following[their], pool.sides[their], r[j], t[j], room,
         )  # fmt: skip
         if not has_detail or relation != OVERLAPPING or found == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
             relations[item] = relation
@@ -391,16 +341,14 @@ def relate_outline_pairs(
 
 @allocating_kernel
 def _relate_two(
-    vertices: Any, following: Any, sides: Any, turn: Any, move: Any, other: Any, their_following: Any, their_sides: Any,
-    their_turn: Any, their_move: Any, are_posed: tuple[bool, bool],
+    vertices: Any, following: Any, sides: Any, turn: Any, move: Any, other: Any, theirs: Any, their_sides: Any,
+    their_turn: Any, their_move: Any,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return what `relate_placed` does, of two bodies under poses."""
-    n = len(vertices)
-    placed, boxes = np.empty((n + len(other), 2)), np.empty((n_blocks(len(other)), 4))
-    error = _place(vertices, turn, move, are_posed[0], placed[:n])
-    error = max(error, _place(other, their_turn, their_move, are_posed[1], placed[n:]))
-    box_blocks(placed[n:], their_following, boxes)
-    return relate_placed(placed[:n], following, sides, placed[n:], their_following, their_sides, boxes, error)
+    """Return what `_relate_under` does."""
+    room = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
+    return _relate_under(
+        vertices, following, sides, turn, move, other, theirs, their_sides, their_turn, their_move, room
+    )
 
 
 def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, int, int]:
@@ -410,7 +358,7 @@ def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, 
     if max(len(one[1]), len(other[1])) > MOST_EDGES:
         return UNSETTLED, 0, -1, -1, APART
     found: tuple[int, int, int, int, int] = entry_of(_relate_two)(
-        *one, *motion_of(poses[0], 2), *other, *motion_of(poses[1], 2), (poses[0] is not None, poses[1] is not None)
+        *one, *motion_of(poses[0], 2), *other, *motion_of(poses[1], 2)
     )
     if found[0] == DISJOINT or (found[0] != UNSETTLED and _is_simple(first) and _is_simple(second)):
         return found

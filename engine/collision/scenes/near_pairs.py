@@ -64,8 +64,8 @@ def distances_below(
         form = form_of(bodies.distinct[kind])
         forms[kind] = forms[kind] if form is None else form
     pool, convex = _NONE, np.full(len(forms), -1, np.int64)
-    if bodies.is_posed[pairs[left]].any() or np.isnan(forms[kinds, 0]).any():
-        pool, convex = batches.pool(budget)
+    if bodies.dimension == 3 and (bodies.is_posed[pairs[left]].any() or np.isnan(forms[kinds, 0]).any()):
+        pool, convex = batches.pairs.pool(budget)
 
     def by_batch(start: int, stop: int) -> None:
         entry_of(gaps_of_pairs)(
