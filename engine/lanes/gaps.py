@@ -13,7 +13,7 @@ its middle, g the product of d and its normal. Triangles: the line of their midd
 where they are taken to the other tree, as in `boxes.py`. Discs: both sides of a comparison along a normal are off by
 less than twice the margin (`discs.py`); along another direction g is off by no more for either of them. Four of both
 margins are left out of each bound, and 2^-18 of it for what the last operations round and for rotations that are not
-quite orthogonal. Reaches along a direction are those of numbers of a tree, at most 2: they are off by less than 2^-18.
+quite orthogonal.
 """
 
 from __future__ import annotations
@@ -96,12 +96,6 @@ def child_bounds(
         bound = greater(level if their_cosine is None else level - _width(their_flat, their_cosine), bound)
     bound = greater(bound * _BELOW_ONE - (margin + ratio * their_margin) * 4.0, 0.0)  # what is no number is 0
     store(work, 0, lesser(bound, _MOST))
-
-
-@traced
-def triangle_reaches(blocks: Rows, node: int, way: Triple, work: Rows) -> None:
-    """Write how far the eight triangles of a block reach along a direction, in the tree, to the first row of work."""
-    store(work, 0, _ends(way, [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)])[1])
 
 
 def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]:

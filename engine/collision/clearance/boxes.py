@@ -14,23 +14,18 @@ import numpy as np
 
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
-from engine.collision.meshes.placement import Placement, defect_of, placed, turned_back
+from engine.collision.meshes.placement import Placement, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import inline, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
 from engine.lanes.discs import DISC_ROWS
-from engine.lanes.gaps import FIXED_ROWS, GAP_ROWS, near_triangle, place_triangles, triangle_reaches
+from engine.lanes.gaps import FIXED_ROWS, GAP_ROWS, near_triangle, place_triangles
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
-from engine.predicates.vectors import dot, largest_of, minus
 from engine.types import Point3
 
 ROOT: Final = -1
 """In place of a lane: the whole tree."""
-_ROUNDING: Final = 2.0**-44
-"""Of the size of both bodies: what 40 roundings of sums and products of coordinates may come to."""
-
-
 _BELOW_ONE: Final = 1.0 - 2.0**-50
 
 
@@ -48,43 +43,32 @@ Heap = namedtuple("Heap", "bounds lanes")
 Candidates = namedtuple("Candidates", "pairs bounds")
 """Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
 
-Room = namedtuple("Room", "heap found limits line kept points frames work fixed")
+Room = namedtuple("Room", "heap found limits line points frames work fixed")
 """Work space of searches, one at a time.
 
-limits (2,): of a search (traversal.py). line (12,): the direction of the nearest pair so far, not longer than 1, in
-the axes of both bodies and in space; where the two origins are along it; how often it turned. kept (n_nodes, 4): of
-either body the turn at which `block_reach` was found, and it. points (2, 3): the nearest. frames, work, fixed: of
-`lanes/gaps.py`.
+limits (2,): of a search (traversal.py). line (6,): the direction of the nearest pair so far, not longer than 1, in the
+axes of both bodies. points (2, 3): the nearest. frames, work, fixed: of `lanes/gaps.py`.
 """
 
 
-def new_room(room: int, n_nodes: int) -> Room:
-    """Return work space for so many pairs, and trees of so many nodes."""
+def new_room(room: int) -> Room:
+    """Return work space for so many pairs."""
     heap, found = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
-        heap, Candidates(found, np.empty(room)), np.empty(2), np.zeros(12), np.zeros((n_nodes, 4)),
+        heap, Candidates(found, np.empty(room)), np.empty(2), np.zeros(6),
         np.empty((2, 3)), np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((GAP_ROWS, LANES), np.float32),
         np.empty((FIXED_ROWS, LANES), np.float32),
     )  # fmt: skip
 
 
 class Search(NamedTuple):
-    """One question: both bodies, what bounds along the line allow for, bound on the distance of a point from its
-    rounded one (both bodies together), and work space."""
+    """One question: both bodies, a bound on the distance of a point from its rounded one, both bodies together, and
+    work space."""
 
     a: View
     b: View
-    margin: float
     error: float
     room: Room
-
-
-@inline
-def margin_of(a: View, b: View) -> float:
-    """Return what bounds along the line allow for: rounding, and directions that poses make longer."""
-    apart = scaled(minus(b.place.shift, a.place.shift), a.unit)
-    size = 4.0 * (a.mesh.extent.reach * a.unit + b.mesh.extent.reach * b.unit) + 2.0 * largest_of(apart)
-    return float((_ROUNDING + 16.0 * (defect_of(a.place) + defect_of(b.place))) * size + 1e-300)
 
 
 @merged
@@ -120,15 +104,11 @@ def way_of(line: Any, row: int, sign: float) -> tuple[float, float, float]:
 
 @inline
 def set_line(line: Any, a: View, b: View, d: Point3) -> None:
-    """Keep a direction, not longer than 1, in the axes of either body and in space."""
+    """Keep a direction, not longer than 1, in the axes of either body."""
     d = Point3(_BELOW_ONE * d.x, _BELOW_ONE * d.y, _BELOW_ONE * d.z)
     e, f = turned_back(a.place, d), turned_back(b.place, d)
     line[0], line[1], line[2] = e.x, e.y, e.z
     line[3], line[4], line[5] = f.x, f.y, f.z
-    line[6], line[7], line[8] = d.x, d.y, d.z
-    line[9] = dot(d, scaled(a.place.shift, a.unit))
-    line[10] = dot(d, scaled(b.place.shift, b.unit))
-    line[11] += 1.0
 
 
 DONE: Final = 0
@@ -137,8 +117,6 @@ CLOSER: Final = 2
 INTERRUPTED: Final = 3
 """How a search ended: with all pairs; without room for more pairs of boxes or triangles; with two points nearer than
 asked; by the flag."""
-_REACH: Final = 2.0**-18
-"""More than what a product of a direction with two vectors of float32, none of them above 2, is off by."""
 _ABOVE_ONE: Final = 1.0 + 2.0**-22
 
 
@@ -174,37 +152,6 @@ def keep_below(found: Any, n: int, most: float) -> int:
                 found.pairs[n_kept, column] = found.pairs[item, column]
             n_kept += 1
     return n_kept
-
-
-@merged
-def reach_from(s: Search, view: View, row: int) -> float:
-    """Return how far the origin of a body's tree reaches along the line toward the other body, rounding left out."""
-    line, o, unit = s.room.line, view.mesh.origin, view.unit
-    d = Point3(line[3 * row], line[3 * row + 1], line[3 * row + 2])
-    return (1.0 - 2.0 * row) * (dot(d, scaled(Point3(o[0], o[1], o[2]), unit)) + line[9 + row]) + _REACH * size_of(view)
-
-
-@merged
-def block_reach(s: Search, view: View, row: int, node: int) -> float:
-    """Return how far the triangles of a block reach along the line, toward the other body; kept until that turns."""
-    kept, sign = s.room.kept[node], 1.0 - 2.0 * row
-    if kept[2 * row] != s.room.line[11]:
-        triangle_reaches(view.mesh.blocks, node, way_of(s.room.line, row, sign), s.room.work)
-        kept[2 * row] = s.room.line[11]
-        most = _most_of_block(view.mesh.child, node, s.room.work)
-        kept[2 * row + 1] = sign * (reach_from(s, view, row) + most * size_of(view))
-    return float(kept[2 * row + 1])
-
-
-@inline
-def _most_of_block(child: Any, node: int, work: Any) -> float:
-    """Return the largest number in the first row of work in a lane with a triangle."""
-    most = np.float64(work[0, 0])
-    for lane in range(1, LANES):
-        if child[node, lane] == EMPTY:
-            break
-        most = max(most, np.float64(work[0, lane]))
-    return most
 
 
 @merged

@@ -46,11 +46,11 @@ _ROOM: Final = 4096
 _rooms = threading.local()
 
 
-def _room(n_nodes: int) -> Room:
-    """Return the work space that this thread keeps, for trees of so many nodes."""
+def _room() -> Room:
+    """Return the work space that this thread keeps."""
     found: Room | None = getattr(_rooms, "room", None)
-    if found is None or len(found.kept) < n_nodes or len(found.heap.bounds) != _ROOM:
-        found = _rooms.room = new_room(_ROOM, max(n_nodes, 256))
+    if found is None or len(found.heap.bounds) != _ROOM:
+        found = _rooms.room = new_room(_ROOM)
     return found
 
 
@@ -65,7 +65,7 @@ class SpreadPair:
         self.n_exact = 0  # poses that the exact stage was asked about
         self._radii = radius_of(first), radius_of(second)
         a, b = self.meshes
-        self._room = _room(max(len(a.arrays.child), len(b.arrays.child)))
+        self._room = _room()
         self._reach = 4.0 * (a.arrays.extent.reach + b.arrays.extent.reach) + sum(self._radii)
 
     def clearance(self, item: int) -> Clearance:
@@ -114,7 +114,7 @@ class SpreadPair:
                 every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
                 yield how, start, every
             else:
-                self._room = new_room(2 * len(self._room.found.bounds), len(self._room.kept))
+                self._room = new_room(2 * len(self._room.found.bounds))
 
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the least gap of the candidates, of equal ones that of the smallest faces, and its triangles."""

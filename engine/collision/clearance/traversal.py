@@ -29,10 +29,8 @@ from engine.collision.clearance.boxes import (
     ROOT,
     Search,
     View,
-    block_reach,
     fix,
     keep_below,
-    margin_of,
     measure_blocks,
     scaled,
     set_line,
@@ -143,9 +141,6 @@ def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
         their_node = 0 if j == ROOT else int(second[j >> 3, j & 7])
         i_block, j_block = first[node, 0] < 0, second[their_node, 0] < 0
         if i_block and j_block:
-            reach, their_reach = block_reach(s, s.a, 0, node), block_reach(s, s.b, 1, their_node)
-            if their_reach - reach - s.margin > limits[0]:
-                continue
             how, n_found = measure_blocks(s, node, their_node, n_found, limits)
             if how != DONE:
                 return how, 0
@@ -164,10 +159,8 @@ def _middle(view: View) -> Point3:
 
 @inline
 def _start_line(s: Search) -> None:
-    """Take the line of the middles of both trees to begin with; what was kept for another is of no use."""
-    for k in range(11):
-        s.room.line[k] = 0.0
-    s.room.line[11] += 1.0
+    """Take the line of the middles of both trees to begin with."""
+    s.room.line[:] = 0.0
     start, their_start = _middle(s.a), _middle(s.b)
     middle = minus(their_start, start)
     size = length(middle)
@@ -202,7 +195,7 @@ def find_nearest(
         place, other = place_pair(first.extent, first_poses, own, second.extent, second_poses, item)
         radii = asked.radius * unit, asked.other_radius * unit
         a, b = View(first, place, unit), View(second, other, unit)
-        s = Search(a, b, margin_of(a, b), 2.0 * unit * (place.error + other.error), room)
+        s = Search(a, b, 2.0 * unit * (place.error + other.error), room)
         defect = defect_of(place) + defect_of(other)
         set_frame(room.frames[0], place, first.origin, first.scale, other, second.origin, second.scale, defect)
         set_frame(room.frames[1], other, second.origin, second.scale, place, first.origin, first.scale, defect)

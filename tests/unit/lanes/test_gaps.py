@@ -17,7 +17,6 @@ from engine.lanes.gaps import (
     child_bounds,
     near_triangle,
     place_triangles,
-    triangle_reaches,
 )
 from engine.lanes.tracing import LANES
 from engine.solids.surface import Surface
@@ -91,16 +90,3 @@ def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
                         gap = ours[:, None] - _placed(_below(b, their_node, k), other)[None]
                         most = np.linalg.norm(gap, axis=2).min() / a.scale * (1.0 + 2.0**-22)
                         assert near_triangle(a.blocks, node, lane, frames, way, most, work) >> k & 1
-
-
-def test_reaches_of_blocks_are_those_of_their_triangles() -> None:
-    draw = np.random.default_rng(8)
-    mesh, work = _soup(draw, 3.0), np.empty((GAP_ROWS, LANES), np.float32)
-    d = draw.normal(size=3)
-    d /= np.linalg.norm(d)
-    for node in _children(mesh, are_blocks=True):
-        triangle_reaches(mesh.blocks, node, tuple(d), work)
-        for lane in range(LANES):
-            if mesh.child[node, lane] != EMPTY:
-                reach = ((_below(mesh, node, lane) - mesh.origin) / mesh.scale @ d).max()
-                assert abs(reach - float(work[0, lane])) <= 2.0**-18
