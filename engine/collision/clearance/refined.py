@@ -9,8 +9,6 @@ between them from below, whatever the points are.
 point takes six operations more, a slab eight, each on numbers below twice `size`, which bounds all coordinates. All
 together is below 2^-98 size; 2^-94 size is allowed.
 
-Most candidates name the two features of the first, of which all that they add are corners: floats tell those apart.
-
 **Proof of the points** (`certify`). All candidates that are left name the same two features, vertex, edge or triangle.
 The nearest points of their lines or planes have weights, quotients of differences of products of two scalar products.
 Vectors are off by e = 2^-97 in each coordinate (none is above 2); with L the longest coordinate of edges, M that of the
@@ -33,17 +31,14 @@ from engine.collision.clearance.boxes import Search, View, keep_below, scaled
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
 from engine.collision.meshes.mesh_arrays import triangle_of
-from engine.collision.meshes.placement import Placement, turned
+from engine.collision.meshes.placement import Placement
 from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
-from engine.predicates.vectors import as_point3, dot, minus
 from engine.types import Point3
 
 ROUNDING: Final = 2.0**-94
-_ROUGHLY: Final = 2.0**-40
-"""More than a scalar product of differences of rounded points, none above 2, may be off."""
 
 
 @inline
@@ -140,19 +135,19 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 
 @called
-def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float, Point3, Point3]:
-    """Return the distance of two points of the triangles, by how much the triangles may be nearer at most but for
-    rounding, and the points, rounded."""
+def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
+    """Return the distance of two points of the triangles, and by how much the triangles may be nearer at most but for
+    rounding."""
     p, q, _, _ = ends_of(s, t, first, second)
-    n, ends = less3(q, p), (Point3(p.x.h, p.y.h, p.z.h), Point3(q.x.h, q.y.h, q.z.h))
+    n = less3(q, p)
     square = dot3(n, n)
     if not square.h > 2.0**-300:
-        return Wide(0.0, 0.0), 0.0, *ends
+        return Wide(0.0, 0.0), 0.0
     beyond = 0.0
     for k in range(3):
         beyond = max(beyond, height_above(n, corner(s, k), p).h, -height_above(n, corner(t, k), q).h)
     size = root(square)
-    return size, 2.0 * beyond / size.h, *ends
+    return size, 2.0 * beyond / size.h
 
 
 @inline
@@ -163,18 +158,6 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
     if feature < 3:
         return i, -1, -1
     return (min(i, j), max(i, j), -1) if feature < FACE else (i, j, t[triangle, 2])
-
-
-@inline
-def _is_beyond(view: View, item: int, known: tuple[int, int, int], shift: Point3, way: Point3, base: Point3) -> bool:
-    """Tell whether the corners of a triangle that are none of a feature surely lie beyond the plane across a way."""
-    for k in range(3):
-        vertex = view.mesh.triangles[item, k]
-        if vertex not in known:
-            v = turned(view.place, scaled(as_point3(view.mesh.vertices, vertex), view.unit))
-            if not dot(way, minus(Point3(v.x + shift.x, v.y + shift.y, v.z + shift.z), base)) < -_ROUGHLY:
-                return False
-    return True
 
 
 @inline
@@ -195,24 +178,10 @@ def refine(s: Search, start: Any, other: Any, radii: Any, n: int) -> tuple[float
     found, unit = s.room.found, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
     shift = shift_of(s, start, other)
-    here, there = named(s.a, found.pairs[0, 0], found.pairs[0, 2]), named(s.b, found.pairs[0, 1], found.pairs[0, 3])
-    none, rough = Point3(0.0, 0.0, 0.0), Point3(shift.x.h, shift.y.h, shift.z.h)
-    p = q = none
     for k in range(n):
         i, j, first, second = found.pairs[k]
-        if (
-            k > 0
-            and named(s.a, i, first) == here
-            and named(s.b, j, second) == there
-            and _is_beyond(s.a, i, here, none, minus(q, p), p)
-            and _is_beyond(s.b, j, there, rough, minus(p, q), q)
-        ):
-            found.bounds[k] = found.bounds[0]  # the same two points, and no corner more that may be nearer
-            continue
         t, u = corners_of(s.a, i, Wide3(origin, origin, origin)), corners_of(s.b, j, shift)
-        size, beyond, here_p, there_q = _bounds(t, u, first, second)
-        if k == 0:
-            p, q = here_p, there_q
+        size, beyond = _bounds(t, u, first, second)
         low = less(size, Wide(beyond, 0.0))
         found.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
         least = size if less(size, least).h < 0.0 or k == 0 else least
