@@ -1,7 +1,7 @@
 """Which pairs of a scene that do not meet are nearer than a gap, and how far apart they are.
 
-Boxes around the bodies tell in doubles, with room for rounding, which pairs are surely clear. Boxes along the axes,
-balls and convex bodies are measured in batches (closed_forms.py, convex_gaps.py), all others as by `clearance_poses`.
+Boxes along the axes, balls and convex bodies are measured in batches (closed_forms.py, convex_gaps.py), all others as
+by `clearance_poses`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.budget import Budget
 from engine.collision.clearance.clearance import has_plane
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
@@ -27,9 +27,6 @@ from engine.collision.simple.form_relations import N_NUMBERS
 from engine.direct import entry_of
 from engine.parallel import run_chunks
 
-_ROUNDING: Final = 2.0**-48
-"""Of a distance of two boxes: differences, two hypotenuses and the products here round by less than 16 u."""
-_TINY: Final = 2.0**-1060
 _STRETCHED: Final = 1.0 + 2.0**-38
 """What a pose may stretch: no entry of R' R - I is beyond 1e-12. Two equal poses are left out, as by `collide`, but not
 from the boxes."""
@@ -50,12 +47,11 @@ def distances_below(
 
     is_measured: else only whether they are nearer is told, and those that are have 0.0.
     """
-    bodies, result = batches.bodies, np.full(len(pairs), np.inf)
+    bodies, found = batches.bodies, np.full(len(pairs), np.inf)
     if not gap:
-        return result
-    left = np.flatnonzero(_may_be_near(bodies, pairs, gap))
-    places = pairs[left] + 1
-    kinds, (i, j), found = bodies.kinds[places - 1], places.T, np.empty(len(left))
+        return found
+    places = pairs + 1
+    kinds, (i, j) = bodies.kinds[pairs], places.T
     turns, moves = bodies.rotations, bodies.translations
     equal = np.flatnonzero((moves[i] == moves[j]).all(axis=1))  # of equal poses, which are left out, as by `collide`
     places[equal[(turns[i[equal]] == turns[j[equal]]).all(axis=(1, 2))]] = 0
@@ -64,7 +60,7 @@ def distances_below(
         form = form_of(bodies.distinct[kind])
         forms[kind] = forms[kind] if form is None else form
     pool, convex = _NONE, np.full(len(forms), -1, np.int64)
-    if bodies.dimension == 3 and (bodies.is_posed[pairs[left]].any() or np.isnan(forms[kinds, 0]).any()):
+    if bodies.dimension == 3 and (bodies.is_posed[pairs].any() or np.isnan(forms[kinds, 0]).any()):
         pool, convex = batches.pairs.pool(budget)
 
     def by_batch(start: int, stop: int) -> None:
@@ -73,7 +69,7 @@ def distances_below(
             is_measured, found[start:stop], budget.flag,
         )  # fmt: skip
 
-    run_chunks(by_batch, len(left), budget=budget, workers=workers)
+    run_chunks(by_batch, len(pairs), budget=budget, workers=workers)
     still = np.flatnonzero(np.isnan(found))
     still = still[np.lexsort(kinds[still].T)]  # pairs of the same two solids are asked together
 
@@ -82,11 +78,10 @@ def distances_below(
         ends = [*(start + 1 + np.flatnonzero((some[1:] != some[:-1]).any(axis=1))).tolist(), stop]
         for begin, end in pairwise([start, *ends]):
             rows = still[begin:end]
-            found[rows] = _asked(bodies, pairs[left[rows]], places[rows], gap, is_measured, budget)
+            found[rows] = _asked(bodies, pairs[rows], places[rows], gap, is_measured, budget)
 
     run_chunks(by_search, len(still), budget=budget, first_chunk=4, workers=workers)
-    result[left] = found
-    return result
+    return found
 
 
 def _asked(
@@ -115,12 +110,3 @@ def _asked(
         found[found == 0.0] = np.nan
         pair.fill(0, len(pairs), found)
     return found
-
-
-@np.errstate(all="ignore")
-def _may_be_near(bodies: SceneBodies, pairs: IntArray, gap: float) -> BoolArray:
-    """Tell for pairs whether their boxes are not surely further apart than the gap."""
-    (i, j), low, high = pairs.T, bodies.low, bodies.high
-    apart = np.hypot.reduce(np.fmax(np.fmax(low[j] - high[i], low[i] - high[j]), 0.0), axis=1)
-    reach = gap * _STRETCHED
-    return ~(apart * (1.0 - _ROUNDING) > reach * (1.0 + _ROUNDING) + _TINY)
