@@ -83,13 +83,8 @@ def collide_poses(
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
     n_poses = len(poses.rotations)
-    if n_poses == 1 and progress is None and not (detail or report):
-        if deadline is None and cancel is None:
-            one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
-        else:
-            with Budget(deadline, cancel) as budget:
-                budget.check()
-                one = _collide_pose(first, second, poses, Work(budget, bool(witnesses), bool(boolean)))
+    if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
+        one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
         relations = _ALONE[one.relation].copy()
         return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:

@@ -76,8 +76,8 @@ def clearance(
     Boundary: 0.0 exactly where they have a common point; a positive distance that would round to 0 is the smallest
     denormal. Degenerate input: as `collide`; radius 0, flat boxes and faces without area are bodies too.
     Of several nearest pairs the one on the faces with the smallest numbers is given, the first body's first; where two
-    faces are as near along an edge or all over, one point of that: of boxes along the axes the one nearest to where the
-    first one's face, or edge in the plane, begins.
+    faces are as near along an edge or all over, one point of that: of boxes along the axes, with gaps from 1e-135 to
+    1e150, the one nearest to where the first one's face, or edge in the plane, begins.
     Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
     points given may be a little nearer or further. Poses are exact images, equal ones are left out, as by `collide`.
     Cost: boxes along the axes, balls and half-spaces some 4 us, small bodies of the plane 8. Others both trees, built

@@ -2,12 +2,12 @@
 
 A box is an interval on each axis, a ball one without length and a radius about it. On each axis two of them are apart,
 or share an interval: the distance is the root of the squares of what parts them, less the radii. Where they share
-intervals every point of those is as near, and `ends_of_shared` chooses.
+intervals every point of those is as near, and `_ends_of_shared` chooses.
 
 **Bound.** A coordinate of a body that is not turned, shifted or not, is a double-double without error; a turned centre
 is off by `error`. A difference of two is off by 3 u^2 of itself (and by `error`), not at all where both are doubles;
 squares, their sum and its root together are below 32 u^2 of the root. What the bounds leave open (a tie, a contact or
-almost, exponents) is decided in rationals.
+almost, exponents) is left to the search.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ _EDGES: Final = (2, 1, 3, 0, 0, 0)
 _GAPS, _ROOM = 24, 30
 
 
-def touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
+@inline
+def _touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
     """Return on which sides of an axis each of two boxes has nearest points, low 1, high 2.
 
     up, down: the signs of the second's low less the first's high, and of the first's low less the second's high; lows,
@@ -43,7 +44,8 @@ def touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
     return int(lows >= 0) | int(highs <= 0) << 1, int(lows <= 0) | int(highs >= 0) << 1
 
 
-def ends_of_shared(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
+@inline
+def _ends_of_shared(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
     """Return on which faces of two boxes the nearest points lie that are chosen: a bit each, 2 axis + side.
 
     faces, theirs: those with nearest points; free: the axes on which there are several. The smallest face of the first
@@ -65,9 +67,6 @@ def ends_of_shared(faces: int, theirs: int, free: int, d: int) -> tuple[int, int
             left_out = ~(1 << (2 * axis + (0 if is_high else 1)))
             faces, theirs = faces & left_out, theirs & left_out
     return faces, theirs
-
-
-_touched, _ends_of_shared = inline(touched), inline(ends_of_shared)
 
 
 @inline

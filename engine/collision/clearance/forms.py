@@ -1,5 +1,5 @@
-"""Boxes along the axes, balls and half-spaces: how far apart, by `closed_forms.py`, in rationals where that is not
-sure. Small bodies of the plane by `outlines.py`.
+"""Boxes along the axes, balls and half-spaces: how far apart, by `closed_forms.py`, where that is sure. Small bodies of
+the plane by `outlines.py`.
 
 A linear function over a body is largest at a vertex: of a half-space and any body floats leave the vertices that may be
 it, rationals decide.
@@ -16,20 +16,19 @@ import numpy as np
 
 from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
-from engine.collision.clearance.closed_forms import UNSURE, ends_of_shared, nearest_of_forms, nearest_of_plane, touched
+from engine.collision.clearance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_under_poses
 from engine.collision.clearance.spreads import BALL, feature_of, outline_of, radius_of, spread_of
-from engine.collision.exact_images import Vector, as_vector, image_half_space, image_point, value_at
+from engine.collision.exact_images import Vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.collision.simple.closed_forms import FORMS, form_of
 from engine.direct import entry_of
-from engine.predicates.rational import minus, sign_of, squared_length
-from engine.solids.aabb import Aabb
+from engine.predicates.rational import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
-from engine.solids.pose import Pose, motion_of
+from engine.solids.pose import motion_of
 from engine.solids.sphere import Sphere
 
 _MOST_PAIRS: Final = 1 << 18
@@ -63,8 +62,8 @@ def _told(distance: float, least: float | None) -> Clearance | bool | None:
 
 
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, and boxes
-    that are turned."""
+    """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, boxes that
+    are turned, and where it is not sure."""
     if first.type not in FORMS or second.type not in FORMS:
         return None
     form, other = form_of(first), form_of(second)
@@ -78,8 +77,7 @@ def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None
         return told
     if distance > 0.0 and faces >= 0 and least is None:
         return _answer(distance, points, _named(first, faces), _named(second, theirs))
-    placed = _placed_exactly(first, poses[0]), _placed_exactly(second, poses[1])
-    return None if placed[0] is None or placed[1] is None else _settled((first, second), placed[0], placed[1], least)
+    return None
 
 
 def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
@@ -160,48 +158,6 @@ def _answer(distance: float, points: FloatArray, first: Feature, second: Feature
 
 def _named(solid: Solid, faces: int) -> Feature:
     return BALL if isinstance(solid, Sphere) else FEATURES[solid.dimension][faces]
-
-
-def _placed_exactly(solid: Solid, pose: Pose | None) -> tuple[Vector, Vector] | None:
-    """Return low and high of a placed box or ball; None for a box that is turned."""
-    if isinstance(solid, Sphere):
-        center = image_point(solid.center.tolist(), pose)
-        return center, center
-    assert isinstance(solid, Aabb)
-    if pose is None:
-        return as_vector(solid.min.tolist()), as_vector(solid.max.tolist())
-    if not (pose.rotation == np.eye(solid.dimension)).all():
-        return None
-    return image_point(solid.min.tolist(), pose), image_point(solid.max.tolist(), pose)
-
-
-def _settled(
-    solids: tuple[Solid, Solid], first: tuple[Vector, Vector], second: tuple[Vector, Vector], least: float | None
-) -> Clearance | bool:
-    """Return what `between_forms` does, in rationals."""
-    d, faces, theirs, free = solids[0].dimension, 0, 0, 0
-    for k, (low, high, their_low, their_high) in enumerate(zip(*first, *second)):
-        up, down = sign_of(their_low - high), sign_of(low - their_high)
-        here, there = touched(up, down, sign_of(low - their_low), sign_of(high - their_high))
-        faces, theirs = faces | here << 2 * k, theirs | there << 2 * k
-        free |= (up < 0 and down < 0 and low < high and their_low < their_high) << k
-    faces, theirs = ends_of_shared(faces, theirs, free, d)
-    p, q = _point(first, second, faces, theirs), _point(second, first, theirs, faces)
-    radii = tuple(float(solid.radius) if isinstance(solid, Sphere) else 0.0 for solid in solids)
-    gap = scaled_gap(p, q, (radii[0], radii[1]))
-    if gap.gap.top <= sum(gap.radii) ** 2 * gap.gap.bottom:
-        return MEETING if least is None else False
-    if least is not None:
-        return gap.is_at_least(Fraction(least))
-    return gap.clearance((_named(solids[0], faces), _named(solids[1], theirs)), d)
-
-
-def _point(own: tuple[Vector, Vector], across: tuple[Vector, Vector], faces: int, theirs: int) -> Vector:
-    """Return the point on some faces of a box that is nearest to the one on some faces of another."""
-    return tuple(
-        (own if faces >> 2 * k & 3 else across)[not (faces if faces >> 2 * k & 3 else theirs) >> 2 * k & 1][k]
-        for k in range(len(own[0]))
-    )
 
 
 def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:

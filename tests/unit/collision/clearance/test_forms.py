@@ -1,4 +1,4 @@
-"""Boxes, balls and half-spaces in closed form: what double-doubles are sure of is what rationals say, with points."""
+"""Boxes, balls and half-spaces in closed form: what double-doubles are sure of is what the search and rationals say."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import engine.collision.clearance.forms as forms
 from engine import Aabb, HalfSpace, Pose, Sphere, clearance
 from engine.budget import Budget
-from engine.collision.clearance.closed_forms import UNSURE
+from engine.collision.clearance.clearance import do_meet
 from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
+from engine.collision.clearance.spreads import spread_pair
 from engine.collision.result import Clearance, Feature
 from tests.unit.collision.clearance.makers import turn
 
@@ -42,37 +42,24 @@ def said(found: Clearance | bool | None) -> Any:
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-9, 1e150, 1e-150, 1e300, 5e-324 * 2**55])
-def test_boxes_and_balls_are_what_rationals_say(size: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_boxes_and_balls_are_what_the_search_says(size: float) -> None:
     rng, n_sure = random.Random(int(np.log2(size))), 0
-    real = forms.entry_of
-    for _ in range(300):
+    for _ in range(100):
         d = rng.choice([2, 3])
         first, second, poses = body(rng, d, size), body(rng, d, size), (pose(rng, d, size), pose(rng, d, size))
-        sure: list[bool] = []
-
-        def told(kernel: Any, sure: list[bool] = sure) -> Any:
-            def call(*arguments: Any) -> Any:
-                found = real(kernel)(*arguments)
-                sure.append(found[0] == 0.0 or (found[0] > 0.0 and found[1] >= 0))
-                return found
-
-            return call
-
-        monkeypatch.setattr(forms, "entry_of", told)
         found: Any = between_forms(first, second, poses, None)
-        monkeypatch.setattr(forms, "entry_of", lambda _: lambda *_: (UNSURE, -1, -1))
-        exact = between_forms(first, second, poses, None)
-        n_sure += sum(sure)
-        assert said(found) == said(exact), (first, second, poses)
-        if exact is None:
+        if found is None:
             continue
-        for least in (nextafter(found.distance, 0.0), found.distance, nextafter(found.distance, 1e308)):
-            if least > 0.0:
-                monkeypatch.setattr(forms, "entry_of", lambda _: lambda *_: (UNSURE, -1, -1))
-                settled = between_forms(first, second, poses, least)
-                monkeypatch.setattr(forms, "entry_of", real)
-                assert between_forms(first, second, poses, least) is settled, (first, second, poses, least)
-    assert n_sure > 50 or not 1e-140 < size < 1e140
+        n_sure += 1
+        with Budget() as budget:
+            if found is MEETING:
+                assert do_meet(first, second, poses, budget), (first, second, poses)
+                continue
+            exact = spread_pair(first, second, poses, budget).clearance(0)
+        assert found.distance == exact.distance, (first, second, poses)
+        assert between_forms(first, second, poses, nextafter(found.distance, 0.0)) is True
+        assert between_forms(first, second, poses, nextafter(found.distance, 1e308)) is False
+    assert n_sure > 20 or not 1e-140 < size < 1e140
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-9, 1e100, 1e300])
