@@ -18,8 +18,7 @@ from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.budget import Budget
-from engine.collision.scenes.batches import SceneBatches
-from engine.collision.scenes.bodies import SceneBodies, bodies_of, check_collidable, distinct_of
+from engine.collision.scenes.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.posed.locators import posed_locator
 from engine.containment.rational_locate import is_located

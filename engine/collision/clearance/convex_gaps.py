@@ -4,7 +4,7 @@ Of the differences M = {a - b} of two bodies the point nearest to the origin is 
 furthest toward the origin is added to a simplex of at most three corners, of which those stay that the nearest point
 of all needs. Whatever direction that gives, the slab across it parts the bodies: all vertices are looked at.
 
-**Clear** is proven as *apart* is in `xenocollide.py`, by a slab wider than the gap; **near** by two points, each off by
+**Clear** is proven as *apart* is in `convex/pair.py`, by a slab wider than the gap; **near** by two points, each off by
 the error of a placed point and 2^-48 of the largest corner of M, which covers their weights. The distance itself is
 that of the nearest points of the two features that the last simplex names, bounded as in `refined.py`.
 
@@ -23,8 +23,7 @@ from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.refined import ROUNDING, corner_of, ends_of, height_above
 from engine.collision.clearance.wide import Wide, Wide3, dot3, less, less3, root
 from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays, point_of
-from engine.collision.convex.pair import inner_point
-from engine.collision.convex.xenocollide import PlacedBody, farthest, largest, placed_body
+from engine.collision.convex.pair import PlacedBody, farthest, inner_point, largest, placed_body
 from engine.collision.meshes.placement import PoseArrays, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import called, inline, kernel, merged

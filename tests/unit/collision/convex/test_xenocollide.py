@@ -10,8 +10,7 @@ import pytest
 from engine import Aabb, Pose, Relation, collide
 from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, ConvexArrays, convex_body_of, pooled
-from engine.collision.convex.pair import inner_point
-from engine.collision.convex.xenocollide import APART, MEETING, meet_or_apart, placed_body
+from engine.collision.convex.pair import APART, MEETING, inner_point, meet_or_apart, placed_body
 from engine.collision.meshes.placement import PoseArrays
 from engine.jit import kernel
 from engine.predicates.vectors import minus

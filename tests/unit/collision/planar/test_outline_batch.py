@@ -12,8 +12,7 @@ from engine.collision.planar import outline_batch
 from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement
 from engine.collision.planar.outline_batch import collide_outlines, outline_parts, outline_pool
 from engine.collision.result import Work
-from engine.collision.scenes.batches import SceneBatches
-from engine.collision.scenes.bodies import scene_bodies
+from engine.collision.scenes.batches import SceneBatches, scene_bodies
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 

@@ -7,8 +7,7 @@ import numpy as np
 from engine import Aabb, Pose, Relation, Solid, Sphere, Surface, collide
 from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
-from engine.collision.scenes.batches import SceneBatches
-from engine.collision.scenes.bodies import scene_bodies
+from engine.collision.scenes.batches import SceneBatches, scene_bodies
 
 
 def test_agrees_with_single_pairs_where_it_answers() -> None:

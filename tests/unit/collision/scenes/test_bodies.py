@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Pose, Sphere, WrongDimensionError
-from engine.collision.scenes.bodies import distinct_of, scene_bodies
+from engine.collision.scenes.batches import distinct_of, scene_bodies
 
 TURN = Pose([[0, -1], [1, 0]], [5, 0])
 
