@@ -12,7 +12,6 @@ from typing import Any, Literal, NamedTuple
 
 from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
-from engine.solids.base import setters_of
 from engine.solids.pose import Pose
 from engine.types import Rcc8, Relation
 
@@ -144,7 +143,7 @@ class Feature(NamedTuple):
     indices: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False, init=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Clearance:
     """How far apart two bodies are.
 
@@ -155,13 +154,3 @@ class Clearance:
     distance: float
     points: FloatArray | None = None
     features: tuple[Feature, Feature] | None = None
-
-    def __init__(
-        self, distance: float, points: FloatArray | None = None, features: tuple[Feature, Feature] | None = None
-    ) -> None:
-        _set_distance(self, distance)
-        _set_points(self, points)
-        _set_features(self, features)
-
-
-_set_distance, _set_points, _set_features = setters_of(Clearance)

@@ -34,11 +34,6 @@ class Immutable:
         raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
 
 
-def setters_of(kind: type) -> list[Callable[[Any, Any], None]]:
-    """Return what fills the slots of a frozen dataclass, one a field, without the detour of `object.__setattr__`."""
-    return [getattr(kind, field.name).__set__ for field in fields(kind)]
-
-
 class Preparing:
     """Keeps what is built when it is asked for first; whoever inherits sets `_lock`, an RLock, and `_prepared`, {}."""
 
