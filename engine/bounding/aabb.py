@@ -10,11 +10,9 @@ unposed.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import FloatArray, IntArray
 from engine.jit import kernel
 
 
@@ -37,8 +35,9 @@ def corners_of_box(low: FloatArray, high: FloatArray) -> FloatArray:
 
 @kernel
 def place_boxes(
-    boxes: Any, reaches: Any, radii: Any, kinds: Any, rows: Any, rotations: Any, translations: Any, low: Any, high: Any
-) -> None:
+    boxes: FloatArray, reaches: FloatArray, radii: FloatArray, kinds: IntArray, rows: IntArray, rotations: FloatArray,
+    translations: FloatArray, low: FloatArray, high: FloatArray,
+) -> None:  # fmt: skip
     """Fill low and high (n, d), rounded outward.
 
     boxes (n_kinds, 2, d), of a ball its centre twice; reaches (n_kinds,): how far the body's points are at most from

@@ -23,11 +23,11 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.budget import Budget
 from engine.direct import entry_of
 from engine.jit import allocating_kernel, inline, kernel
@@ -52,7 +52,7 @@ without cells where the first column of `boxes` ascends.
 """
 
 
-def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: Any, block: int = BLOCK) -> Iterator[IntArray]:
+def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: FlagArray, block: int = BLOCK) -> Iterator[IntArray]:
     """Yield ``(n_pairs, 2)`` pairs first < second of closed boxes ``(n, d)`` with a common point, block by block.
 
     Each block is sorted, but where there are several a later one may hold smaller indices; it has about `block` pairs,
@@ -79,7 +79,7 @@ def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> Int
     return pairs
 
 
-def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: Any, block: int) -> Iterator[IntArray]:
+def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: FlagArray, block: int) -> Iterator[IntArray]:
     """Yield the blocks of `pairs_of_boxes`, a pair as first * n + second."""
     n_boxes = len(low)
     grid = _without_cells(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
@@ -137,7 +137,7 @@ def _grid_of(low: FloatArray, high: FloatArray) -> CornerGrid | None:
 
 
 @kernel
-def _measure(low: Any, high: Any, extent: Any) -> None:
+def _measure(low: FloatArray, high: FloatArray, extent: FloatArray) -> None:
     """Fill extent (n,) with the largest side of each box, infinite where a bound is or the side overflows."""
     for box in range(low.shape[0]):
         side = 0.0
@@ -149,7 +149,7 @@ def _measure(low: Any, high: Any, extent: Any) -> None:
 
 
 @kernel
-def _spread(low: Any, extent: Any, widest: float, span: Any) -> None:
+def _spread(low: FloatArray, extent: FloatArray, widest: float, span: FloatArray) -> None:
     """Fill span (2, 3) with the least and the greatest low corner of boxes that are not large."""
     for box in range(low.shape[0]):
         if extent[box] <= widest:
@@ -159,7 +159,10 @@ def _spread(low: Any, extent: Any, widest: float, span: Any) -> None:
 
 
 @allocating_kernel
-def _sort_into_cells(low: Any, high: Any, extent: Any, widest: float, least: Any, width: Any, grid: CornerGrid) -> int:
+def _sort_into_cells(
+    low: FloatArray, high: FloatArray, extent: FloatArray, widest: float, least: FloatArray, width: FloatArray,
+    grid: CornerGrid,
+) -> int:  # fmt: skip
     """Fill the arrays of the grid, boxes and starts zero before; return the sum of the squares of how many share a
     cell."""
     starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
@@ -195,7 +198,7 @@ def _sort_into_cells(low: Any, high: Any, extent: Any, widest: float, least: Any
 
 
 @inline
-def _meet(boxes: Any, box: int, other: int) -> bool:
+def _meet(boxes: FloatArray, box: int, other: int) -> bool:
     """Tell whether two closed boxes have a common point; without branches, which would be guessed wrong."""
     return (
         (boxes[box, 0] <= boxes[other, 3])
@@ -208,7 +211,9 @@ def _meet(boxes: Any, box: int, other: int) -> bool:
 
 
 @inline
-def _add_run(boxes: Any, numbers: Any, box: int, start: int, stop: int, keys: Any, n_found: int) -> int:
+def _add_run(
+    boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, keys: IntArray, n_found: int
+) -> int:
     """Write the keys of the pairs of a box with those of a run that it meets; return the number then found. One key
     more than is found may be written."""
     n_boxes, own = numbers.shape[0], numbers[box]
@@ -220,7 +225,7 @@ def _add_run(boxes: Any, numbers: Any, box: int, start: int, stop: int, keys: An
 
 
 @kernel
-def _collect(grid: CornerGrid, start: int, enough: int, keys: Any, flag: Any) -> tuple[int, int]:
+def _collect(grid: CornerGrid, start: int, enough: int, keys: IntArray, flag: FlagArray) -> tuple[int, int]:
     """Write first * n + second of the pairs of boxes from place `start` on with those after them, until `enough` are
     found; return their number and the place to go on from."""
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray, Int32Array, read_only
+from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.budget import poll
 from engine.jit import allocating, allocating_kernel, inline, kernel
 from engine.lanes.boxes import EMPTY, exchange, fill, join
@@ -119,7 +119,7 @@ def on_lines(array: Any) -> Any:
 
 
 @kernel
-def _normalise(boxes: Any, origin: Any, items: Any, halves: Any) -> float:
+def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: Halves) -> float:
     """Fill origin (3,), items with the boxes in the coordinates of the tree, and the root of halves; return scale."""
     n_items, half = boxes.shape[0], 0.0
     for axis in range(3):
@@ -147,7 +147,7 @@ def _normalise(boxes: Any, origin: Any, items: Any, halves: Any) -> float:
 
 
 @allocating
-def _middle_of(boxes: Any, axis: int) -> float:
+def _middle_of(boxes: FloatArray, axis: int) -> float:
     """Return the median of some boxes' centres along an axis."""
     n_seen, step = 0, (len(boxes) - 1) // _SAMPLE + 1
     sorted_centres = np.empty(_SAMPLE)
@@ -176,7 +176,7 @@ def _include(halves: Any, node: int, others: Any, other: int) -> None:
 
 
 @allocating_kernel
-def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
+def _halve(items: Items, halves: Halves, stack: IntArray, state: IntArray) -> None:
     """Go on with the binary tree for `_WORK` items.
 
     Caller guarantees 2 n - 1 rows, of which the first is there. stack: rows of node and depth; state: how many rows
@@ -211,7 +211,9 @@ def _halve(items: Any, halves: Any, stack: Any, state: Any) -> None:
 
 
 @allocating_kernel
-def _widen(items: Any, halves: Any, boxes: Any, child: Any, stack: Any, state: Any) -> None:
+def _widen(
+    items: Items, halves: Halves, boxes: Float32Array, child: Int32Array, stack: IntArray, state: IntArray
+) -> None:
     """Go on to join binary nodes to nodes of eight, the largest boxes opened first, for `_WORK` / 8 nodes.
 
     stack: rows of binary node and node; state: how many rows wait there, and how many nodes are filled or wait.
@@ -255,7 +257,7 @@ def _widen(items: Any, halves: Any, boxes: Any, child: Any, stack: Any, state: A
 
 
 @inline
-def _set_lane(boxes: Any, node: int, lane: int, rows: Any, row: int) -> None:
+def _set_lane(boxes: Float32Array, node: int, lane: int, rows: Float32Array, row: int) -> None:
     """Store a box as centre and half width, enlarged."""
     for axis in range(3):
         low, high = float(rows[row, axis]), -float(rows[row, 4 + axis])
@@ -264,13 +266,13 @@ def _set_lane(boxes: Any, node: int, lane: int, rows: Any, row: int) -> None:
 
 
 @inline
-def _half_area(rows: Any, row: int) -> float:
+def _half_area(rows: Float32Array, row: int) -> float:
     x, y, z = -rows[row, 4] - rows[row, 0], -rows[row, 5] - rows[row, 1], -rows[row, 6] - rows[row, 2]
     return x * y + y * z + z * x
 
 
 @inline
-def _split(items: Any, halves: Any, node: int, bins: Any, parts: int) -> int:
+def _split(items: Items, halves: Halves, node: int, bins: Bins, parts: int) -> int:
     """Reorder the run of a node so that its left and right part make a good pair of children, and set the boxes of the
     nodes `parts` and `parts` + 1 to theirs; return where the right part starts, where the run does if there is none."""
     start, end, low, width, axis = halves.runs[node, 0], halves.runs[node, 1], np.float32(0.0), np.float32(-1.0), 0
@@ -312,7 +314,7 @@ def _bin_of(centre: float, low: float, scale: float, n_bins: int) -> int:
 
 
 @inline
-def _best_cut(boxes: Any, scratch: int, bins: Any, n_bins: int) -> int:
+def _best_cut(boxes: Float32Array, scratch: int, bins: Bins, n_bins: int) -> int:
     """Return the number of bins to the left of the cheapest cut, 0 where no cut has a finite cost.
 
     boxes: of which the row `scratch` may be used.

@@ -6,10 +6,11 @@ thick and as wide as their corners reach along that axis and away from it.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray
 from engine.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
@@ -20,7 +21,7 @@ _ENLARGED: Final = 2.0**-20
 
 
 @allocating_kernel
-def fill_discs(blocks: Any, child: Any, boxes: Any, discs: Any) -> None:
+def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array) -> None:
     """Fill discs (n_nodes, 8, 8), of inner nodes only, from blocks (`lanes/faces.py`) and boxes of the same tree."""
     n_nodes = child.shape[0]
     parents = np.full(n_nodes, -1, np.int64)  # 8 times the parent, and the lane
@@ -51,14 +52,14 @@ def fill_discs(blocks: Any, child: Any, boxes: Any, discs: Any) -> None:
 
 
 @inline
-def _corner(rows: Any, node: int, lane: int, corner: int) -> Point3:
+def _corner(rows: Float32Array, node: int, lane: int, corner: int) -> Point3:
     """Return a corner of a triangle of a block; of boxes the first is the centre."""
     x, y, z = rows[node, 3 * corner, lane], rows[node, 3 * corner + 1, lane], rows[node, 3 * corner + 2, lane]
     return Point3(float(x), float(y), float(z))
 
 
 @inline
-def _set_normals(blocks: Any, child: Any, parents: Any, normals: Any) -> None:
+def _set_normals(blocks: Float32Array, child: Int32Array, parents: IntArray, normals: FloatArray) -> None:
     """Set normals (n_nodes, 3), zeros, to the direction of the sum of the normals of all faces below a node."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
@@ -83,7 +84,10 @@ def _set_normals(blocks: Any, child: Any, parents: Any, normals: Any) -> None:
 
 
 @inline
-def _set_reached(blocks: Any, child: Any, boxes: Any, parents: Any, normals: Any, reached: Any) -> None:
+def _set_reached(
+    blocks: Float32Array, child: Int32Array, boxes: Float32Array, parents: IntArray, normals: FloatArray,
+    reached: FloatArray,
+) -> None:  # fmt: skip
     """Set reached (n_nodes, 3) to the least and largest product of a corner below with the normal, and the largest
     squared distance from the axis, counted from the middle of the node's box."""
     for node in range(len(child)):

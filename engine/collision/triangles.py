@@ -12,8 +12,6 @@ Source: the textbook's exercise 22.4-5; separating axes after S. Gottschalk et a
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
@@ -32,11 +30,11 @@ from engine.predicates.rational import scaled_integers
 from engine.predicates.vectors import as_point2
 from engine.solids.checks import as_point_groups
 from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED, Accuracy, Relation
+from engine.types import UNDECIDED, Accuracy, Point2, Relation
 
 
 @inline
-def as_facet2(t: Any) -> Facet:
+def as_facet2(t: FloatArray) -> Facet:
     """Load a triangle (3, 2)."""
     return Facet(as_point2(t, 0), as_point2(t, 1), as_point2(t, 2))
 
@@ -48,7 +46,7 @@ def are_apart_on_axis(p: float, q: float, r: float, s: float, t: float, u: float
 
 
 @inline
-def are_boxes_apart(t: Any, u: Any) -> bool:
+def are_boxes_apart(t: Facet, u: Facet) -> bool:
     """Tell whether the boxes around two triangles have no common point on the first two axes."""
     if are_apart_on_axis(t.p.x, t.q.x, t.r.x, u.p.x, u.q.x, u.r.x):
         return True
@@ -56,7 +54,7 @@ def are_boxes_apart(t: Any, u: Any) -> bool:
 
 
 @merged
-def against_edge(p: Any, q: Any, u: Facet) -> int:
+def against_edge(p: Point2, q: Point2, u: Facet) -> int:
     """Return how u lies to the line p q: apart from its left, within that, touching it from the right, or over it."""
     a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
     if max(a, b, c) == UNDECIDED:
@@ -110,14 +108,14 @@ def relation_of_triangles(t: Facet, u: Facet) -> int:
 
 
 @kernel
-def relate_triangles_2d(first: Any, second: Any, relations: Any) -> None:
+def relate_triangles_2d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 2) float64 arrays."""
     for item in range(relations.shape[0]):
         relations[item] = relation_of_triangles(as_facet2(first[item]), as_facet2(second[item]))
 
 
 @allocating_kernel
-def relate_triangles_3d(first: Any, second: Any, relations: Any) -> None:
+def relate_triangles_3d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
     """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):

@@ -11,9 +11,9 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from engine.arrays import Int8Array
+from engine.arrays import FloatArray, Int8Array
 from engine.budget import UNLIMITED
-from engine.containment.locators import locator_of, polygon_by, polyhedron_by, rational_half, settle
+from engine.containment.locators import Locator, locator_of, polygon_by, polyhedron_by, rational_half, settle
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
 from engine.containment.posed.filters import NOT_FINITE
 from engine.containment.rational_locate import combine, over_tree
@@ -80,7 +80,7 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
     return (locations, 0, 0, method) if n_beyond == 0 else _settled(array, solid, locations, n_beyond, method)
 
 
-def _settled(array: Any, solid: Solid, locations: Int8Array, n_beyond: int, method: str) -> Located:
+def _settled(array: FloatArray, solid: Solid, locations: Int8Array, n_beyond: int, method: str) -> Located:
     if n_beyond == NOT_FINITE:
         check_finite(array, ("points",))
     rest = np.flatnonzero(locations == UNDECIDED)
@@ -114,7 +114,7 @@ def _plan_of(solid: Solid, n_points: int) -> tuple[int, Plan | None]:
     return PASS, solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], by(solid, choice, UNLIMITED))
 
 
-def _kept(solid: Solid, key: str, locator: Any) -> Plan | None:
+def _kept(solid: Solid, key: str, locator: Locator) -> Plan | None:
     if not locator.direct:
         return None
     kernel, *prepared = locator.direct
@@ -125,7 +125,7 @@ def _kept(solid: Solid, key: str, locator: Any) -> Plan | None:
     return solid.prepared(key, lambda: plan)
 
 
-def _in_tree(array: Any, solid: Csg) -> Located | None:
+def _in_tree(array: FloatArray, solid: Csg) -> Located | None:
     """Return what `csg_locator` finds, each leaf asked at once; None where one of them cannot be."""
     leaves: dict[int, Located | None] = {}
     over_tree(solid, lambda leaf: leaves.setdefault(id(leaf), located_at_once(array, leaf)), lambda *_: None)

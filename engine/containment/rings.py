@@ -15,11 +15,11 @@ slabs. Below an extent of 2^-960 underflow could spoil this: there is no grid.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int32Array, IntArray
+from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of, make_axis
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
 from engine.containment.rational_locate import Check, no_check
@@ -37,7 +37,9 @@ _NO_STATUSES: Final = np.empty(0, np.int8)
 
 
 @kernel
-def close_rings(vertices: Any, ring_offsets: Any, xs: Any, ys: Any, runs: Any, box: Any) -> None:
+def close_rings(
+    vertices: FloatArray, ring_offsets: IntArray, xs: FloatArray, ys: FloatArray, runs: Int32Array, box: FloatArray
+) -> None:
     """Fill xs and ys with the rings of vertices (n, 2), each ended by its first vertex, runs with one for each, and box
     with xmin, xmax, ymin, ymax."""
     place, x_min, x_max, y_min, y_max = 0, np.inf, -np.inf, np.inf, -np.inf
@@ -55,7 +57,9 @@ def close_rings(vertices: Any, ring_offsets: Any, xs: Any, ys: Any, runs: Any, b
 
 
 @kernel
-def list_runs(ys: Any, rings: Any, slabs: Any, ends: Any, lasts: Any, runs: Any, is_fill: bool) -> None:
+def list_runs(
+    ys: FloatArray, rings: Int32Array, slabs: Axis, ends: IntArray, lasts: IntArray, runs: Int32Array, is_fill: bool
+) -> None:
     """Count (ends[slab] += 1) or list the runs of each slab; rings (n, 2): runs; lasts (n_slabs,): -1 each."""
     low, scale, n_slabs = slabs.low, slabs.cells_per_unit, slabs.n_cells
     for ring in range(len(rings)):
@@ -73,12 +77,14 @@ def list_runs(ys: Any, rings: Any, slabs: Any, ends: Any, lasts: Any, runs: Any,
 
 
 @inline
-def _place(value: float, axis: Any) -> float:
+def _place(value: float, axis: Axis) -> float:
     return (value * 0.5 - axis.low * 0.5) * axis.cells_per_unit
 
 
 @kernel
-def mark_cells(xs: Any, ys: Any, runs: Any, u: Any, v: Any, statuses: Any, flag: Any) -> None:
+def mark_cells(
+    xs: FloatArray, ys: FloatArray, runs: Int32Array, u: Axis, v: Axis, statuses: Int8Array, flag: FlagArray
+) -> None:
     """Set the status of every cell that an edge may reach into to MIXED."""
     for run in range(len(runs)):
         bu, bv = _place(xs[runs[run, 0]], u), _place(ys[runs[run, 0]], v)
@@ -100,7 +106,7 @@ def mark_cells(xs: Any, ys: Any, runs: Any, u: Any, v: Any, statuses: Any, flag:
 
 
 @kernel
-def spread_locations(rings: Any, statuses: Any, flag: Any) -> None:
+def spread_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> None:
     """Set the status of each cell that is not MIXED, from the cell to its left, that below, or by the slabs."""
     u, v, slabs = rings.u, rings.v, rings.slabs
     for row in range(v.n_cells):
@@ -169,7 +175,7 @@ def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
     return solid.prepared("slabs", build, check)
 
 
-def ring_cells_of(solid: Polygon, flag: Any, check: Check = no_check) -> Rings:
+def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> Rings:
     """Return the slabs of a polygon with a grid of cells, prepared once; without one where there can be none.
 
     Cost: some 60 ns an edge, and 12 bytes.

@@ -30,6 +30,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import Float32Array
 from engine.jit import inline, merged
 from engine.lanes.lanes import aligned, any_of, bits_of, count_bits, dot, greater, lesser, load, prefetch
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
@@ -49,7 +50,7 @@ _LINE: Final = 16
 
 
 @inline
-def _set_normal(row: Any, place: int, u: Any, v: Any) -> float:
+def _set_normal(row: Float32Array, place: int, u: tuple[float, ...], v: tuple[float, ...]) -> float:
     """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on its error."""
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     size = max(
@@ -64,7 +65,7 @@ def _set_normal(row: Any, place: int, u: Any, v: Any) -> float:
 
 
 @inline
-def set_nothing(row: Any) -> None:
+def set_nothing(row: Float32Array) -> None:
     """Write the entry of a triangle that no segment in the cell crosses."""
     for k in range(ROWS - 1):
         row[k] = 0.0
@@ -72,7 +73,10 @@ def set_nothing(row: Any) -> None:
 
 
 @inline
-def set_entry(row: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> None:
+def set_entry(
+    row: Float32Array, a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...], u: tuple[float, ...],
+    v: tuple[float, ...],
+) -> None:  # fmt: skip
     """Write the entry of a triangle to row (13,) or longer.
 
     a, b, c: corners less R; u, v: b - a and c - a; all of them differences of the given numbers, each rounded once, in
@@ -108,7 +112,7 @@ def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> i
 
 
 @merged
-def parity_across(groups: Any, group: int, wx: Any, wy: Any, wz: Any) -> int:
+def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: float) -> int:
     """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNDECIDED."""
     parity = group_parity(groups, group, wx, wy, wz)
     while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so

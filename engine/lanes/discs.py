@@ -24,6 +24,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import Float32Array
 from engine.jit import inline
 from engine.lanes.boxes import MARGIN_ROW, SHIFT_ROW
 from engine.lanes.lanes import any_above, bits_of, dot, greater, load, load_lane, root, sift, store
@@ -35,8 +36,9 @@ ROUND: Final = 2.0**-18
 
 @inline
 def discs_meeting(
-    low: int, high: int, first: Any, i: int, second: Any, j: int, frames: Any, scales: tuple[float, float], work: Any
-) -> tuple[int, int]:
+    low: int, high: int, first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array,
+    scales: tuple[float, float], work: Float32Array,
+) -> tuple[int, int]:  # fmt: skip
     """Return those of the pairs of children (`boxes.meeting`) whose discs may meet.
 
     scales: of the two trees. work (DISC_ROWS or more, 8) float32.

@@ -15,8 +15,9 @@ Normals are taken from a tree's own coordinates, at most 2, so nothing overflows
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
+from engine.arrays import Float32Array
 from engine.jit import inline
 from engine.lanes.boxes import FRAME_ROWS, MARGIN_ROW, SHIFT_ROW, Bounds, are_parted
 from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, greater, lane_of, lesser, load, load_lane, sift, store
@@ -35,7 +36,9 @@ _BEYOND: Final = 2.0**98  # a float32 between all coordinates with their margins
 
 
 @inline
-def faces_meeting(first: Any, i: int, second: Any, j: int, frames: Any, work: Any) -> tuple[int, int]:
+def faces_meeting(
+    first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array, work: Float32Array
+) -> tuple[int, int]:
     """Return which triangles of block i and block j may meet: bit 8 a + b for the lanes a and b, lanes a < 4 and the
     others apart, each in 32 bits. work (WORK_ROWS, 8) float32: what it holds after the call is of no use."""
     low, high = meet_boxes(first, i, second, j, frames, work)

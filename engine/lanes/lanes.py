@@ -31,6 +31,7 @@ from engine.lanes.tracing import (
     Mask,
     Number,
     Rows,
+    _Traced,
     instruction,
 )
 
@@ -149,7 +150,7 @@ def count_bits(bits: int) -> int:
 
 
 @inline
-def sift(bits: int, first_lane: int, remaining: Any, arguments: Any) -> int:
+def sift(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
     """Return those of four lanes' pairs (`bytes_of`) of which ``remaining(lane, *arguments)`` leaves the second."""
     kept = 0
     while bits != 0:  # bound: each turn ends a lane

@@ -46,7 +46,7 @@ AXES_BEFORE: Final = (1, 2, 0, 1, 2)
 
 
 @inline
-def longest_axis(half: Any) -> int:
+def longest_axis(half: tuple[float, ...]) -> int:
     """Return the axis along which a half is longest."""
     x, y, z = abs(half[0]), abs(half[1]), abs(half[2])
     if x >= y and x >= z:

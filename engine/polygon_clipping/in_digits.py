@@ -16,9 +16,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.jit import allocating, called, inline
 from engine.polygon_clipping.cut_vertices import VALUE_BOUND
-from engine.polygon_clipping.rings import EXACT, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
+from engine.polygon_clipping.rings import (
+    EXACT,
+    NO_ROOM,
+    Clipped,
+    Cutting,
+    Plane,
+    PlaneTables,
+    Polygons,
+    has_bridges,
+    plane_of,
+)
 from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, put_double, sign_of, sum_products
 from engine.types import OPEN
 
@@ -60,7 +71,7 @@ class ExactScratch(NamedTuple):
 
 
 @allocating
-def exact_scratch(room: int, dimension: int, row_heap: Any, row_places: Any) -> Any:
+def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: IntArray) -> Any:
     """Return what `clip_exactly` works in: for rings that grow to `room` vertices, those that were dropped included."""
     first = _ROWS + row_heap.size
     heap = np.empty(first + 8 * SLOT + 48 * room, np.int64)
@@ -76,7 +87,7 @@ def exact_scratch(room: int, dimension: int, row_heap: Any, row_places: Any) -> 
 
 
 @inline
-def load_vertex(s: Any, v: int, n_ring: int, side: int) -> None:
+def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
     """Set ``loaded[side]`` to the places of vertex v's numbers; those of an original vertex are made there."""
     d = s.points.shape[1]
     for k in range(d + 1):
@@ -90,7 +101,7 @@ def load_vertex(s: Any, v: int, n_ring: int, side: int) -> None:
 
 
 @inline
-def value_at(s: Any, plane: int, side: int, place: int) -> bool:
+def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
     """Put the value of a plane at a loaded vertex at `place`; False where it is too long."""
     n = s.loaded.shape[1]
     for k in range(n):
@@ -99,7 +110,7 @@ def value_at(s: Any, plane: int, side: int, place: int) -> bool:
 
 
 @inline
-def sign_of_vertex(s: Any, plane: Plane, v: int, n_ring: int) -> tuple[int, bool]:
+def sign_of_vertex(s: ExactScratch, plane: Plane, v: int, n_ring: int) -> tuple[int, bool]:
     """Return the exact sign of a plane at vertex v; False where numbers are too long."""
     d, number, axis = s.points.shape[1], plane.number, plane.axis
     if axis >= 0:
@@ -121,7 +132,7 @@ def sign_of_vertex(s: Any, plane: Plane, v: int, n_ring: int) -> tuple[int, bool
 
 
 @inline
-def are_same(s: Any, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
+def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
     """Tell whether two vertices are the same point; the second is False where numbers are too long."""
     d = s.points.shape[1]
     for k in range(d):
@@ -142,7 +153,7 @@ def are_same(s: Any, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
 
 
 @inline
-def put_sums(s: Any, place: int, k: int, carry: int) -> bool:
+def put_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
     """Make number k of the vertex at `place` of two terms, on top of the heap; False where it is too long."""
     top = s.used[1]
     if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
@@ -153,7 +164,7 @@ def put_sums(s: Any, place: int, k: int, carry: int) -> bool:
 
 
 @inline
-def cut_edge(s: Any, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
+def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
     """Make the numbers of vertex j, where the edge p q crosses a plane; False where they are too long."""
     load_vertex(s, p, n_ring, 0)
     load_vertex(s, q, n_ring, 1)
@@ -169,7 +180,7 @@ def cut_edge(s: Any, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
 
 
 @inline
-def cut_corner(s: Any, plane: int, other: int, j: int) -> bool:
+def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
     """Make the numbers of vertex j, where two lines of the plane meet; False where they are too long."""
     for k in range(3):  # the cross product of both rows
         a, b = (k + 1) % 3, (k + 2) % 3
@@ -184,7 +195,7 @@ def cut_corner(s: Any, plane: int, other: int, j: int) -> bool:
 
 
 @inline
-def cut(s: Any, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
+def cut(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
     """Return the vertex made where the edge v w crosses a plane, leaving its inner side or not; TOO_LONG."""
     j, edge, d = s.used[0], s.edges[v], s.points.shape[1]
     if j + 1 >= s.points.shape[0]:
@@ -205,7 +216,7 @@ def cut(s: Any, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
 
 
 @inline
-def push(s: Any, made: Any, kept: int, v: int, is_on: bool, n_ring: int) -> int:
+def push(s: ExactScratch, made: IntArray, kept: int, v: int, is_on: bool, n_ring: int) -> int:
     """Append a vertex, on the plane or not, to the `kept` ones of a ring; return how many there are then, or TOO_LONG.
 
     One that is the same point as the vertex before hands its edge on to that one.
@@ -224,7 +235,7 @@ def push(s: Any, made: Any, kept: int, v: int, is_on: bool, n_ring: int) -> int:
 
 
 @inline
-def close_ring(s: Any, made: Any, kept: int, n_ring: int) -> int:
+def close_ring(s: ExactScratch, made: IntArray, kept: int, n_ring: int) -> int:
     """Return how many vertices of a ring stay, without last ones that are the first point; TOO_LONG."""
     while kept > 1 and s.on_plane[kept - 1] and s.on_plane[0]:
         is_same, is_known = are_same(s, made[kept - 1], made[0], n_ring)
@@ -237,7 +248,7 @@ def close_ring(s: Any, made: Any, kept: int, n_ring: int) -> int:
 
 
 @inline
-def classify(s: Any, plane: Plane, ring: Any, n: int, n_ring: int) -> tuple[int, int]:
+def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int) -> tuple[int, int]:
     """Set the signs of the n vertices of a ring; return how many are outside (TOO_LONG), and on the plane."""
     n_out, n_on = 0, 0
     for i in range(n):
@@ -250,7 +261,7 @@ def classify(s: Any, plane: Plane, ring: Any, n: int, n_ring: int) -> tuple[int,
 
 
 @inline
-def cut_ring(s: Any, plane: int, ring: Any, n: int, made: Any, n_ring: int) -> tuple[int, int]:
+def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray, n_ring: int) -> tuple[int, int]:
     """Cut a ring of n vertices with signs by a plane into `made`; return how many are left (TOO_LONG), and are cuts."""
     kept, n_cuts = 0, 0
     for i in range(n):
@@ -270,7 +281,7 @@ def cut_ring(s: Any, plane: int, ring: Any, n: int, made: Any, n_ring: int) -> t
 
 
 @inline
-def load_ring(s: Any, vertices: Any, first: int, last: int) -> int:
+def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> int:
     """Load a ring without vertices equal to the one before, around the ring; return how many."""
     n, d = 0, s.points.shape[1]
     for i in range(first, last):
@@ -292,7 +303,9 @@ def load_ring(s: Any, vertices: Any, first: int, last: int) -> int:
 
 
 @inline
-def cut_by_planes(s: Any, planes: Any, cutting: Cutting, n_cutting: int, n_ring: int, stop: Any) -> tuple[int, int]:
+def cut_by_planes(
+    s: ExactScratch, planes: PlaneTables, cutting: Cutting, n_cutting: int, n_ring: int, stop: FlagArray
+) -> tuple[int, int]:
     """Cut the ring that is loaded by one plane after another; return how many vertices are left, in which of `rings`.
 
     TOO_LONG or NO_ROOM instead. Adds to the contacts of the planes, and to which dropped a vertex.
@@ -316,8 +329,8 @@ def cut_by_planes(s: Any, planes: Any, cutting: Cutting, n_cutting: int, n_ring:
 
 @called
 def clip_exactly(
-    s: Any, polygons: Polygons, polygon: int, planes: Any, cutting: Cutting, n_cutting: int, stop: Any,
-    clipped: Clipped, written: int,
+    s: ExactScratch, polygons: Polygons, polygon: int, planes: PlaneTables, cutting: Cutting, n_cutting: int,
+    stop: FlagArray, clipped: Clipped, written: int,
 ) -> int:  # fmt: skip
     """Clip a polygon by the planes of `cutting`, whose contacts begin anew; `written` vertices are there already.
 

@@ -21,10 +21,21 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.jit import allocating, called, merged
 from engine.lanes.lanes import move
 from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
-from engine.polygon_clipping.rings import CLIPPED, NO_ROOM, Clipped, Cutting, Plane, Polygons, has_bridges, plane_of
+from engine.polygon_clipping.rings import (
+    CLIPPED,
+    NO_ROOM,
+    Clipped,
+    Cutting,
+    Plane,
+    PlaneTables,
+    Polygons,
+    has_bridges,
+    plane_of,
+)
 
 DOUBT: Final = -1
 """Instead of a number of vertices: doubles do not prove something."""
@@ -73,7 +84,9 @@ def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
 
 
 @merged
-def load_ring(s: Scratch, vertices: Any, begin: int, end: int) -> tuple[int, float, float, float, float, float, float]:
+def load_ring(
+    s: Scratch, vertices: FloatArray, begin: int, end: int
+) -> tuple[int, float, float, float, float, float, float]:
     """Load a ring without vertices equal to the one before; return how many, and the bounds of each axis.
 
     Zeros become +0.0. The first vertex may still be repeated at the end.
@@ -113,7 +126,7 @@ def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
 
 
 @merged
-def choose_planes(s: Scratch, planes: Any) -> tuple[int, bool]:
+def choose_planes(s: Scratch, planes: PlaneTables) -> tuple[int, bool]:
     """List the planes that may cut a polygon; return how many, and whether one has all of it outside.
 
     A plane that has all vertices inside cuts nothing: what later planes see are points between the vertices.
@@ -158,7 +171,7 @@ def value_at(s: Scratch, row: tuple[float, float, float, float], v: int) -> floa
 
 
 @merged
-def mark_sides(s: Scratch, planes: Any, n_cutting: int, n: int) -> None:
+def mark_sides(s: Scratch, planes: PlaneTables, n_cutting: int, n: int) -> None:
     """Set the codes of n vertices: a bit for each plane that one is outside of, ALONE where it is on one or near it."""
     pool, codes, d = s.vertices.pool, s.codes, len(s.vertices.names)
     for i in range(n):
@@ -178,7 +191,7 @@ def mark_sides(s: Scratch, planes: Any, n_cutting: int, n: int) -> None:
 
 
 @merged
-def take_runs(s: Scratch, planes: Any, n_cutting: int, n_ring: int) -> int:
+def take_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int) -> int:
     """List the ring that is loaded as runs of vertices that stay and go together; return how many."""
     ring, edges, ends, codes = s.rings[0], s.vertices.edges, s.ends, s.codes
     if n_cutting == 0:
@@ -201,7 +214,7 @@ def take_runs(s: Scratch, planes: Any, n_cutting: int, n_ring: int) -> int:
 
 
 @merged
-def classify_across(s: Scratch, plane: Plane, ring: Any, n: int, n_ring: int) -> tuple[int, int]:
+def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: int) -> tuple[int, int]:
     """Set the signs of n vertices at a plane across an axis; return how many are not outside (DOUBT), and on it."""
     pool, rests, d, axis, place = s.vertices.pool, s.vertices.rests, len(s.vertices.names), plane.axis, plane.place
     sense, n_in, n_on = 1 if plane.high[plane.number, axis] > 0.0 else -1, 0, 0
@@ -222,7 +235,7 @@ def classify_across(s: Scratch, plane: Plane, ring: Any, n: int, n_ring: int) ->
 
 
 @merged
-def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Any, n: int) -> tuple[int, int]:
+def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n: int) -> tuple[int, int]:
     """Set the signs of n vertices at a plane across no axis; see `classify_across`. None is on it for sure."""
     row, n_in = row_of(s, plane), 0
     for i in range(n):
@@ -235,7 +248,9 @@ def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Any, n: int) 
 
 
 @merged
-def cut_ring(s: Scratch, plane: Plane, ring: Any, n: int, made: Any, n_ring: int, n_made: int) -> tuple[int, int]:
+def cut_ring(
+    s: Scratch, plane: Plane, ring: Int32Array, n: int, made: Int32Array, n_ring: int, n_made: int
+) -> tuple[int, int]:
     """Cut a ring of n vertices by a plane at which they have their signs, into `made`: keep, cross or drop each edge.
 
     n_made: how many vertices there are, cut ones included. Returns how many are left (DOUBT), and how many there are.
@@ -271,7 +286,7 @@ def cut_ring(s: Scratch, plane: Plane, ring: Any, n: int, made: Any, n_ring: int
 
 
 @merged
-def cut_by_planes(s: Scratch, planes: Any, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
+def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
     """Cut the ring of n runs by one plane after another; return how many are left (DOUBT), and in which of `rings`."""
     n_made, now, cutting = n_ring, 0, s.cutting
     for i_plane in range(n_cutting):
@@ -297,7 +312,7 @@ def cut_by_planes(s: Scratch, planes: Any, n_cutting: int, n: int, n_ring: int) 
 
 
 @merged
-def emit(s: Scratch, ring: Any, n: int, n_ring: int, out: Any, place: int) -> int:
+def emit(s: Scratch, ring: Int32Array, n: int, n_ring: int, out: FloatArray, place: int) -> int:
     """Write the vertices of n runs to ``out[place:]``; return the place after them."""
     d = len(s.vertices.names)
     for i in range(n):
@@ -311,8 +326,9 @@ def emit(s: Scratch, ring: Any, n: int, n_ring: int, out: Any, place: int) -> in
 
 @called
 def clip_plainly(
-    polygons: Polygons, planes: Any, first: int, last: int, stop: Any, clipped: Clipped, written: int, s: Scratch
-) -> tuple[int, int, int, int]:
+    polygons: Polygons, planes: PlaneTables, first: int, last: int, stop: FlagArray, clipped: Clipped, written: int,
+    s: Scratch,
+) -> tuple[int, int, int, int]:  # fmt: skip
     """Clip polygons from `first` on, up to one that needs care; `written` vertices are there already.
 
     Returns the polygon reached, the vertices written, 0, DOUBT or NO_ROOM, and how many planes may cut the polygon

@@ -51,13 +51,13 @@ met a plane. dropped: whether one lost a vertex to it.
 
 
 @merged
-def plane_of(planes: Any, number: int) -> Plane:
+def plane_of(planes: PlaneTables, number: int) -> Plane:
     """Return one of the planes."""
     return Plane(planes.high, planes.low, number, planes.axes[number], planes.at[number])
 
 
 @merged
-def has_bridges(cutting: Any, n_cutting: int) -> bool:
+def has_bridges(cutting: Cutting, n_cutting: int) -> bool:
     """Tell whether a plane that dropped a vertex was met in more than two points."""
     may_have = False
     for i in range(n_cutting):

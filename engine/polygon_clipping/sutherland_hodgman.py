@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from engine.jit import allocating_kernel, inline
 from engine.polygon_clipping.in_digits import clip_exactly, exact_scratch
 from engine.polygon_clipping.in_doubles import DOUBT, clip_plainly, scratch_for
@@ -26,7 +27,7 @@ from engine.polygon_clipping.rings import NO_ROOM, Clipped, PlaneTables, Polygon
 
 
 @inline
-def room_for(ring_offsets: Any, first: int, last: int, n_planes: int) -> int:
+def room_for(ring_offsets: IntArray, first: int, last: int, n_planes: int) -> int:
     """Return to how many vertices, dropped ones included, one of some rings may grow; what outgrows it is left open.
 
     A convex ring gains one vertex a plane.
@@ -39,8 +40,8 @@ def room_for(ring_offsets: Any, first: int, last: int, n_planes: int) -> int:
 
 @allocating_kernel
 def clip_rings(
-    vertices: Any, ring_offsets: Any, polygon_offsets: Any, planes: PlaneTables, first: int, last: int, stop: Any,
-    out: Any, sizes: Any, state: Any, may_have_bridges: Any, names: Any,
+    vertices: FloatArray, ring_offsets: IntArray, polygon_offsets: IntArray, planes: PlaneTables, first: int, last: int,
+    stop: FlagArray, out: FloatArray, sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray, names: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Clip polygons first .. last - 1 by all planes; returns the polygon reached and the vertices written.
 

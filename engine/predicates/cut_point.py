@@ -23,10 +23,11 @@ zero, M is |x|.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
 from engine.predicates.error_free import two_diff, two_prod, two_sum
@@ -139,8 +140,9 @@ def nearest(
 
 @inline
 def parameter_and_point(
-    segment: Any, wp: Components, n_wp: int, wq: Components, n_wq: int, axis: int, at: float, point: Any, e: Components
-) -> tuple[float, bool]:
+    segment: FloatArray, wp: Components, n_wp: int, wq: Components, n_wq: int, axis: int, at: float, point: FloatArray,
+    e: Components,
+) -> tuple[float, bool]:  # fmt: skip
     """Set `point` to the nearest doubles of the point with these weights; return t and whether all is sure.
 
     axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`.

@@ -16,10 +16,11 @@ Source: D. E. Knuth, The Art of Computer Programming 2, section 4.3.1, with a si
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import IntArray
 from engine.jit import inline
 from engine.predicates.double_double import U2, dd_add, dd_div, even_of, surely_rounded
 
@@ -40,7 +41,7 @@ _BASE: Final = 2.0**BITS
 
 
 @inline
-def normalise(heap: Any, a: int) -> None:
+def normalise(heap: IntArray, a: int) -> None:
     """Carry, and leave out zeros at both ends; caller guarantees room above for all but the sign."""
     n, first, carry = heap[a], a + 2, 0
     for i in range(first, first + n):
@@ -67,7 +68,7 @@ def normalise(heap: Any, a: int) -> None:
 
 
 @inline
-def put_double(heap: Any, a: int, x: float) -> None:
+def put_double(heap: IntArray, a: int, x: float) -> None:
     """Put a finite double at place a."""
     fraction, exponent = math.frexp(x)
     whole, exponent = int(fraction * 2.0**53), exponent - 53
@@ -79,7 +80,7 @@ def put_double(heap: Any, a: int, x: float) -> None:
 
 
 @inline
-def sign_of(heap: Any, a: int) -> int:
+def sign_of(heap: IntArray, a: int) -> int:
     n = heap[a]
     if n == 0:
         return 0
@@ -87,7 +88,7 @@ def sign_of(heap: Any, a: int) -> int:
 
 
 @inline
-def sum_products(heap: Any, terms: Any, n_terms: int, c: int) -> bool:
+def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
     """Put the sum of the products ``terms[i] = (a, b, factor)``, factor 1 or -1, at place c; False where too long."""
     bottom, top, n_summed = 0, 0, 0
     for i in range(n_terms):
@@ -120,14 +121,14 @@ def sum_products(heap: Any, terms: Any, n_terms: int, c: int) -> bool:
 
 
 @inline
-def negate(heap: Any, a: int) -> None:
+def negate(heap: IntArray, a: int) -> None:
     for i in range(a + 2, a + 2 + heap[a]):
         heap[i] = -heap[i]
     normalise(heap, a)
 
 
 @inline
-def leading(heap: Any, a: int) -> tuple[float, float, int]:
+def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
     """Return the five leading digits as a double-double, and its exponent in digits."""
     n = heap[a]
     h, low, taken = 0.0, 0.0, min(n, 5)
@@ -137,7 +138,7 @@ def leading(heap: Any, a: int) -> tuple[float, float, int]:
 
 
 @inline
-def nearest_quotient(heap: Any, terms: Any, x: int, w: int, one: int, free: int) -> tuple[float, bool]:
+def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, free: int) -> tuple[float, bool]:
     """Return the double nearest to x / w, ties to even, for w > 0; False where it is out of range or too long.
 
     one: the place of the number 1. free: a place with three slots to work in.

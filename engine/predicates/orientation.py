@@ -30,8 +30,8 @@ Changed: the sign of orient3d is opposite, underflow and overflow are covered, t
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import Any
 
+from engine.arrays import FloatArray, Int8Array
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
@@ -254,7 +254,7 @@ def _add_times(e: Components, n: int, m: Components, length: int, z: float, z_ta
 
 
 @kernel
-def orient3d_batch(a: Any, b: Any, c: Any, d: Any, sides: Any) -> None:
+def orient3d_batch(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, sides: Int8Array) -> None:
     """Fill sides (n,) int8 with orient3d of the rows of a, b, c, d (n, 3) float64."""
     for item in range(sides.shape[0]):
         sides[item] = orient3d(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))

@@ -16,8 +16,8 @@ such terms can be, the answer is UNDECIDED; `rational.py` settles it.
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import Any
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, scale, sign
@@ -42,7 +42,7 @@ N_TERM = 1024  # components of one term: fewer than its bits, 53 (16 + 1) = 901,
 
 
 @inline
-def _fill_powers(points: Any, row: int, powers: Components) -> None:
+def _fill_powers(points: FloatArray, row: int, powers: Components) -> None:
     """Set powers[axis * N_POWERS + k] to the rounded k-th power of the coordinate, for every axis of the point."""
     for axis in range(points.shape[1]):
         value = float(points[row, axis])
@@ -53,7 +53,9 @@ def _fill_powers(points: Any, row: int, powers: Components) -> None:
 
 
 @inline
-def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, points: Any, row: int, blur: float) -> int:
+def sign_of_polynomial_filter(
+    powers: IntArray, coefficients: FloatArray, degree: int, points: FloatArray, row: int, blur: float
+) -> int:
     """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) on all of the blurred p = points[row] where
     rounding cannot have changed it, else UNDECIDED.
 
@@ -85,7 +87,7 @@ def sign_of_polynomial_filter(powers: Any, coefficients: Any, degree: int, point
 
 
 @inline
-def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term: int) -> int:
+def _term_exponent(powers: IntArray, coefficients: FloatArray, points: FloatArray, row: int, i_term: int) -> int:
     """Return k with |term| < 2^k, NO_TERM for a term that is zero."""
     if coefficients[i_term] == 0.0:
         return NO_TERM
@@ -98,7 +100,7 @@ def _term_exponent(powers: Any, coefficients: Any, points: Any, row: int, i_term
 
 
 @called
-def sign_of_polynomial_exact(powers: Any, coefficients: Any, points: Any, row: int) -> int:
+def sign_of_polynomial_exact(powers: IntArray, coefficients: FloatArray, points: FloatArray, row: int) -> int:
     """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial_filter`."""
     top = NO_TERM
     for i_term in range(coefficients.shape[0]):

@@ -20,8 +20,9 @@ components between 2^-1074 and 2^1024 number at most 1050, whatever was added.
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from engine.arrays import FloatArray
 from engine.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, add_scaled, compress, grow_product, sign
@@ -63,7 +64,7 @@ class PosedPoint3(NamedTuple):
 
 
 @inline
-def posed_error(poses: Any, pose: int, reach: float) -> float:
+def posed_error(poses: FloatArray, pose: int, reach: float) -> float:
     """Return a bound on the rounding of each posed coordinate, for points whose coordinates are at most `reach`."""
     if pose == UNPOSED:
         return 0.0
@@ -77,7 +78,7 @@ def posed_error(poses: Any, pose: int, reach: float) -> float:
 
 
 @inline
-def posed_point(poses: Any, p: PosedPoint3) -> Point3:
+def posed_point(poses: FloatArray, p: PosedPoint3) -> Point3:
     """Return the posed point, each coordinate within `posed_error` of the exact one."""
     if p.pose == UNPOSED:
         return Point3(p.x, p.y, p.z)
@@ -85,7 +86,7 @@ def posed_point(poses: Any, p: PosedPoint3) -> Point3:
 
 
 @inline
-def _rounded(poses: Any, p: PosedPoint3, axis: int) -> float:
+def _rounded(poses: FloatArray, p: PosedPoint3, axis: int) -> float:
     r, i = p.pose, 3 * axis
     x, y, z = float(poses[r, i]) * p.x, float(poses[r, i + 1]) * p.y, float(poses[r, i + 2]) * p.z
     return x + y + z + float(poses[r, 9 + axis])
@@ -105,7 +106,9 @@ def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -
 
 
 @inline
-def orient3d_posed(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float) -> int:
+def orient3d_posed(
+    poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
+) -> int:
     """Return orient3d of four posed points, or UNDECIDED.
 
     poses (n, 12) float64: R by rows, then t; caller guarantees det R > 0 and entries of R of at most 1.01.
@@ -120,7 +123,7 @@ def orient3d_posed(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d
 
 
 @called
-def orient3d_posed_exact(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
+def orient3d_posed_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
     """Return orient3d of four posed points from an expansion, or UNDECIDED; arguments as for `orient3d_posed`."""
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
         return orient3d_exact(
@@ -146,7 +149,7 @@ def orient3d_posed_exact(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoi
 
 
 @called
-def surely_same(poses: Any, a: PosedPoint3, b: PosedPoint3) -> bool:
+def surely_same(poses: FloatArray, a: PosedPoint3, b: PosedPoint3) -> bool:
     """Tell whether two posed points are one, exactly; False where exponents leave the range."""
     shift, w = _common_shift(poses, a, a, b, b), workspace(N_DIFFERENCE)
     if shift == OUT_OF_RANGE:
@@ -168,7 +171,7 @@ def _add_product_of(m: Components, n: int, w: Components, lengths: Components, f
 
 @inline
 def _set_difference(
-    w: Components, start: int, poses: Any, p: PosedPoint3, q: PosedPoint3, axis: int, shift: int
+    w: Components, start: int, poses: FloatArray, p: PosedPoint3, q: PosedPoint3, axis: int, shift: int
 ) -> int:
     """Set w[start:] to 2^shift times the exact difference of a posed coordinate of p and q; return its length."""
     e = workspace(N_DIFFERENCE)
@@ -185,7 +188,7 @@ def _set_difference(
 
 
 @inline
-def _factors(poses: Any, p: PosedPoint3, axis: int, k: int, shift: int, factor: float) -> tuple[float, float]:
+def _factors(poses: FloatArray, p: PosedPoint3, axis: int, k: int, shift: int, factor: float) -> tuple[float, float]:
     """Return the two factors of term k (x, y, z, translation) of factor * 2^shift times a posed coordinate."""
     value = factor * (p.x if k == 0 else (p.y if k == 1 else p.z))
     if p.pose == UNPOSED:
@@ -198,7 +201,7 @@ def _factors(poses: Any, p: PosedPoint3, axis: int, k: int, shift: int, factor: 
 
 
 @inline
-def _common_shift(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
+def _common_shift(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
     """Return the power of two that brings all coordinates into the range of the exact stage, or OUT_OF_RANGE."""
     largest, smallest, smallest_entry = 0.0, float("inf"), 1.0
     for k in range(4):

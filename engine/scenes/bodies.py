@@ -71,7 +71,9 @@ class Bodies(Preparing):
         self._place_odd(np.arange(len(arrays.kinds)), self.poses, *boxes, budget)
         return body_tree(*boxes, _LISTED)
 
-    def _place_odd(self, names: IntArray, poses: Sequence[Pose | None], low: Any, high: Any, budget: Budget) -> None:
+    def _place_odd(
+        self, names: IntArray, poses: Sequence[Pose | None], low: FloatArray, high: FloatArray, budget: Budget
+    ) -> None:
         """Set the boxes of each csg among some: those of its operands under the pose, put together."""
         arrays = self.arrays(budget)
         odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, Csg)])

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from engine.budget import UNLIMITED, Budget, concatenated
 from engine.direct import entry_of
 from engine.jit import inline, kernel
@@ -74,7 +74,7 @@ def joined(parts: list[Found], dimension: int) -> Found:
     return Found(*(concatenated(each[k], axis=int(k == 3)) for k in range(6)))
 
 
-def taken(found: Found, rows: Any) -> Found:
+def taken(found: Found, rows: IntArray) -> Found:
     """Return some pieces."""
     source, body, are_long, ends, t, faces = found
     return Found(source[rows], body[rows], are_long[rows], ends[:, rows], t[rows], faces[rows])
@@ -130,7 +130,9 @@ def _in_exact_order(found: Found, exact: Exact) -> tuple[Any, ...]:
 
 
 @kernel
-def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any, out: Any, flag: Any) -> bool:
+def put_in_order(
+    given: Any, offsets: IntArray, order: IntArray, ranks: IntArray, is_tied: BoolArray, out: Any, flag: FlagArray
+) -> bool:
     """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last, and `are_long`; tell whether
     their order is exact, and of which sources it is not: of ends that round alike those of one piece may be known to
     differ, or to be one, and the segment's own are one.
@@ -180,7 +182,7 @@ def put_in_order(given: Any, offsets: Any, order: Any, ranks: Any, is_tied: Any,
 
 
 @inline
-def _sort_ends(order: Any, first: int, last: int, body: Any, t: Any) -> None:
+def _sort_ends(order: IntArray, first: int, last: int, body: IntArray, t: FloatArray) -> None:
     """Sort ends, 2 * piece + side, by parameter, body and piece."""
     gap = (last - first) // 2
     while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps

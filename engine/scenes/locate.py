@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.budget import Budget
 from engine.containment.at_once import located_at_once
 from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
@@ -22,8 +22,8 @@ from engine.direct import entry_of
 from engine.jit import kernel
 from engine.parallel import Progress, run_chunks
 from engine.scenes.bodies import candidates
-from engine.scenes.located import MESH, locate_in_body
-from engine.scenes.near_boxes import bodies_in
+from engine.scenes.located import MESH, LocateTables, locate_in_body
+from engine.scenes.near_boxes import Where, bodies_in
 from engine.scenes.scratch import scratch_at, scratch_for
 from engine.scenes.standing import Standing
 from engine.solids.polyhedron import Polyhedron
@@ -59,8 +59,9 @@ class SceneLocations(Ragged):
 
 @kernel
 def locate_near(
-    points: Any, first: int, last: int, where: Any, tables: Any, room: Any, keys: Any, asked: Any, flag: Any
-) -> Any:
+    points: FloatArray, first: int, last: int, where: Where, tables: LocateTables, room: IntArray, keys: IntArray,
+    asked: IntArray, flag: FlagArray,
+) -> Any:  # fmt: skip
     """List the bodies that hold points (n, dim) first ... last, or may, as far as there is room.
 
     keys (room,): 4 (point n_bodies + body) + location, UNDECIDED among them, ascending; asked (n_meshes,): of how many
@@ -98,7 +99,10 @@ def locate_near(
 
 
 @kernel
-def locate_pairs(points: Any, owners: Any, bodies: Any, tables: Any, room: Any, located: Any, flag: Any) -> None:
+def locate_pairs(
+    points: FloatArray, owners: IntArray, bodies: IntArray, tables: LocateTables, room: IntArray, located: Int8Array,
+    flag: FlagArray,
+) -> None:  # fmt: skip
     """Fill located (n,) int8 for pairs of a point and a body that its tables decide, UNDECIDED for others."""
     scratch, is_flat = scratch_at(room), points.shape[1] == 2
     for pair in range(owners.size):

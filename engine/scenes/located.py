@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.budget import Budget
 from engine.containment.cells.locate import side_in_cell
@@ -81,7 +81,9 @@ class LocateTables(NamedTuple):
 
 
 @merged
-def locate_in_body(tables: Any, body: int, is_flat: bool, p: Any, stack: Any, flag: Any) -> tuple[int, bool]:
+def locate_in_body(
+    tables: LocateTables, body: int, is_flat: bool, p: tuple[float, ...], stack: Int32Array, flag: FlagArray
+) -> tuple[int, bool]:
     """Return the location of a point in a body, and whether it took more than a filter; stack: (STACK,), scratch."""
     kind, slot = tables.kinds[body], tables.slots[body]
     q, blur = to_frame(tables, tables.frames[body], p)

@@ -7,12 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import WIDTH, Bvh
 from engine.jit import inline, kernel, merged
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import lowest_bit
-from engine.scenes.scratch import scratch_at
+from engine.scenes.scratch import Scratch, scratch_at
 from engine.segment_clipping.on_boundary.mesh_streams import Way, local_segment
 from engine.segment_clipping.pieces import point_of
 from engine.types import Point3
@@ -33,7 +34,7 @@ _SLACK: Final = 2.0**-20
 
 
 @inline
-def place_in(names: Any, body: int) -> int:
+def place_in(names: IntArray, body: int) -> int:
     """Return where a body stands among names, which ascend; -1 where it does not."""
     low, high = 0, names.size
     while low < high:  # bound: halved each turn
@@ -46,7 +47,7 @@ def place_in(names: Any, body: int) -> int:
 
 
 @merged
-def tree_in(row: Any, dimension: int) -> BodyTree:
+def tree_in(row: IntArray, dimension: int) -> BodyTree:
     """Return the `BodyTree` of a row."""
     n, numbers = row[N_BODIES], array_at(row[NUMBERS], (4,), np.float64)
     boxes = array_at(row[BOXES], (row[N_NODES], BOX_ROWS, WIDTH), np.float32)
@@ -58,21 +59,21 @@ def tree_in(row: Any, dimension: int) -> BodyTree:
 
 
 @inline
-def name_in(words: Any, body: int) -> int:
+def name_in(words: IntArray, body: int) -> int:
     """Return what a body, of which those that moved count from n on, is called in the scene."""
     n, m = words[0, N_BODIES], words[1, N_BODIES]
     return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
 
 
 @inline
-def has_moved(words: Any, body: int) -> bool:
+def has_moved(words: IntArray, body: int) -> bool:
     """Tell whether one of all bodies stands elsewhere by now."""
     m = words[1, N_BODIES]
     return m > 0 and place_in(array_at(words[1, NAMES], (m,), np.int64), body) >= 0
 
 
 @inline
-def way_of(segments: Any, item: int, bodies: BodyTree) -> Way:
+def way_of(segments: FloatArray, item: int, bodies: BodyTree) -> Way:
     """Return a segment in the coordinates of a tree."""
     is_flat = segments.shape[2] == 2
     px, py, pz = point_of(segments, item, 0, is_flat)
@@ -81,13 +82,13 @@ def way_of(segments: Any, item: int, bodies: BodyTree) -> Way:
 
 
 @inline
-def begin_way(bodies: Any, way: Way, scratch: Any) -> None:
+def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
     """Begin to look for the bodies of a tree that a segment may meet."""
     scratch.waiting[0], scratch.keys[0], scratch.depths[0], scratch.depths[1] = 0, -1.0, way.is_near, bodies.listed.size
 
 
 @inline
-def next_body(segments: Any, item: int, bodies: Any, way: Way, last: Any, scratch: Any) -> int:
+def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last: float, scratch: Scratch) -> int:
     """Return the next body whose box a segment may enter before `last`, about the nearest; -1 where there is none."""
     depths = scratch.depths
     while depths[0] > 0:  # bound: each node, and each body, waits once
@@ -107,7 +108,7 @@ def next_body(segments: Any, item: int, bodies: Any, way: Way, last: Any, scratc
 
 
 @inline
-def near_bodies(segments: Any, item: int, words: Any, room: Any) -> int:
+def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray) -> int:
     """Fill scratch.near with the bodies that a segment may meet; return how many."""
     scratch, n_found = scratch_at(room), 0
     for side in range(1 + (words[1, N_BODIES] > 0)):
@@ -123,7 +124,7 @@ def near_bodies(segments: Any, item: int, words: Any, room: Any) -> int:
 
 
 @inline
-def _in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
+def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) -> bool:
     """Tell whether a segment may meet the box of a body: (box - start) / (end - start) loses 4 units of rounding along
     each axis, or 2^-1074 where it underflows; differences beyond `_MOST_WAY`, which may be infinite, say nothing."""
     meet, enters, leaves = True, 0.0, 1.0
@@ -139,7 +140,7 @@ def _in_its_box(segments: Any, item: int, bodies: Any, body: int) -> bool:
 
 
 @inline
-def _open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: int) -> int:
+def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, depth: int) -> int:
     """Put what a node of a tree names, and a segment enters before `last`, on scratch.waiting from `depth` on, the
     nearest last; return where it ends."""
     waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
@@ -158,7 +159,7 @@ def _open_node(tree: Any, node: int, way: Way, last: Any, scratch: Any, depth: i
 
 
 @inline
-def bodies_in(low: Any, high: Any, where: Any, stack: Any, found: Any) -> int:
+def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array, found: IntArray) -> int:
     """Fill `found` with the bodies of a `Where` whose boxes a box (dim,) meets, which may be infinite; return how
     many."""
     n_found, names = _of_box(low, high, where.together, 0, where.names, stack, found, 0), where.names
@@ -168,7 +169,7 @@ def bodies_in(low: Any, high: Any, where: Any, stack: Any, found: Any) -> int:
 
 
 @inline
-def _is_met(low: Any, high: Any, bodies: Any, body: int, left_out: Any) -> bool:
+def _is_met(low: FloatArray, high: FloatArray, bodies: BodyTree, body: int, left_out: IntArray) -> bool:
     """Tell whether a box meets that of a body which is not among those left out."""
     meet = True
     for k in range(low.size):
@@ -183,8 +184,9 @@ def _local(value: float, inverse: float, way: float) -> Any:
 
 @inline
 def _of_box(
-    low: Any, high: Any, bodies: Any, n_before: int, left_out: Any, stack: Any, found: Any, n_found: int
-) -> int:
+    low: FloatArray, high: FloatArray, bodies: BodyTree, n_before: int, left_out: IntArray, stack: Int32Array,
+    found: IntArray, n_found: int,
+) -> int:  # fmt: skip
     """Fill `found` from n_found on with the bodies of a `BodyTree` whose boxes a box meets, and that are not left out;
     return where they end."""
     tree, inverse, depth, stack[0] = bodies.tree, bodies.inverse, 1, 0
@@ -213,7 +215,7 @@ def _of_box(
 
 
 @kernel
-def list_near(points: Any, where: Any, room: Any, pairs: Any, flag: Any) -> int:
+def list_near(points: FloatArray, where: Where, room: IntArray, pairs: IntArray, flag: FlagArray) -> int:
     """List in pairs (room, 2) points (n, dim) and the bodies of a `Where` in whose boxes they lie; return how many,
     more than there is room for where that is less."""
     n_pairs, scratch = 0, scratch_at(room)

@@ -14,10 +14,11 @@ UNDECIDED. Doubles tell whether a body is met, and by which planes: what they le
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.jit import inline
 from engine.lanes.addresses import array_at
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub
@@ -33,7 +34,7 @@ Frame = tuple[Vector, float, Vector, float]
 
 
 @inline
-def _row(m: Any, i: int, v: Vector) -> Pair:
+def _row(m: FloatArray, i: int, v: Vector) -> Pair:
     ah, al = dd_mul(m[i, 0], m[i, 1], v[0][0], v[0][1])
     bh, bl = dd_mul(m[i, 2], m[i, 3], v[1][0], v[1][1])
     ch, cl = dd_mul(m[i, 4], m[i, 5], v[2][0], v[2][1])
@@ -42,14 +43,14 @@ def _row(m: Any, i: int, v: Vector) -> Pair:
 
 
 @inline
-def _turned(m: Any, v: Vector) -> tuple[Vector, float]:
+def _turned(m: FloatArray, v: Vector) -> tuple[Vector, float]:
     """Return M v for a vector of pairs without error, and the bound of each coordinate."""
     bound = _FRAME_BOUND * (abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0]))
     return (_row(m, 0, v), _row(m, 1, v), _row(m, 2, v)), bound
 
 
 @inline
-def in_frame(body: Any, segments: Any, item: int) -> Frame:
+def in_frame(body: IntArray, segments: FloatArray, item: int) -> Frame:
     """Return p' and e' of a segment in the frame of a body (4,) with their bounds, 0 for one without a pose."""
     is_flat = segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
@@ -63,7 +64,7 @@ def in_frame(body: Any, segments: Any, item: int) -> Frame:
 
 
 @inline
-def _plane_at(row: Any, v: Vector, offset: float, blur: float) -> tuple[float, float, float]:
+def _plane_at(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float, float]:
     """Return n . v + offset as a double-double, and its bound; blur: of each coordinate of v."""
     ah, al = dd_scale(v[0][0], v[0][1], row[0])
     bh, bl = dd_scale(v[1][0], v[1][1], row[1])
@@ -76,7 +77,7 @@ def _plane_at(row: Any, v: Vector, offset: float, blur: float) -> tuple[float, f
 
 
 @inline
-def _value(row: Any, v: Vector, offset: float, blur: float) -> tuple[float, float]:
+def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float]:
     """Return n . v + offset by doubles, and its bound: three sums, a product and the tail of v lose 5 u of the size."""
     x, y, z = row[0] * v[0][0], row[1] * v[1][0], row[2] * v[2][0]
     size = abs(x) + abs(y) + abs(z) + abs(offset)
@@ -84,7 +85,7 @@ def _value(row: Any, v: Vector, offset: float, blur: float) -> tuple[float, floa
 
 
 @inline
-def _planes_cut(rows: Any, frame: Frame) -> tuple[int, int, int]:
+def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
     """Return 1, -1 or UNDECIDED for a segment that surely meets all half-spaces, or not, and where it does the planes
     that cut it first and last, -1 for none; by doubles.
 
@@ -122,7 +123,7 @@ def _planes_cut(rows: Any, frame: Frame) -> tuple[int, int, int]:
 
 
 @inline
-def between_planes(body: Any, segments: Any, item: int, is_any: bool) -> tuple[int, End, End]:
+def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
     """Return 1, -1 or UNDECIDED for a segment that meets all half-spaces of a body, or not, or may, and the ends of its
     piece as `put_piece` takes them, unless `is_any`."""
     frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
@@ -142,7 +143,7 @@ def between_planes(body: Any, segments: Any, item: int, is_any: bool) -> tuple[i
 
 
 @inline
-def in_ball(body: Any, segments: Any, item: int, is_any: bool) -> tuple[int, End, End]:
+def in_ball(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
     """Return what `between_planes` does for a ball: d = q - p, and f = p - c off by the rounding of the image c."""
     c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)

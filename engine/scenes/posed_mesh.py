@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import WIDTH
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.prepared import tree_at
@@ -51,7 +52,7 @@ _Lines = namedtuple("_Lines", "addresses sizes places")
 
 
 @inline
-def _mesh_of(lines: Any, numbers: Any) -> PlacedMesh:
+def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
     return PlacedMesh(
         array_at(lines[0], (lines[5], 3, 3), np.float64),
         array_at(lines[1], (lines[5],), np.int64),
@@ -131,7 +132,7 @@ def _ask_blocks(mesh: PlacedMesh, ends: Any, shear: Any, n: int, is_any: bool, c
 
 
 @inline
-def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, words: Any) -> int:
+def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, words: IntArray) -> int:
     """Fill met with the triangles that a segment crosses; return how many, UNSURE where one may be met otherwise. Where
     `is_any` one that is surely met is enough, and 1 is returned.
 
@@ -209,14 +210,14 @@ def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_cl
 
 
 @inline
-def _values(at_p: Any, blur: float, normal: Any) -> Any:
+def _values(at_p: tuple[float, ...], blur: float, normal: Any) -> Any:
     """Return what `dot` does of a vector that is known to `blur` a coordinate, and lost 4 u^2 of it in its rounding."""
     h, low, bound = at_p
     return h, low, 1.5 * bound + 1.01 * blur * (normal[0][2] + normal[1][2] + normal[2][2])
 
 
 @inline
-def _cut_at(mesh: PlacedMesh, segments: Any, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
+def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
     """Make a crossing, in a corner where one is touched; tell whether all is surely nearest."""
     (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
@@ -262,7 +263,9 @@ def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_plac
 
 
 @inline
-def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, stop: Any) -> tuple[int, bool]:
+def crossings_in(
+    body: IntArray, segments: FloatArray, item: int, is_any: bool, words: IntArray, stop: FlagArray
+) -> tuple[int, bool]:
     """Make the crossings of a segment with a placed mesh, in order; return how many, or why not, and whether the first
     end lies in it. Where `is_any` they are not made, and any positive number says that there is one."""
     is_placed, is_closed, scratch = body[3] != 0, body[1] != 0, scratch_at(words)
@@ -298,7 +301,7 @@ def crossings_in(body: Any, segments: Any, item: int, is_any: bool, words: Any, 
 
 
 @inline
-def _is_near_box(numbers: Any, p: Point3, blur: float) -> bool:
+def _is_near_box(numbers: FloatArray, p: Point3, blur: float) -> bool:
     """Tell whether a point known to `blur` a coordinate may lie in the box of a mesh."""
     low, high = PLACES + 5, PLACES + 8
     is_out = (p.x + blur < numbers[low]) | (p.x - blur > numbers[high])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def scratch_for(n_bodies: int) -> IntArray:
 
 
 @merged
-def scratch_at(words: Any) -> Scratch:
+def scratch_at(words: IntArray) -> Scratch:
     """Return the arrays that `scratch_for` has room for."""
     at, m = words[0], MOST_MET
     cuts = Crossings(

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.budget import UNLIMITED, Budget
 from engine.containment.locators import Locator
 from engine.direct import entry_of
@@ -206,7 +206,7 @@ and 2 i + 2, row 0 is the identity."""
 
 
 @inline
-def _put_row(rows: Any, row: int, still: Placed, moved: Placed, body: int, name: int) -> None:
+def _put_row(rows: PairRows, row: int, still: Placed, moved: Placed, body: int, name: int) -> None:
     """Fill a row with a body where it stands."""
     n = still.kinds.size
     rows.kinds[row] = still.kinds[name]
@@ -220,8 +220,9 @@ def _put_row(rows: Any, row: int, still: Placed, moved: Placed, body: int, name:
 
 @kernel
 def list_pairs(
-    named: Any, reach: float, where: Any, still: Any, moved: Any, rows: Any, room: Any, box: Any, flag: Any
-) -> int:
+    named: IntArray, reach: float, where: Where, still: Placed, moved: Placed, rows: PairRows, room: IntArray,
+    box: FloatArray, flag: FlagArray,
+) -> int:  # fmt: skip
     """Fill `rows` with the pairs of a named body and another whose boxes, grown by `reach`, meet, each once, in no
     order; return how many there are, more than there is room for where that is less.
 

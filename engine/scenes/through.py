@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.jit import inline, kernel
 from engine.lanes.addresses import array_at
 from engine.lanes.lanes import prefetch
@@ -20,6 +21,7 @@ from engine.lanes.triangles import longest_axis
 from engine.scenes.near_boxes import (
     N_BODIES,
     PLACED,
+    BodyTree,
     begin_way,
     has_moved,
     name_in,
@@ -30,10 +32,11 @@ from engine.scenes.near_boxes import (
 )
 from engine.scenes.posed_cut import between_planes, in_ball
 from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
-from engine.scenes.scratch import MOST_MET, scratch_at
+from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
-from engine.segment_clipping.on_boundary.mesh_streams import AHEAD
+from engine.segment_clipping.on_boundary.mesh_streams import AHEAD, Way
+from engine.segment_clipping.on_boundary.touching_cut import Crossings
 from engine.segment_clipping.pieces import Pieces, put_piece
 from engine.types import OPEN
 
@@ -51,8 +54,9 @@ Firsts = namedtuple("Firsts", "source body start end t faces ranks")
 
 @inline
 def _cut_on(
-    words: Any, name: int, segments: Any, item: int, is_any: bool, scratch: Any, stop: Any, out: Pieces, row: int
-) -> int:
+    words: IntArray, name: int, segments: FloatArray, item: int, is_any: bool, scratch: IntArray, stop: FlagArray,
+    out: Pieces, row: int,
+) -> int:  # fmt: skip
     """Write the pieces of a segment within a body to the rows of `out` from `row` on; return how many, or why not.
     Where `is_any` nothing is written, and a positive number says that there are some. Of a point the second face is
     -2 - face."""
@@ -80,7 +84,7 @@ def _cut_on(
 
 
 @inline
-def _emit_points(cuts: Any, n: int, source: int, out: Pieces, row: int) -> int:
+def _emit_points(cuts: Crossings, n: int, source: int, out: Pieces, row: int) -> int:
     """Write each crossing of a surface as a piece of one point, as `_join_touches` does; return how many."""
     for place in range(n):
         i = cuts.order[place]
@@ -95,8 +99,8 @@ def _emit_points(cuts: Any, n: int, source: int, out: Pieces, row: int) -> int:
 
 @kernel
 def cut_near(
-    segments: Any, order: Any, last: int, words: Any, scratch: Any, stop: Any, out: Pieces, names: Any, left: Any,
-    n: Any,
+    segments: FloatArray, order: IntArray, last: int, words: IntArray, scratch: IntArray, stop: FlagArray, out: Pieces,
+    names: IntArray, left: IntArray, n: IntArray,
 ) -> None:  # fmt: skip
     """Cut segments (n, 2, dim), those before `last` in an order (n,), on the bodies that they may meet; names (2, m):
     of each piece the body, and whether it is longer than a point; left: rows of a segment and a body that are OPEN.
@@ -136,7 +140,7 @@ def cut_near(
 
 
 @inline
-def _keep_first(scratch: Any, name: int) -> None:
+def _keep_first(scratch: Scratch, name: int) -> None:
     """Keep the first piece of those in a body, unless what is kept begins before it."""
     room, best, found = scratch.room, scratch.best, scratch.found
     t = room.t[0, 0]
@@ -157,7 +161,7 @@ def _keep_first(scratch: Any, name: int) -> None:
 
 
 @inline
-def _put_first(scratch: Any, out: Firsts, row: int, item: int) -> None:
+def _put_first(scratch: Scratch, out: Firsts, row: int, item: int) -> None:
     """Write the first piece found, that of a segment, to a row."""
     piece, is_long = scratch.room, scratch.room.faces[MOST_MET, 1] >= -1
     out.source[row], out.body[row], out.ranks[row, 0], out.ranks[row, 1] = item, scratch.found[0], 0, is_long
@@ -168,7 +172,9 @@ def _put_first(scratch: Any, out: Firsts, row: int, item: int) -> None:
 
 
 @inline
-def _ask(words: Any, body: int, segments: Any, item: int, is_any: bool, room: Any, stop: Any) -> int:
+def _ask(
+    words: IntArray, body: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
+) -> int:
     """Ask a body for the first piece, or any; return SETTLED to go on, MET or OPEN where that tells all, or what the
     body wants."""
     scratch = scratch_at(room)
@@ -188,7 +194,7 @@ def _ask(words: Any, body: int, segments: Any, item: int, is_any: bool, room: An
 
 
 @inline
-def _reached(scratch: Any, bodies: Any, way: Any) -> Any:
+def _reached(scratch: Scratch, bodies: BodyTree, way: Way) -> Any:
     """Return a parameter of `enter_boxes` behind the start of the first piece found.
 
     Along the longest axis k it is (x - m) / e. The slack is more than the rounding of m and e; it is taken twice. That
@@ -204,7 +210,9 @@ def _reached(scratch: Any, bodies: Any, way: Any) -> Any:
 
 
 @inline
-def _search(words: Any, side: int, segments: Any, item: int, is_any: bool, room: Any, stop: Any) -> int:
+def _search(
+    words: IntArray, side: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
+) -> int:
     """Ask the bodies of one `BodyTree` that a segment may meet, about as it enters their boxes, until what was found
     comes before all others; return what `_ask` does."""
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
@@ -224,8 +232,8 @@ def _search(words: Any, side: int, segments: Any, item: int, is_any: bool, room:
 
 @kernel
 def find_first(
-    segments: Any, order: Any, last: int, words: Any, room: Any, is_any: bool, stop: Any, state: Any, out: Firsts,
-    n: Any,
+    segments: FloatArray, order: IntArray, last: int, words: IntArray, room: IntArray, is_any: bool, stop: FlagArray,
+    state: FlagArray, out: Firsts, n: IntArray,
 ) -> None:  # fmt: skip
     """Find the first piece of segments (n, 2, dim), those before `last` in an order (n,), or where `is_any` whether
     there is one.

@@ -18,8 +18,9 @@ Source: the textbook's exercise, a segment on a sphere.
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import called, inline, kernel
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub
 from engine.predicates.error_free import fma, two_diff, two_prod
@@ -178,7 +179,7 @@ def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, o
 
 
 @inline
-def _ball_of(segments: Any, item: int, center: Any) -> tuple[Vector, Vector]:
+def _ball_of(segments: FloatArray, item: int, center: FloatArray) -> tuple[Vector, Vector]:
     """Return d and f of a segment; in the plane z is 0."""
     is_flat = segments.shape[2] == 2
     p, c = point_of(segments, item, 0, is_flat), (center[0], center[1], 0.0 if is_flat else center[2])
@@ -187,8 +188,8 @@ def _ball_of(segments: Any, item: int, center: Any) -> tuple[Vector, Vector]:
 
 @kernel
 def decide_on_sphere(
-    segments: Any, center: Any, radius: float, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any,
-    n: Any,
+    segments: FloatArray, center: FloatArray, radius: float, first: int, last: int, stop: FlagArray, items: Int32Array,
+    planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the closed ball: see `decide_on_boxes`."""
     kept, n_open = 0, 0
@@ -208,8 +209,8 @@ def decide_on_sphere(
 
 @kernel
 def fill_on_sphere(
-    segments: Any, center: Any, radius: float, items: Any, planes: Any, begin: int, size: int, stop: Any,
-    pieces: Pieces, still: Any, n: Any,
+    segments: FloatArray, center: FloatArray, radius: float, items: Int32Array, planes: Int32Array, begin: int,
+    size: int, stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
     """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     n_open = 0

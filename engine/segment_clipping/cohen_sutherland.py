@@ -33,8 +33,9 @@ textbook's section on clipping segments on an AABB.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import kernel, merged
 from engine.predicates.double_double import U2
 from engine.predicates.error_free import fma, two_diff, two_prod, workspace
@@ -157,7 +158,7 @@ def decide_closely(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
 
 
 @merged
-def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
+def corners_of(low: FloatArray, high: FloatArray) -> tuple[Triple, Triple]:
     """Return the corners of a box, in the plane with z from -1 to 1."""
     is_flat = low.size == 2
     return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
@@ -165,8 +166,8 @@ def corners_of(low: Any, high: Any) -> tuple[Triple, Triple]:
 
 @kernel
 def decide_on_boxes(
-    segments: Any, low: Any, high: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any,
-    still: Any, n: Any,
+    segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, first: int, last: int,
+    stop: FlagArray, items: Int32Array, planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`; columns: of its rows.
 

@@ -21,7 +21,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import allocating_kernel, called, inline, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
@@ -71,7 +71,7 @@ def as_columns(rows: FloatArray) -> FloatArray:
 
 
 @inline
-def are_safe(row: Any, segment: Any) -> bool:
+def are_safe(row: FloatArray, segment: FloatArray) -> bool:
     """Tell whether every number of a row and a segment is zero or of a size for which expansions are exact."""
     safe = True
     for k in range(row.size):
@@ -82,7 +82,7 @@ def are_safe(row: Any, segment: Any) -> bool:
 
 
 @inline
-def expand_value(row: Any, point: Any, e: Components) -> int:
+def expand_value(row: FloatArray, point: FloatArray, e: Components) -> int:
     """Set e to the exact value of `row` at `point` as an expansion; seven places in 3D. Returns its length."""
     d = row.size - 1
     n = grow(e, 0, row[d])
@@ -92,14 +92,14 @@ def expand_value(row: Any, point: Any, e: Components) -> int:
 
 
 @called
-def exact_sign(row: Any, point: Any) -> int:
+def exact_sign(row: FloatArray, point: FloatArray) -> int:
     """Return the exact sign of `row` at `point`, both within the safe range."""
     e = workspace(8)
     return sign(e, expand_value(row, point, e))
 
 
 @called
-def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
+def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> int:
     """Return the exact sign of t_i - t_j for two planes that `segment` crosses, all within the safe range."""
     p_i, q_i, p_j, q_j, e = workspace(8), workspace(8), workspace(8), workspace(8), workspace(200)
     n_pi, n_qi = expand_value(row_i, segment[0], p_i), expand_value(row_i, segment[1], q_i)
@@ -109,7 +109,7 @@ def exact_order(row_i: Any, row_j: Any, segment: Any) -> int:
 
 @inline
 def decide_by_rows(
-    segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
+    segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
 ) -> tuple[int, int, int, int]:
     """Decide on one segment by the n `chosen` planes: state, plane entered, plane left, 1 where filters did not do.
 
@@ -157,7 +157,7 @@ def decide_by_rows(
 
 @inline
 def compare_rows(
-    segment: Any, columns: Any, s_p: Any, s_q: Any, bounds: Any, chosen: Any, i: int, j: int
+    segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, i: int, j: int
 ) -> tuple[int, bool]:
     """Return the sign of t_i - t_j for two planes that `segment` crosses, and whether the filter sufficed."""
     order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
@@ -195,7 +195,7 @@ def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> floa
 
 
 @inline
-def coordinate_limit(columns: Any) -> float:
+def coordinate_limit(columns: FloatArray) -> float:
     """Return what coordinates have to stay below, so that bounds of plane values stay below `WIDEST`."""
     limit = np.inf
     for j in range(columns.shape[1]):
@@ -205,7 +205,7 @@ def coordinate_limit(columns: Any) -> float:
 
 @called
 def decide_alone(
-    segments: Any, item: int, columns: Any, limit: float, numbers: Any, chosen: Any
+    segments: FloatArray, item: int, columns: FloatArray, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
     """Decide on one segment as `decide_by_rows` does; limit: of coordinates. numbers, chosen: (3, m), (m,), scratch."""
     is_flat = segments.shape[2] == 2
@@ -227,8 +227,9 @@ def decide_alone(
 
 @allocating_kernel
 def decide_on_rows(
-    segments: Any, columns: Any, first: int, last: int, stop: Any, items: Any, planes: Any, still: Any, n: Any
-) -> None:
+    segments: FloatArray, columns: FloatArray, first: int, last: int, stop: FlagArray, items: Int32Array,
+    planes: Int32Array, still: Int32Array, n: IntArray,
+) -> None:  # fmt: skip
     """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0.
 
     Plane by plane over a block of segments, without branches. Outputs: see `decide_on_boxes`.

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Final, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.budget import Budget, Cancel
 from engine.direct import entry_of
 from engine.jit import inline, kernel
@@ -154,7 +154,10 @@ def _joined(
 
 
 @kernel
-def join_parts(starts: Any, ends: Any, faces: Any, at: Any, vertices: Any, offsets: Any, out: Joined, flag: Any) -> int:
+def join_parts(
+    starts: FloatArray, ends: FloatArray, faces: IntArray, at: IntArray, vertices: FloatArray, offsets: IntArray,
+    out: Joined, flag: FlagArray,
+) -> int:  # fmt: skip
     """Join pieces of segments, from starts (m, dim) to ends, where one begins at the vertex at which the one before
     reaches the end of its segment; return how many there are then.
 
@@ -193,13 +196,13 @@ def join_parts(starts: Any, ends: Any, faces: Any, at: Any, vertices: Any, offse
 
 
 @inline
-def _goes_on(faces: Any, at: Any, part: int, after: int) -> bool:
+def _goes_on(faces: IntArray, at: IntArray, part: int, after: int) -> bool:
     """Tell whether a part reaches the end of its segment, and the one after it begins the next there."""
     return (faces[part, 1] < 0) & (faces[after, 0] < 0) & (at[after] == at[part] + 1)
 
 
 @inline
-def _n_moved(faces: Any, at: Any, begin: int, end: int, vertices: Any, first: int, last: int) -> int:
+def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: FloatArray, first: int, last: int) -> int:
     """Return how many parts of a line, from its first vertex on, follow those up to its last: 0 unless both vertices
     are one, both within, and not all parts are connected."""
     if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
@@ -213,7 +216,7 @@ def _n_moved(faces: Any, at: Any, begin: int, end: int, vertices: Any, first: in
 
 
 @inline
-def _put(rows: Any, row: int, points: Any, point: int) -> int:
+def _put(rows: FloatArray, row: int, points: FloatArray, point: int) -> int:
     """Copy a point; return the row after it."""
     for k in range(points.shape[1]):
         rows[row, k] = points[point, k]
@@ -221,7 +224,7 @@ def _put(rows: Any, row: int, points: Any, point: int) -> int:
 
 
 @inline
-def _are_same(points: Any, point: int, others: Any, other: int) -> bool:
+def _are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> bool:
     are_same = True
     for k in range(points.shape[1]):
         are_same &= points[point, k] == others[other, k]

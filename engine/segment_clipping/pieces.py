@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.budget import concatenated
 from engine.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
@@ -80,7 +81,7 @@ def is_plain(p: Triple, q: Triple) -> bool:
 
 
 @merged
-def point_of(segments: Any, item: int, end: int, is_flat: bool) -> Triple:
+def point_of(segments: FloatArray, item: int, end: int, is_flat: bool) -> Triple:
     """Return an end of a segment."""
     return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
 
@@ -94,7 +95,7 @@ def put_end(pieces: Pieces, row: int, end: int, point: Triple, is_flat: bool) ->
 
 
 @merged
-def put_own_end(pieces: Pieces, row: int, end: int, segments: Any, item: int, is_flat: bool) -> None:
+def put_own_end(pieces: Pieces, row: int, end: int, segments: FloatArray, item: int, is_flat: bool) -> None:
     """Write an end of a piece that is the segment's own."""
     pieces.t[row, end], pieces.faces[row, end] = end, -1
     put_end(pieces, row, end, point_of(segments, item, end, is_flat), is_flat)
@@ -109,7 +110,7 @@ def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
 
 
 @inline
-def put_point(point: Any, segments: Any, item: int, t: float, low: float, slack: float) -> bool:
+def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low: float, slack: float) -> bool:
     """Write the point at t, known within slack of itself; tell whether that and t are surely nearest."""
     bound = (T_BOUND + slack) * abs(t)
     sure = (slack < 0.001) & (t + (low - bound) == t + (low + bound))
@@ -121,7 +122,7 @@ def put_point(point: Any, segments: Any, item: int, t: float, low: float, slack:
 
 
 @inline
-def put_piece(out: Pieces, row: int, source: int, segments: Any, item: int, first: End, last: End) -> bool:
+def put_piece(out: Pieces, row: int, source: int, segments: FloatArray, item: int, first: End, last: End) -> bool:
     """Write a piece between two ends; tell whether all numbers are surely the nearest."""
     sure = True
     out.source[row] = source

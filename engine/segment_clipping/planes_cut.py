@@ -8,8 +8,7 @@ block of pieces are made at once, cut or not, without branches. In the plane z i
 
 from __future__ import annotations
 
-from typing import Any
-
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import called, kernel, merged
 from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.double_double import dd_add, dd_div
@@ -22,7 +21,7 @@ from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_
 
 
 @called
-def cut_by_signs(row: Any, segment: Any, point: Any, axis: int, at: float) -> tuple[float, bool]:
+def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
 
     axis, at: across an axis, where, and the row has a 1 or -1 there alone; else -1 and anything.
@@ -60,8 +59,8 @@ def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, 
 
 @kernel
 def fill_on_rows(
-    segments: Any, columns: Any, items: Any, planes: Any, begin: int, size: int, stop: Any, pieces: Pieces, still: Any,
-    n: Any,
+    segments: FloatArray, columns: FloatArray, items: Int32Array, planes: Int32Array, begin: int, size: int,
+    stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
     """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
@@ -128,7 +127,7 @@ def cut_end(
 
 @called
 def cut_again(
-    segments: Any, low: Any, high: Any, columns: Any, row: int, unsure: int, pieces: Pieces
+    segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, row: int, unsure: int, pieces: Pieces
 ) -> bool:  # fmt: skip
     """Make those ends of a piece again whose bit of `unsure` is set, by exact signs; return whether all is sure."""
     all_sure = True
@@ -143,8 +142,8 @@ def cut_again(
 
 @kernel
 def fill_on_boxes(
-    segments: Any, low: Any, high: Any, columns: Any, items: Any, planes: Any, begin: int, size: int, stop: Any,
-    pieces: Pieces, still: Any, n: Any,
+    segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, items: Int32Array, planes: Int32Array,
+    begin: int, size: int, stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
     """Fill the pieces, from row `begin` on, of the first `size` items, ``segments`` ((n, 2, dim) float64) on a box.
 

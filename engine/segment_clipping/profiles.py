@@ -348,7 +348,7 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
     return contacts_of(points[0], points[1], elements, budget.check)
 
 
-def _near(elements: Any, p: Point, q: Point) -> Any:
+def _near(elements: FloatArray, p: Point, q: Point) -> Any:
     """Return the elements (k, corners, dim) whose boxes p q may meet, ends known to their rounding, and more."""
     with np.errstate(all="ignore"):  # what is no number keeps an element
         a, b = (np.array([float(x) for x in point]) for point in (p, q))

@@ -16,11 +16,10 @@ Conversely a convex solid whose triangles all have an area passes, provided o li
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, read_only
+from engine.arrays import FloatArray, IntArray, read_only
 from engine.jit import allocating, inline, kernel
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
@@ -61,7 +60,7 @@ def _certified(solid: Polyhedron) -> Convexity | None:
 
 
 @kernel
-def _certify(vertices: Any, triangles: Any, center: Any) -> int:
+def _certify(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
     """Return the side, 1 or -1, of every face on which the centre of a convex solid lies; 0 where not certified."""
     o = Point3(center[0], center[1], center[2])
     n_faces = triangles.shape[0]
@@ -78,7 +77,7 @@ def _certify(vertices: Any, triangles: Any, center: Any) -> int:
 
 
 @allocating
-def _is_locally_convex(vertices: Any, triangles: Any, side: int) -> bool:
+def _is_locally_convex(vertices: FloatArray, triangles: IntArray, side: int) -> bool:
     """Tell whether across each edge the next triangle's far corner is on the centre's side of the plane, or on it."""
     n_faces = triangles.shape[0]
     size = 8
@@ -107,7 +106,7 @@ def _is_locally_convex(vertices: Any, triangles: Any, side: int) -> bool:
 
 
 @inline
-def _place(table: Any, triangles: Any, start: int, end: int) -> int:
+def _place(table: IntArray, triangles: IntArray, start: int, end: int) -> int:
     """Return where in the table the edge stands, or where it would. The table is at most half full."""
     mask = table.shape[0] - 1
     place = (start * 73856093 ^ end * 19349663) & mask
@@ -122,7 +121,7 @@ def _place(table: Any, triangles: Any, start: int, end: int) -> int:
 
 
 @inline
-def _is_crossed_once(vertices: Any, triangles: Any, o: Point3, side: int) -> bool:
+def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side: int) -> bool:
     """Tell whether some half-line from o through no edge crosses one triangle only.
 
     Through q: it crosses the triangle a, b, c where the planes o a b, o b c and o c a have q on the inner side, which
@@ -142,7 +141,7 @@ def _is_crossed_once(vertices: Any, triangles: Any, o: Point3, side: int) -> boo
 
 
 @inline
-def _crossings(vertices: Any, triangles: Any, o: Point3, q: Point3, side: int) -> int:
+def _crossings(vertices: FloatArray, triangles: IntArray, o: Point3, q: Point3, side: int) -> int:
     """Return how many triangles the half-line from o through q crosses, -1 where it may meet an edge."""
     n_crossed = 0
     for item in range(triangles.shape[0]):

@@ -31,11 +31,11 @@ prune-and-search", 1993. Changed: exact signs, closed triangles, the fixed scan.
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.budget import Budget
 from engine.direct import entry_of
 from engine.errors import FaceNotSimpleError
@@ -131,12 +131,14 @@ def _projection_of_largest_area(points: FloatArray) -> int:
 
 
 @inline
-def _at(vertices: Any, merged: Any, corner: int, axis: int, scale: float) -> float:
+def _at(vertices: FloatArray, merged: IntArray, corner: int, axis: int, scale: float) -> float:
     return float(vertices[merged[corner], axis]) * scale
 
 
 @inline
-def _area(vertices: Any, merged: Any, corners: tuple[int, int], axis: int, scale: float) -> tuple[float, float]:
+def _area(
+    vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float
+) -> tuple[float, float]:
     """Return twice the area along an axis of the face of the corners from the first up to the last, and a bound on its
     error."""
     first, last = corners
@@ -153,7 +155,9 @@ def _area(vertices: Any, merged: Any, corners: tuple[int, int], axis: int, scale
 
 
 @inline
-def _turns_once(vertices: Any, merged: Any, corners: tuple[int, int], axis: int, scale: float, is_left: bool) -> bool:
+def _turns_once(
+    vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float, is_left: bool
+) -> bool:
     """Tell whether a face certainly turns strictly one way at every corner, and around once."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
@@ -178,7 +182,7 @@ def _turns_once(vertices: Any, merged: Any, corners: tuple[int, int], axis: int,
 
 
 @inline
-def _projection(vertices: Any, merged: Any, corners: tuple[int, int]) -> int:
+def _projection(vertices: FloatArray, merged: IntArray, corners: tuple[int, int]) -> int:
     """Return CONVEX, or the number from 1 of the axis along which the area is largest, negative where that is negative;
     UNSURE where rounding leaves that open."""
     largest, least, found, is_convex = 0.0, -1.0, 0, True
@@ -199,8 +203,9 @@ def _projection(vertices: Any, merged: Any, corners: tuple[int, int]) -> int:
 
 @kernel
 def cut_convex_faces(
-    vertices: Any, offsets: Any, merged: Any, starts: Any, corners: Any, projections: Any, flag: Any
-) -> None:
+    vertices: FloatArray, offsets: IntArray, merged: IntArray, starts: IntArray, corners: IntArray,
+    projections: Int8Array, flag: FlagArray,
+) -> None:  # fmt: skip
     """Fill corners (starts[-1], 3) with positions in `merged`: the triangles of face i from starts[i] on, fans about
     the last corner; faces that are not certainly convex are left out. projections (m,) int8: see `_projection`."""
     for face in range(offsets.shape[0] - 1):

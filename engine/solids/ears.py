@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from engine.arrays import FlagArray, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.orientation import orient2d
 from engine.types import UNDECIDED, Point2
@@ -77,7 +78,7 @@ def _are_apart(a: float, b: float, c: float, d: float) -> bool:
 
 
 @kernel
-def find_meeting(ring: Ring, found: Any, flag: Any) -> int:
+def find_meeting(ring: Ring, found: IntArray, flag: FlagArray) -> int:
     """Return whether the ring is SIMPLE, or what was found: TURNS_BACK at corner found[0], or side found[0] MEETS side
     found[1]; ENDED_EARLY where the flag is set or a turn is wanted. Side i goes from corner i to the next one."""
     x, y, n = ring.x, ring.y, ring.x.shape[0]
@@ -102,7 +103,7 @@ def find_meeting(ring: Ring, found: Any, flag: Any) -> int:
 
 
 @kernel
-def cut_ears(ring: Ring, corners: Corners, ears: Any, flag: Any) -> int:
+def cut_ears(ring: Ring, corners: Corners, ears: IntArray, flag: FlagArray) -> int:
     """Fill ears (n - 2, 3): corner before, tip, corner after; return how many were cut, fewer than n - 2 where the flag
     is set or a turn is wanted. ring: simple, counter-clockwise."""
     before, after, is_blunt, n, n_blunt = corners.before, corners.after, corners.is_blunt, ring.x.shape[0], 0

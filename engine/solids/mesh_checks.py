@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, Int8Array, IntArray
 from engine.jit import allocating, allocating_kernel, called, inline
 
 _POLL: Final = 0x3FFF
@@ -34,7 +35,7 @@ def _mixed(bits: Any, row: int) -> Any:
 
 
 @allocating
-def _find_equal_rows(bits: Any, first: Any, flag: Any) -> int:
+def _find_equal_rows(bits: Any, first: IntArray, flag: FlagArray) -> int:
     """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of different
     ones.
 
@@ -70,7 +71,7 @@ def _find_equal_rows(bits: Any, first: Any, flag: Any) -> int:
 
 
 @allocating
-def _find_repeat(offsets: Any, indices: Any, n_vertices: int, flag: Any) -> int:
+def _find_repeat(offsets: IntArray, indices: IntArray, n_vertices: int, flag: FlagArray) -> int:
     """Return the first face that names a vertex twice, -1 if none does."""
     last_face = np.full(n_vertices, -1, np.int64)
     for face in range(offsets.shape[0] - 1):
@@ -84,13 +85,13 @@ def _find_repeat(offsets: Any, indices: Any, n_vertices: int, flag: Any) -> int:
 
 
 @inline
-def _following(offsets: Any, face: int, corner: int) -> int:
+def _following(offsets: IntArray, face: int, corner: int) -> int:
     """Return the next corner of a face."""
     return corner + 1 if corner + 1 < offsets[face + 1] else offsets[face]
 
 
 @called
-def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) -> None:
+def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: IntArray, flag: FlagArray) -> None:
     """Put the edges of all faces into `ends`, those with the lower vertex v at ``starts[v]`` to ``starts[v + 1]``.
 
     ends: the higher vertex h of an edge that runs up to it, ~h of one that runs down. starts: zeros, (n_vertices + 2,).
@@ -115,7 +116,7 @@ def _group_edges(offsets: Any, indices: Any, starts: Any, ends: Any, flag: Any) 
 
 
 @allocating
-def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[int, int]:
+def _count_unbalanced(starts: IntArray, ends: IntArray, marks: Int8Array, flag: FlagArray) -> tuple[int, int]:
     """Return how many edges are used an odd number of times, and how many others more often in one direction.
 
     starts, ends: from `_group_edges`. marks: int8, set to _ODD_USES or _TURNED at every use of such edges, else 0.
@@ -145,8 +146,9 @@ def _count_unbalanced(starts: Any, ends: Any, marks: Any, flag: Any) -> tuple[in
 
 @allocating
 def _name_unbalanced(
-    offsets: Any, corners: Any, starts: Any, ends: Any, marks: Any, wanted: int, named: Any, flag: Any
-) -> None:
+    offsets: IntArray, corners: IntArray, starts: IntArray, ends: IntArray, marks: Int8Array, wanted: int,
+    named: IntArray, flag: FlagArray,
+) -> None:  # fmt: skip
     """Set `named` (k, 5) to the first edges that are marked so: the face and the corner where the edge is used first,
     the next corner, how often it is used in this direction and in the other."""
     places = np.empty_like(starts)
@@ -179,8 +181,9 @@ def _name_unbalanced(
 
 @allocating_kernel
 def look_over(
-    bits: Any, offsets: Any, indices: Any, must_close: bool, merged: Any, named: Any, flag: Any
-) -> tuple[int, int, int, int]:
+    bits: Any, offsets: IntArray, indices: IntArray, must_close: bool, merged: IntArray, named: IntArray,
+    flag: FlagArray,
+) -> tuple[int, int, int, int]:  # fmt: skip
     """Return the first face that names a vertex twice (-1: none), the number of different vertices, and what
     `_count_unbalanced` does (0, 0 unless each edge must be used equally often in both directions).
 

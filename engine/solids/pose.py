@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, read_only
+from engine.arrays import BoolArray, FloatArray, read_only
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.jit import kernel
@@ -228,7 +228,7 @@ _UNREAD: Final = np.empty(1, np.bool_)
 
 
 @kernel
-def find_suspects(matrices: Any, limit: float, is_suspect: Any) -> int:
+def find_suspects(matrices: FloatArray, limit: float, is_suspect: BoolArray) -> int:
     """Fill is_suspect (n,) for matrices (n, d, d): whether max|R^T R - I| > limit as computed, or det is not positive;
     return how many there are.
 

@@ -54,7 +54,7 @@ def on_half_space(segments: FloatArray, normal: FloatArray, offset: float) -> tu
 
 
 @merged
-def code_word(p: Any, low: Any, high: Any) -> int:
+def code_word(p: FloatArray, low: FloatArray, high: FloatArray) -> int:
     """Return one bit per side that p is outside of."""
     code = 0
     for k in range(len(low)):
@@ -66,7 +66,7 @@ def code_word(p: Any, low: Any, high: Any) -> int:
 
 
 @allocating
-def cut(p: Any, q: Any, bit: int, low: Any, high: Any) -> Any:
+def cut(p: FloatArray, q: FloatArray, bit: int, low: FloatArray, high: FloatArray) -> Any:
     """Return the intersection of the segment with the plane of the side `bit`."""
     axis = bit // 2
     plane = high[axis] if bit % 2 else low[axis]
@@ -74,7 +74,7 @@ def cut(p: Any, q: Any, bit: int, low: Any, high: Any) -> Any:
 
 
 @allocating
-def clip_one(p: Any, q: Any, n_turns: int, region: Any, code_word: Any, cut: Any) -> int:
+def clip_one(p: FloatArray, q: FloatArray, n_turns: int, region: Any, code_word: Any, cut: Any) -> int:
     """Cut p q in place by ``code_word(p, *region)`` and ``cut(p, q, bit, *region)``; return its status."""
     code_p, code_q = code_word(p, *region), code_word(q, *region)
     for _ in range(n_turns):
@@ -104,7 +104,7 @@ def on_box(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[Flo
 
 
 @inline
-def code_word_of_planes(p: Any, planes: Any) -> int:
+def code_word_of_planes(p: FloatArray, planes: FloatArray) -> int:
     """Return one bit per row (normal, offset) that p is outside of."""
     code = 0
     for j in range(len(planes)):
@@ -114,7 +114,7 @@ def code_word_of_planes(p: Any, planes: Any) -> int:
 
 
 @allocating
-def cut_on_plane(p: Any, q: Any, bit: int, planes: Any) -> Any:
+def cut_on_plane(p: FloatArray, q: FloatArray, bit: int, planes: FloatArray) -> Any:
     """Return the intersection of the segment with the plane of row `bit`."""
     normal, offset = planes[bit, :-1], planes[bit, -1]
     at_p, at_q = signed_distance(p, normal, offset), signed_distance(q, normal, offset)

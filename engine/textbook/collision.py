@@ -10,7 +10,6 @@ Meshes are vertices (n, 3) and triangles (m, 3) each.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +32,7 @@ BOX_TRIANGLES: IntArray = np.array(
 
 
 @inline
-def has_vertex_inside(vertices: Any, others: Any, triangles: Any) -> bool:
+def has_vertex_inside(vertices: FloatArray, others: FloatArray, triangles: IntArray) -> bool:
     """Tell whether one of `vertices` is in the polyhedron (others, triangles)."""
     ahead = Point3(0.6180339887498949, 0.4142135623730951, 0.6695263146546152)  # no direction that occurs in a mesh
     found = False
@@ -67,7 +66,7 @@ def meets(p: Point3, q: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 
 
 @inline
-def has_edge_through_face(vertices: Any, triangles: Any, others: Any, faces: Any) -> bool:
+def has_edge_through_face(vertices: FloatArray, triangles: IntArray, others: FloatArray, faces: IntArray) -> bool:
     """Tell whether an edge of the first mesh meets a face of the second; every edge is met twice, from both sides."""
     for i in range(len(triangles)):
         for k in range(3):
@@ -156,13 +155,13 @@ def bounding_sphere(vertices: FloatArray) -> tuple[FloatArray, float]:
 
 
 @inline
-def side(a: Any, b: Any, p: Any) -> float:
+def side(a: FloatArray, b: FloatArray, p: FloatArray) -> float:
     """Return > 0 where p is on the left of the line from a to b."""
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
 @inline
-def holds(triangle: Any, p: Any) -> bool:
+def holds(triangle: FloatArray, p: FloatArray) -> bool:
     """Tell whether a triangle of either orientation holds p, its edges included."""
     a, b, c = triangle[0], triangle[1], triangle[2]
     s0, s1, s2 = side(a, b, p), side(b, c, p), side(c, a, p)
@@ -170,13 +169,13 @@ def holds(triangle: Any, p: Any) -> bool:
 
 
 @inline
-def edges_cross(a: Any, b: Any, c: Any, d: Any) -> bool:
+def edges_cross(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> bool:
     """Tell whether each of ab and cd has its ends on opposite sides of the other."""
     return side(a, b, c) * side(a, b, d) <= 0.0 and side(c, d, a) * side(c, d, b) <= 0.0
 
 
 @inline
-def pair_collides(first: Any, second: Any) -> bool:
+def pair_collides(first: FloatArray, second: FloatArray) -> bool:
     """Tell whether two triangles (3, 2) have a common point: an edge crosses an edge, or one holds a vertex."""
     if holds(first, second[0]) or holds(second, first[0]):
         return True

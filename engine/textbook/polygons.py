@@ -59,7 +59,7 @@ def unsigned_angle(ux: float, uy: float, vx: float, vy: float) -> float:
 
 
 @allocating
-def sum_of_angles(point: Any, vertices: Any, angle: Any) -> float:
+def sum_of_angles(point: FloatArray, vertices: FloatArray, angle: Any) -> float:
     """Return the sum of the angles under which the edges are seen from a point."""
     total = 0.0
     for j in range(len(vertices)):
@@ -81,7 +81,7 @@ def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
 
 
 @allocating_kernel
-def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: Any) -> BoolArray:
+def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: float) -> BoolArray:
     """Tell of each point (n, 2) whether the unsigned sum is at least a full turn less `tolerance` (radians)."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):

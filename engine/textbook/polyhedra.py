@@ -10,7 +10,7 @@ between them or meet both, and the parity is a matter of luck. A point on the su
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def intersect(origin: Point3, direction: Point3, a: Point3, b: Point3, c: Point3
 
 
 @inline
-def parity_of(point: Point3, direction: Point3, vertices: Any, triangles: Any, margin: float) -> int:
+def parity_of(point: Point3, direction: Point3, vertices: FloatArray, triangles: IntArray, margin: float) -> int:
     """Return the parity of the triangles that the half-line meets, their edges included; CLOSE_TO_AN_EDGE where it
     passes one by less than `margin`, in barycentric units."""
     parity = OUT

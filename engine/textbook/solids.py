@@ -37,7 +37,7 @@ def in_implicit(points: FloatArray, powers: IntArray, coefficients: FloatArray) 
 
 
 @inline
-def signed_distance(point: Any, normal: Any, offset: float) -> float:
+def signed_distance(point: FloatArray, normal: FloatArray, offset: float) -> float:
     """Return dot(normal, point) + offset: a distance up to the length of the normal, which points inward."""
     total = 0.0
     for k in range(len(normal)):

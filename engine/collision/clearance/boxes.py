@@ -8,10 +8,11 @@ them near 1. Each body alone is looked at along a line: a direction d in its own
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import Float32Array, FloatArray
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.placement import Placement, placed, turned_back
@@ -78,7 +79,7 @@ def scaled(p: Point3, unit: float) -> Point3:
 
 
 @inline
-def fix(view: View, at: int, fixed: Any) -> None:
+def fix(view: View, at: int, fixed: Float32Array) -> None:
     """Write box and disc of a lane, or what holds the whole tree, to the first column of `fixed`."""
     if at == ROOT:
         for row in range(FIXED_ROWS):
@@ -97,13 +98,13 @@ def size_of(view: View) -> float:
 
 
 @merged
-def way_of(line: Any, row: int, sign: float) -> tuple[float, float, float]:
+def way_of(line: FloatArray, row: int, sign: float) -> tuple[float, float, float]:
     """Return the direction of the line, or against it, in the axes of a body."""
     return sign * line[3 * row], sign * line[3 * row + 1], sign * line[3 * row + 2]
 
 
 @inline
-def set_line(line: Any, a: View, b: View, d: Point3) -> None:
+def set_line(line: FloatArray, a: View, b: View, d: Point3) -> None:
     """Keep a direction, not longer than 1, in the axes of either body."""
     d = Point3(_BELOW_ONE * d.x, _BELOW_ONE * d.y, _BELOW_ONE * d.z)
     e, f = turned_back(a.place, d), turned_back(b.place, d)
@@ -142,7 +143,7 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
 
 
 @inline
-def keep_below(found: Any, n: int, most: float) -> int:
+def keep_below(found: Candidates, n: int, most: float) -> int:
     """Leave out the candidates above the bound; return how many there are."""
     n_kept = 0
     for item in range(n):
@@ -155,7 +156,7 @@ def keep_below(found: Any, n: int, most: float) -> int:
 
 
 @merged
-def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: Any) -> tuple[int, int]:
+def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: FloatArray) -> tuple[int, int]:
     """Add the pairs of triangles of two blocks that may be the nearest; return how that ended, and their number.
 
     limits: as in `find_nearest`; the first falls.

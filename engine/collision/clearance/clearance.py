@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any, Literal, Unpack, overload
+from typing import Literal, Unpack, overload
 
 import numpy as np
 
@@ -116,7 +116,7 @@ def clearance(
     return answer, Accuracy("exact", 0.5, 1, n_exact, n_exact, "+".join(sorted({first.type, second.type})))
 
 
-def checked_distance(value: Any, name: str = "at_least") -> float:
+def checked_distance(value: float, name: str = "at_least") -> float:
     """Return a distance; raise unless it is a finite number, 0 or more."""
     try:
         number = float(value)

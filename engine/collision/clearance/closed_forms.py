@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from engine.arrays import FloatArray
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
 from engine.collision.simple.form_relations import IS_BALL, RADIUS
 from engine.jit import inline, kernel
@@ -83,7 +84,7 @@ def _wide(w: Any, at: int) -> Wide:
 
 
 @inline
-def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
+def _place(form: FloatArray, turn: FloatArray, move: FloatArray, w: Any, first: int) -> float:
     """Write the bounds of a placed form to w, low and high of each axis; return a bound on their error, infinite for a
     box that is turned and beyond the range of the bounds.
 
@@ -112,8 +113,9 @@ def _place(form: Any, turn: Any, move: Any, w: Any, first: int) -> float:
 
 @inline
 def gap_of_forms(
-    form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any, w: Any
-) -> tuple[float, int, int, Wide, float]:
+    form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
+    their_move: FloatArray, w: Any,
+) -> tuple[float, int, int, Wide, float]:  # fmt: skip
     """Return the distance, 0.0 where they surely meet, or UNSURE; on which faces the nearest points lie; the root; and
     the error of coordinates.
 
@@ -162,8 +164,9 @@ def gap_of_forms(
 
 @kernel
 def nearest_of_forms(
-    form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any, points: Any
-) -> tuple[float, int, int]:
+    form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
+    their_move: FloatArray, points: FloatArray,
+) -> tuple[float, int, int]:  # fmt: skip
     """Return what `gap_of_forms` does, and fill points (2, d); UNSURE points are told by -1 in place of the faces."""
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)

@@ -14,10 +14,11 @@ three-dimensional space, 1988; C. Ericson, Real-Time Collision Detection, 2005, 
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.clearance.closed_forms import gap_of_forms
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.refined import ROUNDING, corner_of, ends_of, height_above
@@ -212,8 +213,8 @@ def _beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wid
 
 @kernel
 def gaps_of_pairs(
-    forms: Any, pool: ConvexArrays, bodies: Any, kinds: Any, poses: PoseArrays, places: Any, gap: float,
-    is_measured: bool, distances: Any, flag: Any,
+    forms: FloatArray, pool: ConvexArrays, bodies: IntArray, kinds: IntArray, poses: PoseArrays, places: IntArray,
+    gap: float, is_measured: bool, distances: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill distances (n,) of pairs without a common point: as `gap_of_convex` says, NaN where this is not sure.
 

@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.collision.clearance.vertex_edge import Found, Placed, Wide2, measure, minus2, point
 from engine.collision.clearance.wide import Wide, less
 from engine.collision.planar.outline_batch import BLOCK
@@ -105,7 +106,7 @@ def _kept(near: Any, n: int, most: float) -> int:
 
 
 @inline
-def _gap(boxes: Any, block: int, others: Any, other: int) -> float:
+def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float:
     """Return about how far two boxes are apart, squared."""
     x = max(boxes[block, 0] - others[other, 2], others[other, 0] - boxes[block, 2], 0.0)
     y = max(boxes[block, 1] - others[other, 3], others[other, 1] - boxes[block, 3], 0.0)
@@ -135,7 +136,7 @@ def look_for(a: Placed, b: Placed, near: Any) -> Look:
 
 
 @inline
-def _least_face(following: Any, vertex: int) -> int:
+def _least_face(following: IntArray, vertex: int) -> int:
     """Return the lesser edge at a vertex."""
     for edge in range(vertex):
         if following[edge] == vertex:

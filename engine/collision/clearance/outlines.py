@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.clearance.closed_forms import UNSURE
 from engine.collision.clearance.outline_search import MOST_NEAR, ROOM, Look, line_of, look_for, row_of, search, way_to
 from engine.collision.clearance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, minus2, place, point
@@ -70,7 +71,7 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
 
 @inline
 def _write(
-    at: Wide2, error: float, errors: float, found: Found, way: Wide2, radius: float, points: Any, end: int
+    at: Wide2, error: float, errors: float, found: Found, way: Wide2, radius: float, points: FloatArray, end: int
 ) -> bool:
     """Write the point at a radius from another along a way that is as long as is found; tell whether it is sure.
 
@@ -88,7 +89,7 @@ def _write(
 
 
 @inline
-def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: Any) -> tuple[float, int, int]:
+def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray) -> tuple[float, int, int]:
     """Return the distance of two bodies, 0.0 where they surely meet, or UNSURE; of each body the vertex, or the number
     of vertices + the edge, that the points (2, 2) written lie on; -1 where these are not sure.
 
@@ -122,15 +123,16 @@ def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: A
 
 
 @inline
-def _n_rows(following: Any) -> int:
+def _n_rows(following: IntArray) -> int:
     """Return how many rows the points and boxes of an outline take."""
     return len(following) + n_blocks(len(following))
 
 
 @allocating_kernel
 def nearest_under_poses(
-    vertices: Any, following: Any, radius: float, turns: Any, moves: Any, other: Any, their_following: Any,
-    their_radius: float, their_turns: Any, their_moves: Any, found: Any, points: Any, flag: Any,
+    vertices: FloatArray, following: IntArray, radius: float, turns: FloatArray, moves: FloatArray, other: FloatArray,
+    their_following: IntArray, their_radius: float, their_turns: FloatArray, their_moves: FloatArray, found: FloatArray,
+    points: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill found (n, 3) with what `_nearest` returns for each pose of the second; the first has as many poses, or one.
     The points are those of the last. Returns early when the flag is raised."""

@@ -23,10 +23,11 @@ direction off by 2 `error` brings a height, of lengths below 4, off by less than
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.collision.clearance.boxes import Search, View, keep_below, scaled
 from engine.collision.clearance.near_triangles import FACE
 from engine.collision.clearance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
@@ -161,7 +162,7 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
 
 
 @inline
-def shift_of(s: Search, start: Any, other: Any) -> Wide3:
+def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
     """Return the translation of the second body less that of the first, times the unit."""
     unit = s.a.unit
     x, y = Wide(*two_diff(other[0] * unit, start[0] * unit)), Wide(*two_diff(other[1] * unit, start[1] * unit))
@@ -169,7 +170,7 @@ def shift_of(s: Search, start: Any, other: Any) -> Wide3:
 
 
 @called
-def refine(s: Search, start: Any, other: Any, radii: Any, n: int) -> tuple[float, int]:
+def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int) -> tuple[float, int]:
     """Bound n candidates again and leave out those that are none; return the double nearest to the distance, -1.0 where
     that is not sure, and how many are left.
 
@@ -210,8 +211,8 @@ def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int],
 
 
 @inline
-def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: Any, error: float,
-           point: Any) -> bool:  # fmt: skip
+def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, error: float,
+           point: FloatArray) -> bool:  # fmt: skip
     """Write the point (d,) at a radius from p along n, from the origin of space; tell whether it is sure."""
     size, is_sure, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
@@ -230,7 +231,9 @@ def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: 
 
 
 @called
-def certify(s: Search, start: Any, other: Any, radii: Any, n: int, points: Any) -> bool:
+def certify(
+    s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int, points: FloatArray
+) -> bool:
     """Fill points (2, d) with the nearest points of two bodies and put the candidate they are on first, of equal ones
     that of the smallest faces; False where n candidates leave them open. Other arguments as for `refine`.
     """

@@ -17,16 +17,19 @@ S. Gottschalk, M. Lin, D. Manocha, Fast distance queries with rectangular swept 
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray
 from engine.collision.clearance.boxes import (
     CLOSER,
     DONE,
     FULL,
     INTERRUPTED,
     ROOT,
+    Heap,
+    Room,
     Search,
     View,
     fix,
@@ -69,7 +72,7 @@ class Asked(NamedTuple):
 
 
 @inline
-def push(heap: Any, n: int, bound: float, i: int, j: int) -> None:
+def push(heap: Heap, n: int, bound: float, i: int, j: int) -> None:
     bounds, lanes = heap.bounds, heap.lanes
     while n > 0 and bounds[(n - 1) >> 1] > bound:  # bound: the height of the heap
         bounds[n], lanes[n, 0], lanes[n, 1] = bounds[(n - 1) >> 1], lanes[(n - 1) >> 1, 0], lanes[(n - 1) >> 1, 1]
@@ -78,7 +81,7 @@ def push(heap: Any, n: int, bound: float, i: int, j: int) -> None:
 
 
 @inline
-def drop_first(heap: Any, n: int) -> None:
+def drop_first(heap: Heap, n: int) -> None:
     """Take the first of n entries out, the last one takes a place of its own."""
     bounds, lanes = heap.bounds, heap.lanes
     last, i, j = bounds[n - 1], lanes[n - 1, 0], lanes[n - 1, 1]
@@ -124,7 +127,7 @@ def _half_of(view: View, at: int) -> float:
 
 
 @inline
-def _search(s: Search, limits: Any, flag: Any) -> tuple[int, int]:
+def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
     """Fill the candidates; return how the search ended, and their number. See `find_nearest`."""
     first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
     n, n_found = 1, 0
@@ -171,7 +174,7 @@ def _start_line(s: Search) -> None:
 @kernel
 def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
-    asked: Asked, answers: Any, room: Any, flag: Any,
+    asked: Asked, answers: FloatArray, room: Room, flag: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Answer for the poses of both bodies from span[0] to span[1] whose answers (n,) are NaN; the first may have but
     one.

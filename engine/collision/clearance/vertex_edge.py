@@ -11,10 +11,11 @@ A foot moves by what moves the corners, times the distance of the vertex over th
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FloatArray, IntArray
 from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
 from engine.collision.planar.outline_batch import box_blocks
 from engine.jit import called, inline
@@ -44,7 +45,9 @@ bodies the vertex, or the number of vertices + the edge, and the least edge that
 
 
 @called
-def place(vertices: Any, following: Any, turn: Any, move: Any, points: Any, boxes: Any) -> tuple[float, float]:
+def place(
+    vertices: FloatArray, following: IntArray, turn: FloatArray, move: FloatArray, points: FloatArray, boxes: FloatArray
+) -> tuple[float, float]:
     """Write the points and boxes of an outline under a pose; return the last two of `Placed`.
 
     Each sum of three is off by 12 u^2 of its terms. Where axes are turned onto axes sums are exact, and where each is a
@@ -69,7 +72,7 @@ def place(vertices: Any, following: Any, turn: Any, move: Any, points: Any, boxe
 
 
 @inline
-def _reach(points: Any, following: Any, boxes: Any, reach: float) -> float:
+def _reach(points: FloatArray, following: IntArray, boxes: FloatArray, reach: float) -> float:
     """Write the boxes of placed points; return the last of `Placed`; reach: of what coordinates are sums of."""
     box_blocks(points, following, boxes)
     for block in range(len(boxes)):
@@ -84,7 +87,7 @@ def _reach(points: Any, following: Any, boxes: Any, reach: float) -> float:
 
 
 @inline
-def point(points: Any, vertex: int) -> Wide2:
+def point(points: FloatArray, vertex: int) -> Wide2:
     return Wide2(Wide(points[vertex, 0], points[vertex, 2]), Wide(points[vertex, 1], points[vertex, 3]))
 
 

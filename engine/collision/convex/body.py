@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -114,15 +113,16 @@ def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> Conv
 
 
 @merged
-def point_of(points: Any, point: int) -> Point3:
+def point_of(points: FloatArray, point: int) -> Point3:
     """Load a vertex of points (3, n)."""
     return Point3(points[0, point], points[1, point], points[2, point])
 
 
 @allocating_kernel
 def _describe(
-    points: Any, triangles: Any, first_neighbor: Any, neighbors: Any, outermost: Any, normals: Any, numbers: Any
-) -> None:
+    points: FloatArray, triangles: IntArray, first_neighbor: IntArray, neighbors: IntArray, outermost: IntArray,
+    normals: FloatArray, numbers: FloatArray,
+) -> None:  # fmt: skip
     """Fill everything but points and the centre.
 
     A normal from rounded differences and products is off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v| |w|

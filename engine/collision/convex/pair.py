@@ -34,10 +34,11 @@ certified; a proposal that stalls ends the search.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned, turned_back
@@ -107,7 +108,7 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
 
 
 @merged
-def inner_point(numbers: Any, body: int, f: PlacedBody, which: int) -> Point3:
+def inner_point(numbers: FloatArray, body: int, f: PlacedBody, which: int) -> Point3:
     """Return one of the two points inside a body, posed: CENTER or ASIDE."""
     return placed(Point3(numbers[body, which], numbers[body, which + 1], numbers[body, which + 2]), f.place)
 
@@ -139,7 +140,7 @@ def _lies(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBo
 
 
 @inline
-def _lies_in_ball(points: Any, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
+def _lies_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
     """Return the same for a ball: its centre and the farthest point of the other body."""
     most = 0.0
     for point in range(a.first, a.stop):
@@ -151,7 +152,7 @@ def _lies_in_ball(points: Any, a: PlacedBody, center: Point3, radius: float, err
 
 
 @merged
-def _has_equal_pose(rotations: Any, translations: Any, i: int, j: int) -> bool:
+def _has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
     """Tell whether rows i and j hold one pose: then the two bodies count as unposed."""
     for k in range(3):
         for m in range(3):
@@ -162,8 +163,8 @@ def _has_equal_pose(rotations: Any, translations: Any, i: int, j: int) -> bool:
 
 @kernel
 def relate_convex_pairs(
-    pool: ConvexArrays, bodies: Any, poses: PoseArrays, pairs: Any, is_boolean: bool, may_be_equal: bool,
-    relations: Any, flag: Any,
+    pool: ConvexArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, is_boolean: bool, may_be_equal: bool,
+    relations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
 
@@ -218,7 +219,7 @@ def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> 
 
 
 @merged
-def farthest(points: Any, graph: Any, f: PlacedBody, local: Point3, hint: int) -> int:
+def farthest(points: FloatArray, graph: IntArray, f: PlacedBody, local: Point3, hint: int) -> int:
     """Return a vertex about farthest along a local direction: all of few, else uphill from `hint`, -1 for none."""
     if f.stop - f.first <= _FEW:
         best, found = -np.inf, f.first
@@ -244,7 +245,7 @@ def farthest(points: Any, graph: Any, f: PlacedBody, local: Point3, hint: int) -
 
 
 @inline
-def largest(points: Any, f: PlacedBody, d: Point3) -> float:
+def largest(points: FloatArray, f: PlacedBody, d: Point3) -> float:
     """Return the largest d . p of all points p of a posed body."""
     local = turned_back(f.place, d)
     best, other = -np.inf, -np.inf
@@ -258,7 +259,7 @@ def largest(points: Any, f: PlacedBody, d: Point3) -> float:
 
 
 @inline
-def is_apart_along(points: Any, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
+def is_apart_along(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
     """Tell whether all of the first body surely lies below all of the second one along d."""
     size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(largest(points, a, d) + largest(points, b, negative(d)))
     return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
@@ -287,7 +288,7 @@ def _size(a: Point3) -> float:
 
 
 @inline
-def meet_or_apart(points: Any, graph: Any, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
+def meet_or_apart(points: FloatArray, graph: IntArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
     """Return APART, MEETING (the open interiors) or UNSETTLED. v0: a point of M, better not one of its symmetry.
 
     Stages: 0 and 1 find the first two corners, 2 the third, until the half-line from v0 to the origin passes between

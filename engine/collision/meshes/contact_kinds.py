@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import FloatArray, Int8Array
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.triangle_triangle import (
     Facet,
@@ -51,7 +52,9 @@ face, three bits for each face."""
 
 
 @called
-def _side(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float, work: Any) -> int:
+def _side(
+    poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float, work: Int8Array
+) -> int:
     """Return orient3d; 0, and note it, where it is open."""
     side = sign_of_four(poses, a, b, c, d, error)
     if side == UNDECIDED:
@@ -61,8 +64,9 @@ def _side(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPo
 
 @called
 def _turn(
-    poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float, work: Any
-) -> int:
+    poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float,
+    work: Int8Array,
+) -> int:  # fmt: skip
     """Return how three points of one plane turn; 0, and note it, where that is open."""
     turn = turn_in_plane(poses, a, b, c, off, axis, error)
     if turn == UNDECIDED:
@@ -71,7 +75,7 @@ def _turn(
 
 
 @called
-def _against_face(poses: Any, t: Facet, sides: Signs, u: Facet, axis: int, error: float, work: Any) -> int:
+def _against_face(poses: FloatArray, t: Facet, sides: Signs, u: Facet, axis: int, error: float, work: Int8Array) -> int:
     """Return how t, at these sides of u's plane, meets the open face u: EDGE_FACE, VERTEX_FACE; or by corners."""
     off, flat = beside(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     if not np.isfinite(off.x + off.y + off.z):
@@ -115,7 +119,7 @@ def _against_face(poses: Any, t: Facet, sides: Signs, u: Facet, axis: int, error
 
 @called
 def _overlap_on_line(
-    poses: Any, t: Facet, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Any
+    poses: FloatArray, t: Facet, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Int8Array
 ) -> bool:
     """Tell whether edge k of t and c d, on one line, share a length, by planes through either end and off the line."""
     a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), beside(t, axis)
@@ -130,7 +134,7 @@ def _overlap_on_line(
 
 @called
 def _open_edges_meet(
-    poses: Any, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Any
+    poses: FloatArray, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Int8Array
 ) -> bool:
     """Tell whether two open edges of the faces have a common point."""
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
@@ -174,7 +178,7 @@ def lone_zero(sides: Signs) -> int:
 
 
 @inline
-def _is_edge_across(poses: Any, t: Facet, u: Facet, sides: Signs, their_sides: Signs, error: float) -> bool:
+def _is_edge_across(poses: FloatArray, t: Facet, u: Facet, sides: Signs, their_sides: Signs, error: float) -> bool:
     """Tell whether an edge of one of two faces that straddle surely passes through the other, strictly within it.
 
     Each cuts the line of the two planes in an interval. Where these share a length and two ends differ, one of them
@@ -190,7 +194,9 @@ def _is_edge_across(poses: Any, t: Facet, u: Facet, sides: Signs, their_sides: S
 
 
 @called
-def kind_of(poses: Any, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Any) -> tuple[int, int]:
+def kind_of(
+    poses: FloatArray, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Int8Array
+) -> tuple[int, int]:
     """Return the kind of the contact of two faces with area, UNSETTLED where a sign is open, and whether it may cut the
     open face t (1), u (2) or BOTH: not where all that they share is one point, or lies on its border. Sets FLUSH."""
     work[_BAD] = work[FLUSH] = 0
@@ -237,7 +243,7 @@ def _sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tuple[in
 
 
 @merged
-def common_corner(poses: Any, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
+def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
     """Return 3 k + m where corner k of a face surely is corner m of another, and they have no other common point, else
     -1; t, u: the rounded posed triangles, each coordinate off by at most `error`; own, their: before their poses.
 

@@ -10,11 +10,11 @@ and of the faces that meet in a common corner only (`contact_kinds.py`) gets no 
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray
+from engine.arrays import FlagArray, FloatArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, keep_first
 from engine.collision.meshes.face_state import proves_overlap, state_of
@@ -104,7 +104,7 @@ def room_of(found: Found) -> int:
 
 
 @inline
-def store_pose(poses: Any, row: int, pose: PoseArrays, item: int) -> None:
+def store_pose(poses: FloatArray, row: int, pose: PoseArrays, item: int) -> None:
     """Write one pose as exact signs take it: rotation by rows, then translation."""
     for i in range(3):
         for k in range(3):

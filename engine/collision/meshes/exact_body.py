@@ -17,11 +17,10 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
-from engine.arrays import IntArray
+from engine.arrays import FloatArray, IntArray
 from engine.bounding.bvh import STACK, WIDTH
 from engine.collision.exact_images import rounded_quotient
 from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_shift
@@ -137,7 +136,7 @@ def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
 
 
 @inline
-def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: Any) -> bool:
+def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: FloatArray) -> bool:
     """Tell whether a placed child box surely has no common point with bounds (6,); NaN is never apart."""
     r, t = pose.rotations[0], pose.translations[0]
     for i in range(3):
@@ -151,7 +150,7 @@ def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, mar
 
 
 @allocating_kernel
-def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: Any, found: Any) -> int:
+def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: FloatArray, found: IntArray) -> int:
     """Write the triangles whose placed boxes may meet bounds (6,) into found (room,); return their number."""
     t = pose.translations[0]
     shift = max(abs(t[0]), abs(t[1]), abs(t[2]))

@@ -12,11 +12,11 @@ faces above a point within it, along an axis that crosses it, tell which: an odd
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from engine.arrays import Int8Array, IntArray
+from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
@@ -54,7 +54,7 @@ def side_of_corner(mesh: MeshArrays, face: int, t: Facet, other: int, k: int, p:
 
 
 @inline
-def state_by(mesh: MeshArrays, face: int, other: int, poses: Any) -> int:
+def state_by(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> int:
     """Return what one other face of the body makes of the state of `face` (which has an area)."""
     if mesh.axis[other] == -1:
         return STATE_CLEAN
@@ -95,7 +95,7 @@ def is_corner(mesh: MeshArrays, face: int, other: int, k: int) -> bool:
 
 
 @inline
-def state_of(mesh: MeshArrays, face: int, poses: Any) -> int:
+def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return the state of a face, kept once computed; stacked without area. poses: any (n, 12), nothing has a pose."""
     if mesh.state[face] == STATE_UNKNOWN:
         mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
@@ -103,7 +103,7 @@ def state_of(mesh: MeshArrays, face: int, poses: Any) -> int:
 
 
 @allocating
-def state_among(mesh: MeshArrays, face: int, poses: Any) -> int:
+def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return what the other faces of the body make of the state of a face with area."""
     t = triangle_of(mesh, face)
     p, q, r = in_tree(mesh, t.p), in_tree(mesh, t.q), in_tree(mesh, t.r)
@@ -120,7 +120,7 @@ def state_among(mesh: MeshArrays, face: int, poses: Any) -> int:
 
 
 @inline
-def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: Any) -> bool:
+def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: FloatArray) -> bool:
     """Tell whether a strict crossing of these two faces proves that the open interiors of two solids meet."""
     a = state_of(first, i, poses)
     if a == STATE_STACKED:
@@ -143,7 +143,7 @@ def state_at(mesh: MeshArrays, face: int) -> int:
 
 
 @allocating_kernel
-def _find_states(mesh: MeshArrays, faces: Any, states: Any) -> None:
+def _find_states(mesh: MeshArrays, faces: IntArray, states: Int8Array) -> None:
     """Fill states (n,) with the state of each of `faces` (n,)."""
     poses = np.zeros((1, 12))
     for item in range(faces.shape[0]):
@@ -167,7 +167,7 @@ def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
 
 
 @allocating
-def inner_side(mesh: MeshArrays, face: int, poses: Any) -> int:
+def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return the side of a face, 1 that of its normal or -1, on which its body lies; UNTOLD. poses: as `state_of`."""
     if mesh.inner[face] == 0:
         mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else UNTOLD

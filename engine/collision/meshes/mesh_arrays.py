@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections import namedtuple
 from dataclasses import dataclass
 from math import frexp, ldexp
-from typing import Any
 
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
-from engine.arrays import FloatArray, IntArray, read_only
+from engine.arrays import BoolArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
 from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
@@ -145,8 +144,8 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
 
 @allocating_kernel
 def _lay_out(
-    vertices: Any, triangles: Any, faces: Any, child: Any, order: Any, ordered: Any, used: Any, axis: Any,
-    components: Any,
+    vertices: FloatArray, triangles: IntArray, faces: IntArray, child: Int32Array, order: IntArray, ordered: IntArray,
+    used: FloatArray, axis: Int8Array, components: IntArray,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components, and the
     least face connected with the first triangle.
@@ -188,7 +187,9 @@ def _lay_out(
 
 
 @kernel
-def _fill_blocks(vertices: Any, triangles: Any, child: Any, origin: Any, scale: float, blocks: Any) -> None:
+def _fill_blocks(
+    vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float, blocks: Float32Array
+) -> None:
     """Fill blocks (n_nodes, 9, 8) with the corners of the triangles of each block, in the coordinates of the tree."""
     for node in range(child.shape[0]):
         if child[node, 0] >= 0:
@@ -204,7 +205,7 @@ def _fill_blocks(vertices: Any, triangles: Any, child: Any, origin: Any, scale: 
 
 
 @kernel
-def _lattice_of(vertices: Any) -> tuple[float, int, int]:
+def _lattice_of(vertices: FloatArray) -> tuple[float, int, int]:
     """Return the largest magnitude of a coordinate, k of the largest power 2^k that divides all (0 if all are zero),
     and k >= 0 so that every coordinate times 2^k is an integer, surely."""
     reach, lowest, smallest = 0.0, 2000, 2000
@@ -273,13 +274,13 @@ def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
 
 
 @kernel
-def join_vertices(triangles: Any, left_out: Any, parent: Any) -> None:
+def join_vertices(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
     """Set parent (n_vertices,) so that vertices connected by triangles not left out have one representative."""
     _join(triangles, left_out, parent)
 
 
 @inline
-def _join(triangles: Any, left_out: Any, parent: Any) -> None:
+def _join(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
     for vertex in range(parent.shape[0]):
         parent[vertex] = vertex
     for item in range(triangles.shape[0]):

@@ -13,9 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
-from engine.collision.meshes.placement import Placement, defect_of, orient2d_near, place_pair, placed, turned_back
+from engine.collision.meshes.placement import (
+    Placement,
+    PoseArrays,
+    defect_of,
+    orient2d_near,
+    place_pair,
+    placed,
+    turned_back,
+)
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel, merged
 from engine.lanes.boxes import inside_box
@@ -135,8 +144,8 @@ def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> i
 
 @kernel
 def locate_vertices(
-    source: MeshArrays, source_pose: Any, vertices: Any, mesh: MeshArrays, pose: Any, found: Any,
-    flag: Any,
+    source: MeshArrays, source_pose: PoseArrays, vertices: IntArray, mesh: MeshArrays, pose: PoseArrays,
+    found: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill found (n,) int8 for the vertices (n,) of `source` against `mesh`, each under its one pose."""
     a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
@@ -163,7 +172,7 @@ def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
 
 
 @inline
-def next_face(mesh: MeshArrays, stack: Any, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
+def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
     """Return a face whose box meets a box, -1 if there is none left, and how much waits on the stack (STACK,) int32,
     which begins with the root, 0: nodes, and faces as in `MeshArrays.child`."""
     while n > 0:  # bound: each node and face enters once

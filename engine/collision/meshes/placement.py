@@ -26,11 +26,11 @@ s_b / s_a + |T|; six products of denormal numbers round to less than 2^-1071 in 
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
+from engine.arrays import Float32Array, FloatArray
 from engine.jit import inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
@@ -72,7 +72,7 @@ def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Pl
 
 
 @inline
-def is_lattice_rotation(rotation: Any) -> bool:
+def is_lattice_rotation(rotation: FloatArray) -> bool:
     """Tell whether a rotation only permutes axes and turns signs."""
     for i in range(3):
         for k in range(3):
@@ -186,8 +186,9 @@ def defect_of(place: Placement) -> float:
 
 @inline
 def set_frame(
-    frame: Any, a: Placement, a_origin: Any, a_scale: float, b: Placement, b_origin: Any, b_scale: float, defect: float
-) -> bool:
+    frame: Float32Array, a: Placement, a_origin: FloatArray, a_scale: float, b: Placement, b_origin: FloatArray,
+    b_scale: float, defect: float,
+) -> bool:  # fmt: skip
     """Fill frame (22, 8) float32 with the map from tree b to tree a; tell whether the two trees are surely apart."""
     ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
     there = turned(b, origin)

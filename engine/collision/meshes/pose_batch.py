@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from engine.arrays import FlagArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import (
     BOTH,
@@ -78,7 +77,7 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: Place) -> int:
 
 
 @called
-def in_contact(s: Search, n: int, n_named: int, row: Any) -> None:
+def in_contact(s: Search, n: int, n_named: int, row: IntArray) -> None:
     """Fill the row of a pair by its n contacts, all there are, of which the first name the witness.
 
     The first are put in order, and of those looked at the class becomes JUDGED with the corners in the plane of the
@@ -147,7 +146,7 @@ def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, int]:
 
 
 @inline
-def put_in_order(faces: Any, their_faces: Any, pairs: Any, kinds: Any, n: int) -> None:
+def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
     """Bring the first N_NAMED of n pairs of triangles to the front: flush ones first, then by the callers' faces, then
     by their numbers."""
     for item in range(1, n):
@@ -166,7 +165,7 @@ def put_in_order(faces: Any, their_faces: Any, pairs: Any, kinds: Any, n: int) -
 @kernel
 def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
-    descent: Descent, found: Found, n_known: int, rows: Any, flag: Any,
+    descent: Descent, found: Found, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the one of the first.
 

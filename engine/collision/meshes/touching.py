@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces
@@ -80,7 +81,7 @@ def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
 
 
 @called
-def side_of_all(poses: Any, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
+def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
     """Return the closed side (1, -1) of a plane on which about so many vertices lie, 0 if they lie on it; UNDECIDED if
     they lie on both sides, or where a sign is open."""
     found, n = 0, v.points.shape[0]
@@ -93,7 +94,7 @@ def side_of_all(poses: Any, plane: Facet, v: Vertices, error: float, n_samples: 
 
 
 @called
-def separates(poses: Any, plane: Facet, u: Vertices, v: Vertices, error: float) -> bool:
+def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: float) -> bool:
     """Tell whether a plane has the vertices of two bodies on different closed sides, not all of them in it."""
     for n_samples in (_SAMPLED, max(len(u.points), len(v.points))):  # most planes cut the bodies in the middle
         side = side_of_all(poses, plane, u, error, n_samples)
@@ -153,7 +154,7 @@ def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPo
 
 
 @called
-def _corners_on(poses: Any, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+def _corners_on(poses: FloatArray, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
     """Return a bit for each corner of t that lies on the closed face u, -1 where that is not known."""
     found = 0
     for k in range(3):
@@ -240,7 +241,7 @@ JUDGED = 64
 
 
 @inline
-def place_of(known: Any, vertex: int) -> int:
+def place_of(known: IntArray, vertex: int) -> int:
     """Return where a vertex stands in a table of a power of two of places, or the free place where it may."""
     last = known.shape[0] - 1
     place = vertex & last
@@ -267,7 +268,9 @@ def may_be_corner(own: OwnPoint, mesh: MeshArrays) -> bool:
 
 
 @called
-def where_faces_are(s: Search, own: int, n: int, shares: Any, known: Any, is_flush: Any, told: Any) -> int:
+def where_faces_are(
+    s: Search, own: int, n: int, shares: BoolArray, known: IntArray, is_flush: BoolArray, told: IntArray
+) -> int:
     """Return OUTSIDE where every face of a body in contact has a point that surely lies outside the other body, and no
     corner off it does not, nor any component without contact; INSIDE where one surely lies inside and has an inside of
     its own beside it; else UNDECIDED.
@@ -336,7 +339,7 @@ def has_inside_beside(s: Search, source: MeshArrays, face: int) -> bool:
 
 
 @allocating
-def by_places(s: Search, n: int, shares: Any) -> int:
+def by_places(s: Search, n: int, shares: BoolArray) -> int:
     """Return OVERLAPPING or TOUCHING where the faces of both bodies that are in contact tell it, else UNSETTLED."""
     n_places = 16
     while n_places < 6 * n:

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import FloatArray
 from engine.jit import called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, posed_point
@@ -41,7 +42,7 @@ Facet = namedtuple("Facet", "p q r")
 
 
 @inline
-def facet_at(points: Any, i: int, j: int, k: int) -> Facet:
+def facet_at(points: FloatArray, i: int, j: int, k: int) -> Facet:
     """Load three of points (n, 3)."""
     return Facet(as_point3(points, i), as_point3(points, j), as_point3(points, k))
 
@@ -164,7 +165,9 @@ def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
 
 
 @inline
-def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float) -> int:
+def sign_of_four(
+    poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
+) -> int:
     """Return `orient3d_posed`; 0 at once for a repeated point, or a common coordinate, of one pose."""
     if is_same(a, d) or is_same(b, d) or is_same(c, d) or is_same(a, b) or is_same(a, c) or is_same(b, c):
         return 0
@@ -177,7 +180,7 @@ def sign_of_four(poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: 
 
 
 @called
-def sides_of(poses: Any, t: Facet, u: Facet, error: float) -> Signs:
+def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
     """Return the sides of the plane of t on which the corners of u lie, each as `sign_of_four`."""
     a = posed_point(poses, t.p)
     v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
@@ -206,7 +209,7 @@ def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[
 
 
 @called
-def classify(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
+def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
 
     poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection
@@ -238,7 +241,7 @@ def classify(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
 
 
 @inline
-def projected(p: Any, axis: int) -> Point2:
+def projected(p: Point3, axis: int) -> Point2:
     """Return the point without one coordinate, the two others in cyclic order."""
     return Point2(p.y, p.z) if axis == 0 else (Point2(p.z, p.x) if axis == 1 else Point2(p.x, p.y))
 
@@ -254,7 +257,7 @@ def beside(t: Facet, axis: int) -> PosedPoint3:
 
 @inline
 def turn_in_plane(
-    poses: Any, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
+    poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
 ) -> int:
     """Return how a, b, c of one plane turn; off: a point off that plane. The sense is the same within a question."""
     if axis >= 0:
@@ -263,7 +266,7 @@ def turn_in_plane(
 
 
 @inline
-def outside_an_edge(poses: Any, t: Facet, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
     """Return how an edge of t separates it from u, both in one plane.
 
     1: some edge has all of u strictly outside; 0: outside or on it; -1: no edge separates; UNDECIDED.
@@ -294,7 +297,7 @@ def outside_an_edge(poses: Any, t: Facet, u: Facet, off: PosedPoint3, axis: int,
 
 @called
 def passes_within(
-    poses: Any, a: PosedPoint3, b: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float
+    poses: FloatArray, a: PosedPoint3, b: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
     """Tell whether a segment a b in the plane of t meets its open face: 1, or not: 0; UNDECIDED."""
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
@@ -316,7 +319,7 @@ def passes_within(
 
 
 @called
-def is_on_face(poses: Any, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
     """Tell whether a point in the plane of t lies on the closed face: 1, or not: 0; UNDECIDED."""
     found, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     for edge in range(3):
@@ -329,7 +332,7 @@ def is_on_face(poses: Any, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int
 
 
 @inline
-def separation(poses: Any, t1: Facet, t2: Facet, axis: int, error: float) -> int:
+def separation(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return how two coplanar triangles with area lie: 1 apart, 0 only their borders meet, -1 interiors meet."""
     off = beside(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
 from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement, rings_of
@@ -93,7 +93,7 @@ def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArr
 
 
 @kernel
-def find_sides(vertices: Any, following: Any, sides: Any) -> None:
+def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> None:
     """Fill sides (n,) int8 of edges that meet only in vertices: 1 where the interior is on the left, -1 on the right,
     0 where some coordinate is too large or too small to tell.
 
@@ -151,7 +151,7 @@ def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
 
 
 @kernel
-def is_simple(vertices: Any, following: Any) -> bool:
+def is_simple(vertices: FloatArray, following: IntArray) -> bool:
     """Tell whether no two edges of these rings meet but in the vertex between them, and none has length 0."""
     for i in range(len(vertices)):
         a, b = as_point2(vertices, i), as_point2(vertices, following[i])
@@ -170,7 +170,7 @@ def is_simple(vertices: Any, following: Any) -> bool:
 
 
 @inline
-def _place(vertices: Any, turn: Any, move: Any, placed: Any) -> float:
+def _place(vertices: FloatArray, turn: FloatArray, move: FloatArray, placed: FloatArray) -> float:
     """Write the rounded posed vertices of a body; return a bound on the error of each coordinate (`placement.py`)."""
     reach, is_exact = 0.0, True
     for axis in range(2):  # a turn by the lattice
@@ -195,7 +195,7 @@ def n_blocks(n_edges: int) -> int:
 
 
 @inline
-def box_blocks(points: Any, following: Any, boxes: Any) -> None:
+def box_blocks(points: FloatArray, following: IntArray, boxes: FloatArray) -> None:
     """Write the box of each block of edges: low x, low y, high x, high y."""
     for edge in range(len(following)):
         a, b, block = as_point2(points, edge), as_point2(points, following[edge]), edge // BLOCK
@@ -207,7 +207,7 @@ def box_blocks(points: Any, following: Any, boxes: Any) -> None:
 
 
 @inline
-def _misses(boxes: Any, block: int, a: Point2, b: Point2, slack: float) -> bool:
+def _misses(boxes: FloatArray, block: int, a: Point2, b: Point2, slack: float) -> bool:
     """Tell whether an edge a b is further than a slack from the box of a block."""
     if max(a.x, b.x) + slack < boxes[block, 0] or boxes[block, 2] + slack < min(a.x, b.x):
         return True
@@ -215,7 +215,7 @@ def _misses(boxes: Any, block: int, a: Point2, b: Point2, slack: float) -> bool:
 
 
 @inline
-def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
+def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -> int:
     """Return 1 for a point inside the rings, 0 outside, ON_EDGE, or UNSURE where a bound does not tell."""
     is_inside = 0
     for edge in range(len(following)):
@@ -237,7 +237,9 @@ def inside(p: Point2, vertices: Any, following: Any, error: float) -> int:
 
 
 @inline
-def _rings_inside(points: Any, following: Any, vertices: Any, their_following: Any, error: float) -> int:
+def _rings_inside(
+    points: FloatArray, following: IntArray, vertices: FloatArray, their_following: IntArray, error: float
+) -> int:
     """Return where the rings of a body lie that do not meet another one, as bits; others add nothing that is wrong."""
     found = 0
     for vertex in range(len(following)):
@@ -251,8 +253,9 @@ def _rings_inside(points: Any, following: Any, vertices: Any, their_following: A
 
 @inline
 def relate_placed(
-    points: Any, following: Any, sides: Any, vertices: Any, theirs: Any, their_sides: Any, boxes: Any, error: float
-) -> tuple[int, int, int, int, int]:
+    points: FloatArray, following: IntArray, sides: Any, vertices: FloatArray, theirs: IntArray, their_sides: Any,
+    boxes: FloatArray, error: float,
+) -> tuple[int, int, int, int, int]:  # fmt: skip
     """Return the relation of two placed bodies, or UNSETTLED; what holds of their interiors, as bits; the first edges
     that meet, -1 for none or not the first, and how.
 
@@ -303,8 +306,9 @@ def relate_placed(
 
 @inline
 def _relate_under(
-    vertices: Any, following: Any, sides: Any, turn: Any, move: Any, other: Any, theirs: Any, their_sides: Any,
-    their_turn: Any, their_move: Any, room: tuple[Any, Any, Any],
+    vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
+    theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
+    room: tuple[Any, Any, Any],
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
     """Return what `relate_placed` does, of two bodies under poses; room: for the vertices of both, and for boxes."""
     placed, others, boxes = room
@@ -315,8 +319,9 @@ def _relate_under(
 
 @allocating_kernel
 def relate_outline_pairs(
-    pool: OutlineArrays, bodies: Any, poses: PoseArrays, pairs: Any, has_detail: bool, relations: Any, flag: Any
-) -> None:
+    pool: OutlineArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, has_detail: bool, relations: Int8Array,
+    flag: FlagArray,
+) -> None:  # fmt: skip
     """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
 
     has_detail: overlaps that are no PO stay UNSETTLED. Returns early when the flag is raised.
@@ -341,8 +346,8 @@ def relate_outline_pairs(
 
 @allocating_kernel
 def _relate_two(
-    vertices: Any, following: Any, sides: Any, turn: Any, move: Any, other: Any, theirs: Any, their_sides: Any,
-    their_turn: Any, their_move: Any,
+    vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
+    theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
     """Return what `_relate_under` does."""
     room = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))

@@ -6,8 +6,7 @@ which of them sticks out of the other.
 
 from __future__ import annotations
 
-from typing import Any
-
+from engine.arrays import FloatArray, IntArray
 from engine.jit import called, inline
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
@@ -56,8 +55,9 @@ def _of_sectors(
 
 @called
 def at_contact(
-    points: Any, following: Any, edge: int, side: int, vertices: Any, theirs: Any, other: int, their_side: int
-) -> int:
+    points: FloatArray, following: IntArray, edge: int, side: int, vertices: FloatArray, theirs: IntArray, other: int,
+    their_side: int,
+) -> int:  # fmt: skip
     """Return what holds where two edges meet, as bits; of the start of an edge the one before it says that."""
     a, b = as_point2(points, edge), as_point2(points, following[edge])
     c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])

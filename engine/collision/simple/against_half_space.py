@@ -6,11 +6,9 @@ by its faces with vertices there; the half-space always sticks out of the body.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, value_at
 from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, mesh_body_of
@@ -91,7 +89,7 @@ def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, w
 
 
 @inline
-def _side(mesh: MeshArrays, vertex: int, plane: Any) -> int:
+def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
     """Return 1 or -1 where that is sure, else 0.
 
     Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three
@@ -106,7 +104,7 @@ def _side(mesh: MeshArrays, vertex: int, plane: Any) -> int:
 
 
 @kernel
-def scan_sides(mesh: MeshArrays, plane: Any, unsure: Any, flag: Any) -> tuple[int, int, int]:
+def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: FlagArray) -> tuple[int, int, int]:
     """Look along the vertices of a mesh until one lies surely beyond a plane and one surely before it.
 
     plane: (3, 3), the weights of the coordinates; their sizes, which bound their errors; the offset and its size.

@@ -9,10 +9,9 @@ UNSETTLED.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
@@ -57,7 +56,7 @@ def _enters(t: Facet, own: OwnPoint, radius: float) -> int:
 
 
 @allocating
-def _first_to_enter(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: Any) -> tuple[int, int]:
+def _first_to_enter(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
     """Return the relation of the surface of a mesh and a ball as far as it is proven, DISJOINT or TOUCHING (a face
     enters the ball), and of the faces that enter any, or where it is to be named the one of the nearest box, of equal
     ones the first."""
@@ -103,7 +102,7 @@ def _holds(vertex: int, own: OwnPoint, radius: float, mesh: MeshArrays) -> int:
 
 
 @inline
-def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: Any) -> int:
+def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
     """Tell whether all vertices of a mesh surely lie in the open ball: 1, one surely does not: 0; else UNSETTLED.
 
     Some that are spread over the mesh are asked first: neighbours are alike.
@@ -120,7 +119,7 @@ def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: Any) -> int
 
 
 @inline
-def _relate(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: Any) -> tuple[int, int]:
+def _relate(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
     relation, triangle = _first_to_enter(own, radius, mesh, is_named, flag)
     if relation == DISJOINT:
         where = locate_point(own, mesh) if mesh.has_inside else OUTSIDE
@@ -134,7 +133,9 @@ def _relate(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag
 
 
 @kernel
-def relate_balls(mesh: MeshArrays, centers: Any, radius: float, is_named: bool, found: Any, flag: Any) -> None:
+def relate_balls(
+    mesh: MeshArrays, centers: FloatArray, radius: float, is_named: bool, found: IntArray, flag: FlagArray
+) -> None:
     """Fill found (n, 2) int64 with the relation of a mesh (first) and a ball about each of centers (n, 4), a point and
     how far each of its coordinates may be off, or UNSETTLED; and a triangle that enters it, where the relation is
     overlapping, unless even-odd cancels that one, or touching; the one that names the contact if `is_named`.

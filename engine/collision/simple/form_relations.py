@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
+from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
 from engine.jit import called, inline, kernel
@@ -46,7 +47,7 @@ class Placed(NamedTuple):
 
 
 @inline
-def source_of(turn: Any, axis: int) -> tuple[int, float]:
+def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
     """Return the axis that a rotation turns to another one, and with which sign; -1 where it mixes axes."""
     found, factor = -1, 0.0
     for m in range(turn.shape[0]):
@@ -58,7 +59,7 @@ def source_of(turn: Any, axis: int) -> tuple[int, float]:
 
 
 @inline
-def bound_at(form: Any, turn: Any, axis: int, side: int) -> float:
+def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
     """Return the bound of a box on one side of an axis as a rotation of the lattice places it."""
     source, factor = source_of(turn, axis)
     return factor * form[source + (HIGH if (side == 1) == (factor > 0.0) else 0)]
@@ -115,7 +116,9 @@ _relate = inline(relate_boxes)
 
 
 @kernel
-def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: Any) -> None:
+def relate_box_pairs(
+    low: FloatArray, high: FloatArray, is_box: BoolArray, pairs: IntArray, relations: Int8Array
+) -> None:
     """Fill relations (n,) int8 for the pairs (n, 2) of which both are boxes without pose."""
     for item in range(pairs.shape[0]):
         i, j = pairs[item, 0], pairs[item, 1]
@@ -124,7 +127,7 @@ def relate_box_pairs(low: Any, high: Any, is_box: Any, pairs: Any, relations: An
 
 
 @inline
-def _face(turn: Any, axis: int, side: int) -> int:
+def _face(turn: FloatArray, axis: int, side: int) -> int:
     """Return the face of a box that a pose turns to one side of an axis."""
     source, factor = source_of(turn, axis)
     return 2 * source + (side if factor > 0.0 else 1 - side)
@@ -137,7 +140,7 @@ def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
 
 
 @called
-def _name_overlap(ranks: Any, turn: Any, their_turn: Any) -> int:
+def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind and faces of a contact of two boxes of space that overlap, or UNSETTLED.
 
     Faces in one plane on one side share an area. Where there are none, an edge of one box passes through a face of the
@@ -163,7 +166,7 @@ def _name_overlap(ranks: Any, turn: Any, their_turn: Any) -> int:
 
 
 @inline
-def _name_touching(ranks: Any, turn: Any, their_turn: Any) -> int:
+def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind and faces of the contact of two boxes of space that touch.
 
     They share a part of a face, an edge or a vertex, by on how many axes they only touch; of the faces that meet there
@@ -326,7 +329,10 @@ def _relate_to_ball(a: Placed, ball: Placed) -> int:
 
 
 @kernel
-def relate_forms(form: Any, turn: Any, move: Any, other: Any, their_turn: Any, their_move: Any) -> int:
+def relate_forms(
+    form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
+    their_move: FloatArray,
+) -> int:  # fmt: skip
     """Return the relation of two forms, the first a box where one is, each with rotation (d, d) and translation (d,);
     above it, of two boxes of space that meet, the kind of their contact and their faces. UNSETTLED where not told."""
     a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)

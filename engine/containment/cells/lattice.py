@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.reach import layer_reached, row_reached, walls_of
 from engine.jit import inline, kernel
 from engine.predicates.vectors import corners_of
+from engine.types import Point3
 
 LEVELS: Final = 12
 """At most: 96 cells cut eleven times have indices below 2^30."""
@@ -91,7 +92,7 @@ def share_of(level: int) -> float:
 
 
 @inline
-def reference_point(lattice: Any, x: int, y: int, z: int, level: int) -> Any:
+def reference_point(lattice: Lattice, x: int, y: int, z: int, level: int) -> Any:
     """Return the reference point of a cell by its indices on a level."""
     low, size, share = lattice.low, lattice.size, share_of(level)
     return (
@@ -102,13 +103,13 @@ def reference_point(lattice: Any, x: int, y: int, z: int, level: int) -> Any:
 
 
 @inline
-def scaled_difference(a: Any, b: Any, scale: Any, parts: float) -> Any:
+def scaled_difference(a: Any, b: Point3, scale: tuple[float, ...], parts: float) -> Any:
     """Return a - b in units of the cells of a level: one rounding each."""
     return ((a[0] - b[0]) * (scale[0] * parts), (a[1] - b[1]) * (scale[1] * parts), (a[2] - b[2]) * (scale[2] * parts))
 
 
 @inline
-def _list_triangle(mesh: Any, triangle: int, block: Any, ends: Any, items: Any, is_fill: bool) -> None:
+def _list_triangle(mesh: Mesh, triangle: int, block: Block, ends: IntArray, items: Int32Array, is_fill: bool) -> None:
     """Count or list a triangle in the cells of a block that it reaches into, in scanning order."""
     low, scale, (depth, x_low, y_low, z_low, nx, ny, nz, first_cell) = mesh.lattice.low, mesh.lattice.scale, block
     parts, shift = parts_of(depth), 2 * (LEVELS - 1 - depth)
@@ -138,14 +139,14 @@ def _list_triangle(mesh: Any, triangle: int, block: Any, ends: Any, items: Any, 
 
 
 @inline
-def _list_in(triangle: int, cell: int, ends: Any, items: Any, is_fill: bool) -> None:
+def _list_in(triangle: int, cell: int, ends: IntArray, items: Int32Array, is_fill: bool) -> None:
     if is_fill:
         items[ends[cell]] = triangle
     ends[cell] += 1
 
 
 @kernel
-def list_top(mesh: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
+def list_top(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray) -> None:
     """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) what reaches into each cell of level 0."""
     nx, ny, nz = mesh.lattice.n
     for triangle in range(len(mesh.triangles)):
@@ -155,7 +156,9 @@ def list_top(mesh: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None
 
 
 @kernel
-def list_parts(mesh: Any, level: Any, parents: Any, ends: Any, items: Any, is_fill: bool, flag: Any) -> None:
+def list_parts(
+    mesh: Mesh, level: Level, parents: IntArray, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray
+) -> None:
     """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell.
 
     level: that of the parents; parents: (p,) some of its cells; ends: (p * 64,).

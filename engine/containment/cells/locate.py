@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.containment.cells.lattice import LEVELS, PARTS, finest, parts_of, reference_point, scaled_difference
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, called, inline, merged
@@ -68,7 +69,7 @@ def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any,
 
 
 @merged
-def _enter(points: Any, cells: Any, kept_points: Any, n_kept: Any) -> Any:
+def _enter(points: FloatArray, cells: Any, kept_points: Any, n_kept: int) -> Any:
     """Look up the codes of level 0 of the points kept; returns how many have a list or a brick, and so wait."""
     low, scale, n, codes = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.codes
     item_of, code_of, level_of, places, waiting = kept_points
@@ -127,7 +128,7 @@ def ask_leaves(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locati
 
 
 @allocating_kernel
-def locate_by_cells(points: Any, cells: Any, locations: Any, flag: Any) -> int:
+def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: FlagArray) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
 
     Points go through one stage after another, many at a time, so that the loads of a stage do not wait for each other:
@@ -165,7 +166,7 @@ def _index(value: float, low: float, scale: float) -> int:
 
 
 @inline
-def side_in_cell(frames: Any, places: Any, row: int, p: Any, blur: float) -> int:
+def side_in_cell(frames: FloatArray, places: IntArray, row: int, p: tuple[float, ...], blur: float) -> int:
     """Return the location of a blurred point (x, y, z) if its cell tells it, else UNDECIDED.
 
     frames: (n, 6), places: (n, 4), what `TopCells` has of each polyhedron, of which `row` counts.

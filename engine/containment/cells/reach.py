@@ -48,7 +48,7 @@ class Walls(NamedTuple):
 
 
 @inline
-def walls_of(u: Any, v: Any) -> Any:
+def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
     """Return the walls of the triangle 0, u, v."""
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     su, sv = abs(u[0]) + abs(u[1]) + abs(u[2]), abs(v[0]) + abs(v[1]) + abs(v[2])
@@ -94,7 +94,7 @@ def _narrowed(low: float, high: float, slope: float, value: float) -> tuple[floa
 
 
 @inline
-def layer_reached(walls: Any, z: float, y: float, first: int, last: int) -> tuple[int, int]:
+def layer_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
     """Return the first and last row of a layer that the triangle may reach into; z: of the centres, y: of row 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_x:
@@ -103,7 +103,7 @@ def layer_reached(walls: Any, z: float, y: float, first: int, last: int) -> tupl
 
 
 @inline
-def row_reached(walls: Any, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
+def row_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
     """Return the first and last cell of a row that the triangle may reach into; x: of the centre of cell 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_z:

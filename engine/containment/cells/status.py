@@ -7,15 +7,17 @@ what that test leaves open, by vertical rays.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from engine.arrays import BoolArray, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
 from engine.containment.cells.lattice import (
     LEVELS,
     PARTS,
     SPLIT,
     UNKNOWN,
+    Lattice,
+    Level,
+    Mesh,
     finest,
     parts_of,
     reference_point,
@@ -29,7 +31,7 @@ from engine.types import UNDECIDED
 
 
 @inline
-def _empty_before(counts: Any, first: int, place: int, nx: int, ny: int) -> int:
+def _empty_before(counts: IntArray, first: int, place: int, nx: int, ny: int) -> int:
     """Return an empty cell of a block that shares a wall with this one and comes before it, -1 if there is none."""
     if place % nx > 0 and counts[first + place - 1] == 0:
         return first + place - 1
@@ -41,7 +43,7 @@ def _empty_before(counts: Any, first: int, place: int, nx: int, ny: int) -> int:
 
 
 @kernel
-def label_empty(counts: Any, nx: int, ny: int, labels: Any) -> None:
+def label_empty(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
     """Fill labels (nz * ny * nx,) int64 with the cell that each empty cell copies from, itself for one that is asked.
 
     Cells with a list label themselves.
@@ -52,7 +54,7 @@ def label_empty(counts: Any, nx: int, ny: int, labels: Any) -> None:
 
 
 @inline
-def _is_in_cell(lattice: Any, point: Any, x: int, y: int, z: int, shift: int) -> bool:
+def _is_in_cell(lattice: Lattice, point: tuple[float, ...], x: int, y: int, z: int, shift: int) -> bool:
     low, scale = lattice.low, lattice.scale
     return (
         finest(point[0], low[0], scale[0]) >> shift == x
@@ -62,7 +64,7 @@ def _is_in_cell(lattice: Any, point: Any, x: int, y: int, z: int, shift: int) ->
 
 
 @kernel
-def reference_points(lattice: Any, places: Any, level: int, points: Any, is_valid: Any) -> None:
+def reference_points(lattice: Lattice, places: Int32Array, level: int, points: FloatArray, is_valid: BoolArray) -> None:
     """Fill points (n, 3) and is_valid (n,) with the reference points of cells and whether they lie in them."""
     for item in range(len(places)):
         x, y, z = places[item, 0], places[item, 1], places[item, 2]
@@ -72,7 +74,9 @@ def reference_points(lattice: Any, places: Any, level: int, points: Any, is_vali
 
 
 @inline
-def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int, reference: Any) -> None:
+def _fill_groups(
+    groups: Float32Array, first_group: int, mesh: Mesh, level: Level, cell: int, reference: tuple[float, ...]
+) -> None:
     """Write the groups of a cell's triangles about its reference point, in units of the cells of its level."""
     scale, parts = mesh.lattice.scale, parts_of(level.depth)
     first, last = level.firsts[cell], level.firsts[cell + 1]
@@ -93,7 +97,10 @@ def _fill_groups(groups: Any, first_group: int, mesh: Any, level: Any, cell: int
 
 
 @kernel
-def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, found: Any, flag: Any) -> None:
+def locate_parts(
+    mesh: Mesh, level: Level, parents: IntArray, counts: IntArray, groups: Float32Array, found: Int8Array,
+    flag: FlagArray,
+) -> None:  # fmt: skip
     """Fill found (p * 64,) int8 with the status of each part: of its reference point, or of all of it if it is empty.
 
     level, parents: as for `list_parts`; counts: (p * 64,) lengths of the parts' lists; groups: workspace for the
@@ -123,7 +130,9 @@ def locate_parts(mesh: Any, level: Any, parents: Any, counts: Any, groups: Any, 
 
 
 @kernel
-def fill_leaves(mesh: Any, level: Any, leaves: Any, starts: Any, groups: Any, flag: Any) -> None:
+def fill_leaves(
+    mesh: Mesh, level: Level, leaves: IntArray, starts: IntArray, groups: Float32Array, flag: FlagArray
+) -> None:
     """Fill groups (n, 14, 8) float32 with the lists of `leaves`, cells of a level, each from the group in starts."""
     for item in range(len(leaves)):
         if flag[0]:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from engine.arrays import FlagArray, FloatArray, Int8Array
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.error_free import two_diff, workspace
@@ -48,7 +49,7 @@ def _has_exact_square(value: float) -> bool:
 
 
 @called
-def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) -> int:
+def _settle(points: FloatArray, item: int, center: FloatArray, radius: float, expansion: Any) -> int:
     """Return the location by exact sums; UNDECIDED where differences or squares are no exact pairs."""
     if not _has_exact_square(radius):
         return UNDECIDED
@@ -62,7 +63,9 @@ def _settle(points: Any, item: int, center: Any, radius: float, expansion: Any) 
 
 
 @kernel
-def locate_in_ball(points: Any, center: Any, blur: float, radius: float, locations: Any, flag: Any) -> int:
+def locate_in_ball(
+    points: FloatArray, center: FloatArray, blur: float, radius: float, locations: Int8Array, flag: FlagArray
+) -> int:
     """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter, or NOT_FINITE.
 
     blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is UNDECIDED.

@@ -26,6 +26,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, in_space
 from engine.jit import allocating, inline, kernel, merged
 from engine.predicates.side import side_of_plane, side_of_plane_filter
@@ -44,14 +45,14 @@ _LARGE: Final = 1e300
 
 
 @merged
-def _row(planes: Any, row: int, is_flat: bool) -> HalfSpace3:
+def _row(planes: FloatArray, row: int, is_flat: bool) -> HalfSpace3:
     """Return row `row` of planes (m, 3 or 4); those of the plane have 0 in the third place, as points have."""
     a, b, d = float(planes[row, 0]), float(planes[row, 1]), float(planes[row, 2 if is_flat else 3])
     return HalfSpace3(a, b, 0.0 if is_flat else float(planes[row, 2]), d)
 
 
 @inline
-def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int, bool]:
+def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: BoolArray) -> tuple[int, bool]:
     """Return the location of a point (n, 2 or 3) and whether it needed more than the filter."""
     x, y, z = in_space(points, item)
     p, location, is_unsure = Point3(x, y, z), 1, False
@@ -73,7 +74,7 @@ def _locate_one(points: Any, item: int, planes: Any, is_exact: Any) -> tuple[int
 
 
 @inline
-def _largest(values: Any, folded: Any) -> float:
+def _largest(values: FloatArray, folded: FloatArray) -> float:
     """Return the largest size of values (_BLOCK,), by halves: short loops that the compiler turns into vectors."""
     half = _BLOCK // 2
     for k in range(half):
@@ -86,12 +87,14 @@ def _largest(values: Any, folded: Any) -> float:
 
 
 @merged
-def _value(h: Any, x: Any, y: Any, z: Any, is_flat: bool) -> Any:
+def _value(h: HalfSpace3, x: float, y: float, z: float, is_flat: bool) -> Any:
     return h.a * x + h.b * y + h.d if is_flat else h.a * x + h.b * y + h.c * z + h.d
 
 
 @allocating
-def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, is_flat: bool) -> int:
+def _locate(
+    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray, is_flat: bool
+) -> int:
     """Do what both kernels do; is_flat is known when they are compiled."""
     if has_not_finite(points):
         return NOT_FINITE
@@ -158,7 +161,9 @@ def _locate(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any, 
 
 
 @kernel
-def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
+def locate_in_half_planes(
+    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
+) -> int:
     """Fill `locations` (n,) int8 for points (n, 2) and planes (m, 3); UNDECIDED where the exponents are out of range.
 
     is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
@@ -168,6 +173,8 @@ def locate_in_half_planes(points: Any, planes: Any, is_exact: Any, locations: An
 
 
 @kernel
-def locate_in_half_spaces(points: Any, planes: Any, is_exact: Any, locations: Any, flag: Any) -> int:
+def locate_in_half_spaces(
+    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
+) -> int:
     """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
     return int(_locate(points, planes, is_exact, locations, flag, False))

@@ -19,11 +19,11 @@ polygon problem for arbitrary polygons". Changed: exact signs, three values.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray
+from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
 from engine.jit import called, inline, kernel, merged
@@ -57,7 +57,7 @@ class Rings(NamedTuple):
 
 
 @merged
-def _pass_edge(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any, blur: Any) -> tuple[bool, bool]:
+def _pass_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
     """Tell whether the edge counts for q, and whether that is not sure."""
     above = ay - y
     left = (ax - x) * (by - y)
@@ -71,7 +71,9 @@ def _pass_edge(ax: Any, ay: Any, bx: Any, by: Any, x: Any, y: Any, blur: Any) ->
 
 
 @merged
-def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float, blur: float) -> tuple[int, int]:
+def _count_crossings(
+    xs: FloatArray, ys: FloatArray, first: int, last: int, x: float, y: float, blur: float
+) -> tuple[int, int]:
     """Return how many edges between the vertices first ... last count for q, and how many are not sure."""
     n_crossed = n_unsure = 0
     for edge in range(np.uint64(first), np.uint64(last)):  # unsigned: no index that counts from the end
@@ -83,7 +85,7 @@ def _count_crossings(xs: Any, ys: Any, first: int, last: int, x: float, y: float
 
 
 @inline
-def meet_edge(a: Any, b: Any, q: Any) -> int:
+def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
     """Return CROSSED if the ray to the right from q passes the edge, MISSED, ON_EDGE or UNDECIDED."""
     if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
         return MISSED
@@ -102,7 +104,7 @@ def meet_edge(a: Any, b: Any, q: Any) -> int:
 
 
 @called
-def _one_by_one(xs: Any, ys: Any, runs: Any, first: int, last: int, q: Any) -> int:
+def _one_by_one(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
     """Return the location of q by some runs, UNDECIDED where a sign is out of the compiled range."""
     is_odd, is_open = False, False
     for run in range(first, last):
@@ -120,7 +122,7 @@ def _one_by_one(xs: Any, ys: Any, runs: Any, first: int, last: int, q: Any) -> i
 
 @inline
 def locate_in_runs(
-    xs: Any, ys: Any, runs: Any, first: int, last: int, x: float, y: float, blur: float
+    xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, bool]:
     """Return the location of (x, y) by the runs first ... last, and whether it took more than a filter.
 
@@ -140,7 +142,7 @@ def locate_in_runs(
 
 
 @merged
-def _look_up(points: Any, rings: Any, locations: Any) -> None:
+def _look_up(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
     """Give each point the status of its cell, without a branch."""
     u, v, (x_min, x_max, y_min, y_max), statuses = rings.u, rings.v, rings.box, rings.statuses
     for item in range(len(points)):
@@ -153,7 +155,7 @@ def _look_up(points: Any, rings: Any, locations: Any) -> None:
 
 
 @kernel
-def locate_in_rings(points: Any, blurs: Any, rings: Any, locations: Any, flag: Any) -> int:
+def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locations: Int8Array, flag: FlagArray) -> int:
     """Fill `locations` (n,) int8 for points (n, 2) from a `Rings`; returns how many needed more than the filter.
 
     blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite.

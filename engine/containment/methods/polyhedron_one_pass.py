@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite
@@ -23,7 +24,7 @@ _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
 
 
 @inline
-def _sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> None:
+def _sort_into_cells(points: FloatArray, u: Axis, v: Axis, firsts: IntArray, order: Int32Array) -> None:
     """Fill order (n,) int32 with the points (n, 3) by their cell, and firsts (u_cells * v_cells + 1,) with the places.
 
     u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
@@ -42,13 +43,13 @@ def _sort_into_cells(points: Any, u: Any, v: Any, firsts: Any, order: Any) -> No
 
 
 @inline
-def _cell_at(points: Any, item: int, u: Any, v: Any) -> int:
+def _cell_at(points: FloatArray, item: int, u: Axis, v: Axis) -> int:
     row = cell_of(points[item, 1], v.low, v.cells_per_unit, v.n_cells)
     return row * u.n_cells + cell_of(points[item, 0], u.low, u.cells_per_unit, u.n_cells)
 
 
 @inline
-def _take_down(states: Any, item: int, met: int) -> None:
+def _take_down(states: FlagArray, item: int, met: int) -> None:
     """Enter in a point's state how its ray met a triangle."""
     if met & BEYOND:
         states[item] |= _BEYOND
@@ -62,7 +63,7 @@ def _take_down(states: Any, item: int, met: int) -> None:
 
 
 @inline
-def _conclude(states: Any, locations: Any) -> int:
+def _conclude(states: FlagArray, locations: Int8Array) -> int:
     """Fill the locations from the states; returns how many points needed more than the filter."""
     n_beyond = 0
     for item in range(len(states)):
@@ -78,7 +79,10 @@ def _conclude(states: Any, locations: Any) -> int:
 
 
 @inline
-def _pass_over(points: Any, cells: Any, vertices: Any, triangles: Any, z_min: float, states: Any, flag: Any) -> None:
+def _pass_over(
+    points: FloatArray, cells: Any, vertices: FloatArray, triangles: IntArray, z_min: float, states: FlagArray,
+    flag: FlagArray,
+) -> None:  # fmt: skip
     """Enter in states (n,) uint8 how the rays of points (n, 3) meet the triangles (m, 3).
 
     cells: u, v, firsts, order as `_sort_into_cells` leaves them. z_min: least of the points.
@@ -108,7 +112,7 @@ def _pass_over(points: Any, cells: Any, vertices: Any, triangles: Any, z_min: fl
 
 
 @inline
-def _axis_over(points: Any, axis: int, n_cells: int) -> Axis:
+def _axis_over(points: FloatArray, axis: int, n_cells: int) -> Axis:
     """Return cells over the points along an axis, one where there is no extent: `make_axis`, compiled."""
     low = high = float(points[0, axis])
     for item in range(1, len(points)):
@@ -118,7 +122,9 @@ def _axis_over(points: Any, axis: int, n_cells: int) -> Axis:
 
 
 @allocating_kernel
-def locate_by_pass(points: Any, vertices: Any, triangles: Any, locations: Any, flag: Any) -> int:
+def locate_by_pass(
+    points: FloatArray, vertices: FloatArray, triangles: IntArray, locations: Int8Array, flag: FlagArray
+) -> int:
     """Fill `locations` (n,) int8 for points (n, 3), n > 0; returns how many needed more than the filter, or NOT_FINITE.
 
     triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge.

@@ -28,7 +28,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.bounding.bvh import LEAST, STACK, WIDTH
+from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
+from engine.bounding.bvh import LEAST, STACK, WIDTH, Bvh
 from engine.containment.posed.filters import NOT_FINITE, has_not_finite, orient2d_blurred
 from engine.jit import allocating_kernel, called, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
@@ -52,7 +53,7 @@ _ABOVE_ALL: Final = np.float32(8.0)
 
 
 @inline
-def decide2(a: Any, b: Any, c: Any) -> Any:
+def decide2(a: Point2, b: Point2, c: Point2) -> Any:
     """Return (orient2d, 0), or (orient2d, BEYOND) where it took more than the filter."""
     turn = orient2d_filter(a, b, c)
     if turn != UNDECIDED:
@@ -61,7 +62,7 @@ def decide2(a: Any, b: Any, c: Any) -> Any:
 
 
 @inline
-def moved_sign(turn: int, a: Any, b: Any) -> int:
+def moved_sign(turn: int, a: Point2, b: Point2) -> int:
     """Return `turn` = orient2d(a, b, q), a zero decided as for q + (eps, eps^2)."""
     if turn != 0:
         return turn
@@ -79,7 +80,7 @@ def is_astride(first: int, second: int, third: int) -> bool:
 
 
 @inline
-def touch_in_plane(a: Any, b: Any, c: Any, q: Any) -> int:
+def touch_in_plane(a: Point2, b: Point2, c: Point2, q: Point2) -> int:
     """Return ON_FACE, MISSED or UNDECIDED for 2D points: q among the signs of all three edges never on both sides."""
     first, second, third = orient2d(a, b, q), orient2d(b, c, q), orient2d(c, a, q)
     if is_astride(first, second, third):
@@ -90,7 +91,7 @@ def touch_in_plane(a: Any, b: Any, c: Any, q: Any) -> int:
 
 
 @inline
-def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
+def touch_triangle(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
     """Return ON_FACE if q lies on the closed triangle a, b, c, which may be degenerate; else MISSED, or UNDECIDED.
 
     Caller guarantees that q lies in the triangle's box.
@@ -116,7 +117,7 @@ def touch_triangle(a: Any, b: Any, c: Any, q: Any) -> int:
 
 
 @inline
-def meet_upwards(a: Any, b: Any, c: Any, q: Any) -> int:
+def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
     """Return CROSSED if the ray up from the moved q meets the triangle, ON_FACE if q is on it, MISSED or UNDECIDED.
 
     BEYOND is added where it took more than the filter.
@@ -155,7 +156,7 @@ def meet_upwards(a: Any, b: Any, c: Any, q: Any) -> int:
 
 
 @inline
-def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
+def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> int:
     """Return CROSSED if the rays up from all of the blurred q meet the triangle, MISSED if none does, or UNDECIDED."""
     if q.z - blur > max(a.z, b.z, c.z):
         return MISSED
@@ -173,7 +174,7 @@ def _meet_blurred(a: Any, b: Any, c: Any, q: Any, blur: float) -> int:
 
 
 @merged
-def _in_tree(tree: Any, q: Any, blur: float) -> tuple[Any, Any, Any, float, bool]:
+def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, bool]:
     """Return q in the coordinates of the tree, its z widened upwards, the least and the most that the rays up from the
     blurred one may reach there, the blur there, and whether q is near enough for that."""
     origin, scale = tree.origin, tree.scale
@@ -186,7 +187,7 @@ def _in_tree(tree: Any, q: Any, blur: float) -> tuple[Any, Any, Any, float, bool
 
 
 @allocating_kernel
-def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any) -> tuple[int, bool]:
+def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: IntArray) -> tuple[int, bool]:
     """Fill found (n,) int64 with the rows of `tree.triangles` of which it is not sure how the rays up from all of the
     blurred (x, y, z) meet them; return how many, and whether they meet an odd number of the others.
 
@@ -220,7 +221,7 @@ def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Any
 
 
 @inline
-def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tuple[int, bool]:
+def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: FlagArray) -> tuple[int, bool]:
     """Return the location of a blurred q in a `TriangleTree`, and whether it took more than a filter.
 
     stack: (STACK,) int32. Coordinates of the tree are at most 2, and so is q in it, or it is outside.
@@ -261,7 +262,7 @@ def locate_in_tree(tree: Any, q: Any, blur: float, stack: Any, flag: Any) -> tup
 
 
 @allocating_kernel
-def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any) -> int:
+def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, flag: FlagArray) -> int:
     """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
 
     blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite. tree: a
@@ -273,7 +274,9 @@ def locate_by_tree(points: Any, blurs: Any, tree: Any, locations: Any, flag: Any
 
 
 @called
-def _locate_each(points: Any, blurs: Any, tree: Any, locations: Any, stack: Any, flag: Any) -> int:
+def _locate_each(
+    points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, stack: Int32Array, flag: FlagArray
+) -> int:
     """Do what `locate_by_tree` does, without counting references to the arrays of the tree for each point."""
     n_beyond = 0
     for item in range(len(points)):
@@ -286,7 +289,7 @@ def _locate_each(points: Any, blurs: Any, tree: Any, locations: Any, stack: Any,
 
 
 @kernel
-def fill_triangle_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
+def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatArray) -> None:
     """Fill boxes (m, 6) with the least and the largest coordinates of triangles (m, 3)."""
     for triangle in range(len(triangles)):
         a, b, c = corners_of(vertices, triangles, triangle)
@@ -296,7 +299,9 @@ def fill_triangle_boxes(vertices: Any, triangles: Any, boxes: Any) -> None:
 
 
 @kernel
-def lay_out(vertices: Any, triangles: Any, tree: Any, child: Any, ordered: Any, blocks: Any) -> None:
+def lay_out(
+    vertices: FloatArray, triangles: IntArray, tree: Bvh, child: Int32Array, ordered: Int32Array, blocks: Float32Array
+) -> None:
     """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, child with its children numbered so.
 
     blocks: (n_nodes, 8, 8) float32, zero; filled as `overhead` reads them.

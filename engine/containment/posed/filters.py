@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.jit import inline, kernel
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, Point2
 
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
@@ -22,7 +23,7 @@ NOT_FINITE: Final = -1
 
 
 @inline
-def has_not_finite(points: Any) -> bool:
+def has_not_finite(points: FloatArray) -> bool:
     """Tell whether NaN or an infinity is among points (n, dim): without a branch, at the speed of the memory."""
     is_found, flat = False, points.reshape(points.size)
     for place in range(len(flat)):
@@ -31,7 +32,7 @@ def has_not_finite(points: Any) -> bool:
 
 
 @inline
-def orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
+def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
     """Return the sign of orient2d(a, b, .) on all of the blurred q, or UNDECIDED."""
     left = (a.x - q.x) * (b.y - q.y)
     right = (a.y - q.y) * (b.x - q.x)
@@ -41,7 +42,9 @@ def orient2d_blurred(a: Any, b: Any, q: Any, blur: float) -> int:
 
 
 @inline
-def side_of_box(low: Any, high: Any, is_flat: bool, p: Any, blur: float) -> int:
+def side_of_box(
+    low: tuple[float, ...], high: tuple[float, ...], is_flat: bool, p: tuple[float, ...], blur: float
+) -> int:
     """Return the location of a blurred point (x, y, z) in a box; in the plane all z are 0."""
     is_out = (p[0] + blur < low[0]) | (p[0] - blur > high[0])
     is_out |= (p[1] + blur < low[1]) | (p[1] - blur > high[1])
@@ -57,7 +60,7 @@ def side_of_box(low: Any, high: Any, is_flat: bool, p: Any, blur: float) -> int:
 
 
 @inline
-def side_of_rows(rows: Any, first: int, last: int, p: Any, blur: float) -> int:
+def side_of_rows(rows: FloatArray, first: int, last: int, p: tuple[float, ...], blur: float) -> int:
     """Return the location of a blurred point (x, y, z) by the rows first ... last of rows (n, 4)."""
     location = 1
     for row in range(first, last):
@@ -74,13 +77,15 @@ def side_of_rows(rows: Any, first: int, last: int, p: Any, blur: float) -> int:
 
 
 @inline
-def in_space(points: Any, item: int) -> Any:
+def in_space(points: FloatArray, item: int) -> Any:
     """Return a row of points (n, 2 or 3) as (x, y, z); z is 0 in the plane."""
     return float(points[item, 0]), float(points[item, 1]), 0.0 if points.shape[1] == 2 else float(points[item, 2])
 
 
 @kernel
-def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, flag: Any) -> int:
+def locate_in_rows_blurred(
+    points: FloatArray, blurs: FloatArray, rows: FloatArray, locations: Int8Array, flag: FlagArray
+) -> int:
     """Fill `locations` (n,) int8 for rows (m, 4), each given or correctly rounded; returns how many stay open.
 
     Those of the plane have 0 in the third place.
@@ -95,7 +100,9 @@ def locate_in_rows_blurred(points: Any, blurs: Any, rows: Any, locations: Any, f
 
 
 @kernel
-def locate_in_box(points: Any, blurs: Any, low: Any, high: Any, locations: Any, flag: Any) -> int:
+def locate_in_box(
+    points: FloatArray, blurs: FloatArray, low: FloatArray, high: FloatArray, locations: Int8Array, flag: FlagArray
+) -> int:
     """Fill `locations` (n,) int8 for points (n, dim) and the corners low, high (dim,); returns how many stay open.
 
     Six comparisons, exact as they stand.
@@ -119,8 +126,9 @@ def locate_in_box(points: Any, blurs: Any, low: Any, high: Any, locations: Any, 
 
 @kernel
 def locate_by_polynomial(
-    points: Any, blurs: Any, powers: Any, coefficients: Any, degree: int, locations: Any, flag: Any
-) -> int:
+    points: FloatArray, blurs: FloatArray, powers: IntArray, coefficients: FloatArray, degree: int,
+    locations: Int8Array, flag: FlagArray,
+) -> int:  # fmt: skip
     """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED.
 
     blurs: as for `locate_in_box`. powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns

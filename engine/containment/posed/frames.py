@@ -74,7 +74,7 @@ _TINY: Final = 1e-320
 
 
 @inline
-def to_frame(frames: Any, frame: int, p: Any) -> Any:
+def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
     """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 where it is exact.
 
     frames: has inverses (n, 3, 3) of R^-1 rounded, translations (n, 3) and is_turn (n,): whether the entries are
@@ -95,7 +95,7 @@ def to_frame(frames: Any, frame: int, p: Any) -> Any:
 
 
 @kernel
-def move_to_body_frame(points: Any, frames: Any, moved: Any, blurs: Any) -> None:
+def move_to_body_frame(points: FloatArray, frames: Frames, moved: FloatArray, blurs: FloatArray) -> None:
     """Fill moved (n, dim) and blurs (n,) by the only one of `frames`."""
     for item in range(len(points)):
         p, blurs[item] = to_frame(frames, 0, in_space(points, item))

@@ -38,8 +38,9 @@ is four times as much.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
+from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import MEETS, Rings
 from engine.polygon_overlay.compiled.crossing_signs import Edges
@@ -82,7 +83,7 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 
 @inline
-def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: Any, stop: Any) -> bool:
+def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: FlagArray, stop: FlagArray) -> bool:
     """Tell whether the first and the last event of every edge are far enough from the edge that begins or ends there.
 
     along: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL.
@@ -113,7 +114,7 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: 
 
 
 @merged
-def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
     """Tell whether the edges ab and cd cannot touch, or fold, on the way to their rounded places."""
     if points[a] == points[d]:
         c, d = d, c
@@ -129,7 +130,7 @@ def _is_apart(points: Any, x: Any, y: Any, a: int, b: int, c: int, d: int, squar
 
 
 @inline
-def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: Any) -> bool:
+def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: FlagArray) -> bool:
     """Tell whether rounding put a point, one where rings do not meet, on a straight line with its neighbours."""
     x, y, moved = rounded.x, rounded.y, rounded.moved
     for ring in range(n_rings):
@@ -147,8 +148,9 @@ def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: Any) 
 
 @inline
 def certify(
-    rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Any, heads: Any, stop: Any
-) -> bool:
+    rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Int32Array, heads: Int32Array,
+    stop: FlagArray,
+) -> bool:  # fmt: skip
     """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
 
     n: points of ``rings``. tree, tails, heads: scratch for as many. Only edges with the mark DOUBTFUL are looked at.

@@ -17,10 +17,11 @@ Source: M. I. Shamos and D. Hoey, Geometric intersection problems, 1976, section
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import agree, smaller_of, turns
@@ -56,7 +57,7 @@ def _is_after(ax: float, ay: float, bx: float, by: float) -> bool:
 
 
 @inline
-def _rise_of(x: Any, y: Any, size: int) -> int:
+def _rise_of(x: FloatArray, y: FloatArray, size: int) -> int:
     """Return how many edges of a ring go up in the order of x, then y; GENERAL unless it is surely strictly convex.
 
     It is if all its turns are to the left, and it turns once: its edges go up once, and down once. x, y: its vertices,
@@ -78,7 +79,7 @@ def _rise_of(x: Any, y: Any, size: int) -> int:
 
 
 @inline
-def _first_of(vertices: Any) -> int:
+def _first_of(vertices: FloatArray) -> int:
     """Return which of some vertices is the first in the order of x, then y."""
     low = 0
     px, py = vertices[0, 0], vertices[0, 1]
@@ -91,7 +92,7 @@ def _first_of(vertices: Any) -> int:
 
 @inline
 def load_convex(
-    vertices: Any, base: int, edges: Edges, origins: Any, start: int, stop: Any
+    vertices: FloatArray, base: int, edges: Edges, origins: Int32Array, start: int, stop: FlagArray
 ) -> tuple[int, int]:  # fmt: skip
     """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end.
 
@@ -169,7 +170,7 @@ def _enter_passage(edges: Edges, e: int, f: int, passages: Passages) -> int:
 
 @inline
 def _find_passages(
-    edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: Any
+    edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: FlagArray
 ) -> int:  # fmt: skip
     """Enter the crossings of two chains, walked from left to right; return how many, or GENERAL.
 
@@ -219,7 +220,7 @@ def _holds(edges: Edges, first: int, last: int, v: int) -> int:
 
 
 @inline
-def _add_vertices(edges: Edges, origins: Any, first: int, last: int, points: Points, n: int) -> int:
+def _add_vertices(edges: Edges, origins: Int32Array, first: int, last: int, points: Points, n: int) -> int:
     """Append the vertices first .. last - 1 to a result of n points; return how many these are then."""
     size = max(last - first, 0)
     x, y, names = edges.x[first : first + size], edges.y[first : first + size], origins[first : first + size]
@@ -231,7 +232,7 @@ def _add_vertices(edges: Edges, origins: Any, first: int, last: int, points: Poi
 
 @inline
 def _add_stretch(
-    edges: Edges, origins: Any, e: int, f: int, first: int, last: int, points: Points, n: int
+    edges: Edges, origins: Int32Array, e: int, f: int, first: int, last: int, points: Points, n: int
 ) -> int:  # fmt: skip
     """Append the vertices between two points on edges e and f of the ring first .. last - 1."""
     if f >= e:
@@ -252,8 +253,8 @@ def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points
 
 @inline
 def _walk(
-    edges: Edges, origins: Any, n: int, second: int, end: int, turned: int, turned_second: int, passages: Passages,
-    points: Points, stop: Any,
+    edges: Edges, origins: Int32Array, n: int, second: int, end: int, turned: int, turned_second: int,
+    passages: Passages, points: Points, stop: FlagArray,
 ) -> tuple[int, float]:  # fmt: skip
     """Write the points of the result; return how many, or GENERAL, and how far one moved.
 
@@ -297,7 +298,7 @@ def _walk(
 
 @called
 def intersect_convex(
-    subject: Any, clip: Any, given: Given, passages: Passages, points: Points, stop: Any
+    subject: FloatArray, clip: FloatArray, given: Given, passages: Passages, points: Points, stop: FlagArray
 ) -> tuple[int, int, float]:  # fmt: skip
     """Intersect two rings: return the number of points, which of them is first, and how far one moved; or GENERAL.
 

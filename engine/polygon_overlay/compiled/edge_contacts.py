@@ -18,11 +18,12 @@ all, so a vertex where there is one), crossings through one point later, when th
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
+from engine.arrays import FlagArray, FloatArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
 from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, FEW, BoxTree, begin_pairs, boxes_meet, next_pairs
@@ -44,7 +45,7 @@ def is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, squ
 
 
 @merged
-def _is_beside(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+def _is_beside(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
     """Tell whether c and d are on one side of the line ab, further from it than the root of ``square``."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
@@ -53,7 +54,7 @@ def _is_beside(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) ->
 
 
 @merged
-def _crosses(x: Any, y: Any, a: int, b: int, c: int, d: int) -> bool:
+def _crosses(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> bool:
     """Tell whether c and d are on two sides of ab, and a and b on two sides of cd, in floating point."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
@@ -65,7 +66,7 @@ def _crosses(x: Any, y: Any, a: int, b: int, c: int, d: int) -> bool:
 
 
 @called
-def segments_are_far(x: Any, y: Any, a: int, b: int, c: int, d: int, square: float) -> bool:
+def segments_are_far(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
     """Tell whether the segments ab and cd are further apart than the root of ``square``."""
     if _is_beside(x, y, a, b, c, d, square) or _is_beside(x, y, c, d, a, b, square):
         return True
@@ -203,7 +204,7 @@ class Turns(NamedTuple):
 
 
 @merged
-def turns(x: Any, y: Any, a: int, b: int, c: int, d: int) -> Turns:
+def turns(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> Turns:
     """Return the turns from the segment ab to the points c and d."""
     i, j, k, m = np.uint64(a), np.uint64(b), np.uint64(c), np.uint64(d)  # no look at whether they count from the end
     ux, uy = x[j] - x[i], y[j] - y[i]
@@ -227,7 +228,7 @@ def agree(found: Turns) -> bool:
 
 @inline
 def find_contacts(
-    edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: Any
+    edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: FlagArray
 ) -> Contacts:
     """Enter all contacts; the edges of pairs of which `Contacts.are_far` does not hold get the mark DOUBTFUL.
 
@@ -309,7 +310,7 @@ def _few_pairs(edges: Edges, tree: BoxTree, n: int) -> int:
 
 
 @merged
-def _put_in_doubt(marks: Any, e: int, f: int) -> None:
+def _put_in_doubt(marks: FlagArray, e: int, f: int) -> None:
     marks[e] |= DOUBTFUL
     marks[f] |= DOUBTFUL
 

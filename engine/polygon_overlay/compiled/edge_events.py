@@ -8,9 +8,10 @@ R. C. Singleton, Sorting by address calculation, 1956).
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 from engine.arrangement.union_find import unite
+from engine.arrays import FlagArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
 from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, Events, Unions
@@ -122,7 +123,7 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
 
 
 @called
-def _mark_near(edges: Edges, events: Events, along: Along, marks: Any, e: int) -> None:
+def _mark_near(edges: Edges, events: Events, along: Along, marks: FlagArray, e: int) -> None:
     """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e.
 
     Then also the edge that begins or ends there.
@@ -148,7 +149,7 @@ def _mark_near(edges: Edges, events: Events, along: Along, marks: Any, e: int) -
 
 
 @inline
-def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Any) -> bool:
+def _group_events(events: Events, along: Along, n: int, n_events: int, stop: FlagArray) -> bool:
     """Put the events of each edge together, in any order; return False where the call is to end."""
     starts, reaches = along.starts, along.reaches
     starts[: n + 1] = 0
@@ -200,7 +201,7 @@ def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n:
 
 @inline
 def sort_events(
-    edges: Edges, events: Events, along: Along, unions: Unions, marks: Any, n: int, n_events: int, stop: Any
+    edges: Edges, events: Events, along: Along, unions: Unions, marks: FlagArray, n: int, n_events: int, stop: FlagArray
 ) -> bool:
     """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE.
 

@@ -26,6 +26,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray
 from engine.jit import allocating, inline, merged
 
 POLL: Final = 0x3FFF
@@ -74,7 +75,7 @@ def leaves_of(n: int) -> int:
 
 
 @merged
-def boxes_meet(boxes: Any, i: int, others: Any, j: int) -> bool:
+def boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
     """Tell whether two closed boxes have a common point."""
     return (  # all four at once: which fails first is not foreseeable, and a branch missed costs more than all
         (boxes[i, 0] <= others[j, 1])
@@ -85,7 +86,7 @@ def boxes_meet(boxes: Any, i: int, others: Any, j: int) -> bool:
 
 
 @merged
-def box_holds(boxes: Any, i: int, others: Any, j: int) -> bool:
+def box_holds(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
     """Tell whether a box holds another, which may be equal."""
     return (
         (boxes[i, 0] <= others[j, 0])
@@ -117,7 +118,7 @@ def _spread(bits: int) -> int:
 
 
 @allocating
-def order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
+def order_boxes(boxes: FloatArray, n: int, places: Any, stop: FlagArray) -> bool:
     """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order.
 
     Only the lower left corners are looked at.
@@ -163,13 +164,13 @@ def order_boxes(boxes: Any, n: int, places: Any, stop: Any) -> bool:
 
 
 @inline
-def build_tree(tree: BoxTree, n: int, stop: Any) -> None:
+def build_tree(tree: BoxTree, n: int, stop: FlagArray) -> None:
     """Fill the nodes, their marks and the places of the first n boxes."""
     fill_nodes(tree, n, ANYWHERE if order_boxes(tree.boxes, n, tree.places, stop) else 0, stop)
 
 
 @inline
-def fill_nodes(tree: BoxTree, n: int, added: int, stop: Any) -> None:
+def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
     """Fill the nodes and their marks, with the one that is added, by ``places``; empty nodes are inverted."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
@@ -208,7 +209,7 @@ def push_children(tree: BoxTree, node: int, depth: int) -> int:
 
 
 @inline
-def encode_boxes(tree: BoxTree, n: int, stop: Any) -> None:
+def encode_boxes(tree: BoxTree, n: int, stop: FlagArray) -> None:
     """Fill the codes of the first n boxes; those with y_max < y_min meet none. Caller guarantees a built tree."""
     boxes, nodes, lows, highs = tree.boxes, tree.nodes, tree.lows, tree.highs
     x_min, y_min = nodes[1, 0], nodes[1, 2]
@@ -272,7 +273,7 @@ def _all_pairs(tree: BoxTree, n: int) -> int:
 
 
 @inline
-def begin_pairs(tree: BoxTree, n: int, stop: Any) -> int:
+def begin_pairs(tree: BoxTree, n: int, stop: FlagArray) -> int:
     """Make ready to look for the pairs among the first n boxes; return the depth for `next_pairs`."""
     if n > FEW:
         encode_boxes(tree, n, stop)

@@ -22,8 +22,9 @@ so nothing counts references to arrays.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
+from engine.arrays import FlagArray, IntArray
 from engine.jit import kernel, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import number_cycles
 from engine.polygon_overlay.compiled.boundary.chain_rings import join_regions, mark_boundary, walk_rings
@@ -108,7 +109,7 @@ _NONE: Final = _Arranged(0, 0, 0, 0, False, 0)
 
 @merged
 def _intersect_convex(
-    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, stop: Any
+    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, stop: FlagArray
 ) -> tuple[int, int, float]:
     """Intersect the only ring of each polygon, where both are convex; returns as `intersect_convex`."""
     first, second = span.first, span.second
@@ -122,8 +123,8 @@ def _intersect_convex(
 
 @merged
 def _load_pair(
-    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, kept: Any, is_named: bool,
-    stop: Any,
+    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, kept: FlagArray, is_named: bool,
+    stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Load the rings of both polygons; return the numbers of vertices and rings, and whether none is too small."""
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
@@ -140,7 +141,7 @@ def _load_pair(
 
 
 @merged
-def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: Any) -> _Arranged:
+def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, stop: FlagArray) -> _Arranged:
     """Find the boundary rings of a pair that is loaded. Where the call is to end, nothing found is right."""
     n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     margin = CLEARANCE * loaded.largest
@@ -179,7 +180,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, stop: An
 
 @merged
 def _arrange_chains(
-    w: Workspace, loaded: Loaded, kept: Any, nesting: Nesting, contacts: Contacts, stop: Any
+    w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
 ) -> tuple[int, int]:
     """Find the boundary rings of whatever its contacts are; return their number, or NO_ROOM, and that of their points.
 
@@ -218,7 +219,7 @@ def _arrange_chains(
 
 
 @merged
-def _round(w: Workspace, n: int, arranged: _Arranged, stop: Any) -> tuple[float, bool]:
+def _round(w: Workspace, n: int, arranged: _Arranged, stop: FlagArray) -> tuple[float, bool]:
     """Round the points of the rings; return how far one moved, or LOST, and whether the rings are surely valid."""
     found, rounded, n_found, n_points = w.found, w.rounded, arranged.n_found, arranged.n_points
     farthest = round_points(w.given.edges, w.events, found.point, n, arranged.n_crossings, n_points, rounded, stop)
@@ -239,8 +240,8 @@ def _ended(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int,
 
 @kernel
 def overlay_pairs(
-    subjects: RingArrays, subject_items: Any, clips: RingArrays, clip_items: Any, begin: int, reduced: Loaded,
-    kept: Any, nesting: Nesting, stop: Any, words: Any, outcomes: Outcomes,
+    subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, begin: int, reduced: Loaded,
+    kept: FlagArray, nesting: Nesting, stop: FlagArray, words: IntArray, outcomes: Outcomes,
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and the output of words from its beginning.
 

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
@@ -67,7 +67,7 @@ class Loaded(NamedTuple):
 
 
 @merged
-def is_before(vertices: Any, i: int, j: int) -> bool:
+def is_before(vertices: FloatArray, i: int, j: int) -> bool:
     """Tell whether vertex i is further left than j, or as far and lower."""
     return vertices[i, 0] < vertices[j, 0] or (vertices[i, 0] == vertices[j, 0] and vertices[i, 1] < vertices[j, 1])
 
@@ -95,7 +95,7 @@ def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple
 @inline
 def load_rings(
     rings: RingArrays, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int, box: Box, given: Given,
-    tree: BoxTree, n: int, n_rings: int, stop: Any,
+    tree: BoxTree, n: int, n_rings: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
@@ -145,7 +145,7 @@ def load_rings(
 
 
 @inline
-def box_of(vertices: Any, first: int, last: int) -> Box:
+def box_of(vertices: FloatArray, first: int, last: int) -> Box:
     """Return x_min, x_max, y_min, y_max of some vertices; inverted where there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
@@ -175,7 +175,7 @@ def is_empty(box: Box) -> bool:
 
 
 @inline
-def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) -> float:
+def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArray) -> float:
     """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
 
     Its length is the larger of both coordinates'. BENT: where `find_contacts` would not be in doubt either that this
@@ -209,7 +209,7 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: Any) ->
 
 
 @inline
-def build_edge_tree(edges: Edges, n: int, n_rings: int, order: Any, tree: BoxTree, stop: Any) -> None:
+def build_edge_tree(edges: Edges, n: int, n_rings: int, order: IntArray, tree: BoxTree, stop: FlagArray) -> None:
     """Build the tree over the boxes of the edges, those of small rings ring by ring. order: scratch by ring."""
     boxes, places, at = tree.boxes, tree.places, 0
     if n > _SMALL_RING * n_rings:
@@ -234,7 +234,7 @@ def build_edge_tree(edges: Edges, n: int, n_rings: int, order: Any, tree: BoxTre
 
 
 @inline
-def mark_runs(edges: Edges, runs: Any, n_runs: int, tree: BoxTree) -> None:
+def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> None:
     """Give the edges that stand for many a mark, and boxes that meet none; the ring turns at the ends of each."""
     for k in range(n_runs):
         e = runs[k]
@@ -244,7 +244,7 @@ def mark_runs(edges: Edges, runs: Any, n_runs: int, tree: BoxTree) -> None:
 
 
 @inline
-def mark_short(edges: Edges, n: int, margin: float, marks: Any) -> None:
+def mark_short(edges: Edges, n: int, margin: float, marks: FlagArray) -> None:
     """Put in doubt edges no longer than ``margin``, their length as `fill_boxes` has it, and those next to them."""
     x, y = edges.x, edges.y
     for e in range(n):
@@ -256,7 +256,7 @@ def mark_short(edges: Edges, n: int, margin: float, marks: Any) -> None:
 
 
 @kernel
-def find_most(ring_offsets: Any, polygon_offsets: Any) -> tuple[int, int]:
+def find_most(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[int, int]:
     """Return the most vertices, and the most rings, that a polygon has."""
     n_vertices = n_rings = 0
     for k in range(polygon_offsets.shape[0] - 1):

@@ -15,10 +15,9 @@ Everything that the overlay asks of a vertex, it asks where both of its edges ar
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import inline, kernel
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
@@ -51,7 +50,7 @@ from engine.predicates.expansion import LARGEST, is_safe
 
 
 @inline
-def _top_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
+def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
     """Return the rightmost vertex, the highest of such, of the blocks of a ring."""
     x_max = blocks.boxes[begin, 1]
     for i in range(begin + 1, end):
@@ -67,7 +66,7 @@ def _top_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
 
 
 @inline
-def _low_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
+def _low_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
     """Return the leftmost vertex, the lowest of such, of a run of blocks; any one if the end of the last is lower."""
     x_min = blocks.boxes[begin, 0]
     for i in range(begin + 1, end):
@@ -83,8 +82,9 @@ def _low_of(vertices: Any, blocks: Blocks, begin: int, end: int) -> int:
 
 @inline
 def _load_run(
-    vertices: Any, first: int, last: int, low: int, high: int, base: int, given: Given, runs: Any, n: int, n_runs: int
-) -> tuple[int, int, bool]:
+    vertices: FloatArray, first: int, last: int, low: int, high: int, base: int, given: Given, runs: Int32Array, n: int,
+    n_runs: int,
+) -> tuple[int, int, bool]:  # fmt: skip
     """Append what stays of the vertices first .. last: both ends, low and high, and the two beside each of these."""
     x, y = given.edges.x, given.edges.y
     safe = True
@@ -108,8 +108,8 @@ def _load_run(
 
 @inline
 def _load_ring(
-    vertices: Any, blocks: Blocks, begin: int, end: int, top: int, base: int, given: Given, runs: Any, n: int,
-    n_runs: int, stop: Any,
+    vertices: FloatArray, blocks: Blocks, begin: int, end: int, top: int, base: int, given: Given, runs: Int32Array,
+    n: int, n_runs: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append what stays of the blocks of a ring; return the numbers of vertices and runs, and whether all are in range.
 
@@ -149,8 +149,8 @@ def _load_ring(
 
 @inline
 def _load_polygon(
-    rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: Any, runs: Any,
-    reduced: Loaded, stop: Any,
+    rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: IntArray,
+    runs: Int32Array, reduced: Loaded, stop: FlagArray,
 ) -> tuple[Loaded, bool]:  # fmt: skip
     """Append what stays of a polygon; return how much there is then, and whether all is in range."""
     n, n_rings, n_runs, largest = reduced
@@ -169,7 +169,7 @@ def _load_polygon(
 @inline
 def _wake(
     subjects: RingArrays, clips: RingArrays, blocks: Blocks, end: int, margin: float, n_most: int, tree: BoxTree,
-    highest: Any, stop: Any,
+    highest: IntArray, stop: FlagArray,
 ) -> bool:  # fmt: skip
     """Make blocks active that are near another, or above a ring's top; tell whether few enough are."""
     n_subject = subjects.offsets.shape[0] - 1
@@ -195,7 +195,7 @@ def _wake(
 
 @kernel
 def reduce_pair(
-    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: Any, stop: Any, words: Any
+    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: FlagArray, stop: FlagArray, words: IntArray
 ) -> Loaded:
     """Load the edges of two polygons into the scratch of overlay_pairs, those that meet nothing as runs.
 
@@ -235,7 +235,7 @@ def reduce_pair(
 
 
 @inline
-def count_left_out(sources: Any, first: int, last: int) -> int:
+def count_left_out(sources: Int32Array, first: int, last: int) -> int:
     """Return how many vertices are left out of the ring of sources ``first`` .. ``last - 1``."""
     n = 0
     for k in range(first, last):
@@ -245,7 +245,9 @@ def count_left_out(sources: Any, first: int, last: int) -> int:
 
 
 @inline
-def _copy(vertices: Any, source: int, base: int, step: int, n: int, made: Any, made_sources: Any, at: int) -> None:
+def _copy(
+    vertices: FloatArray, source: int, base: int, step: int, n: int, made: FloatArray, made_sources: Int32Array, at: int
+) -> None:
     """Write n vertices, from number ``source`` on, one after another in the order of ``step``."""
     part, numbers = made[at : at + n], made_sources[at : at + n]
     if step > 0:
@@ -262,8 +264,8 @@ def _copy(vertices: Any, source: int, base: int, step: int, n: int, made: Any, m
 
 @kernel
 def expand_rings(
-    vertices: Any, sources: Any, offsets: Any, subjects: Any, clips: Any, stop: Any, made: Any, made_sources: Any,
-    made_offsets: Any,
+    vertices: FloatArray, sources: Int32Array, offsets: IntArray, subjects: FloatArray, clips: FloatArray,
+    stop: FlagArray, made: FloatArray, made_sources: Int32Array, made_offsets: IntArray,
 ) -> None:  # fmt: skip
     """Fill ``made``, (m, 2) float64, and ``made_sources``, (m, 2) int32, with rings and all that was left out of them.
 

@@ -20,8 +20,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Ends
+from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.rounded_crossings import common_places, weights_of
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
 from engine.predicates.error_free import fast_two_sum, fma, two_diff, two_sum, workspace
@@ -66,7 +68,7 @@ def _found(pair: _Pair, v: int) -> tuple[Any, int, int]:
 
 
 @merged
-def _end_of(vertices: Any, offsets: Any, v: int, known: Any, side: int) -> int:
+def _end_of(vertices: FloatArray, offsets: IntArray, v: int, known: Any, side: int) -> int:
     """Return the next vertex of the ring of vertex v that is not at its place (v if there is none)."""
     low, n = int(known[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
@@ -130,7 +132,7 @@ def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
 
 
 @inline
-def _place(pair: _Pair, sources: Any, k: int, ox: float, oy: float) -> _Place:
+def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _Place:
     """Return point k, counted from o."""
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
@@ -139,7 +141,7 @@ def _place(pair: _Pair, sources: Any, k: int, ox: float, oy: float) -> _Place:
 
 
 @merged
-def _is_stretch(pair: _Pair, sources: Any, first: int) -> bool:
+def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
     """Tell whether `_BLOCK` points and two, from ``first`` on, are vertices that follow each other in the input."""
     last = first + _BLOCK + 1
     v, w = sources[first, 0], sources[last, 0]
@@ -154,7 +156,7 @@ def _is_stretch(pair: _Pair, sources: Any, first: int) -> bool:
 
 
 @merged
-def _sum_block(vertices: Any, ox: float, sign: float, sums: Any) -> bool:
+def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
     """Add the terms of `_BLOCK` vertices, those between the first and the last; tell whether ``ox`` is as needed.
 
     sums: (3, LANES) totals, what they lost, and sizes. sign: -1 where they are the ring's from the last to the first.
@@ -175,7 +177,7 @@ def _sum_block(vertices: Any, ox: float, sign: float, sums: Any) -> bool:
 
 
 @inline
-def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float, float, float, float]:
+def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tuple[float, float, float, float]:
     """Return twice the area of a ring as a double-double, the bound of its terms, and the sum of their sizes."""
     vertices, v, _ = _found(pair, sources[first, 0])
     ox, n = vertices[v, 0], (last - first) >> 2
@@ -192,7 +194,7 @@ def _twice_area(pair: _Pair, sources: Any, first: int, last: int) -> tuple[float
 
 @inline
 def _twice_area_from(
-    pair: _Pair, sources: Any, first: int, last: int, ox: float, oy: float
+    pair: _Pair, sources: Int32Array, first: int, last: int, ox: float, oy: float
 ) -> tuple[float, float, float, float]:
     """Return what `_twice_area` does, places counted from o; a bound below 0 where that must be zero."""
     before = _place(pair, sources, last - 1, ox, oy)
@@ -236,8 +238,8 @@ def _twice_area_from(
 
 @kernel
 def sum_areas(
-    subjects: Any, subject_items: Any, clips: Any, clip_items: Any, sources: Any, offsets: Any, groups: Any, stop: Any,
-    areas: Any,
+    subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, sources: Int32Array,
+    offsets: IntArray, groups: IntArray, stop: FlagArray, areas: FloatArray,
 ) -> int:  # fmt: skip
     """Fill ``areas``, (n,) float64, with the doubles nearest to the areas of some rings each, NaN where that is unsure.
 

@@ -18,10 +18,11 @@ Every step by vertex is one that the compiler does four at a time, over vertices
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.edge_tree import LEAF, BoxTree, leaves_of, push_children
 from engine.polygon_overlay.compiled.loading import Box, RingArrays, box_of
@@ -47,7 +48,7 @@ looked at one by one; firsts: the first block of each ring, and the end of the l
 
 
 @inline
-def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int, stop: Any) -> int:
+def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int, stop: FlagArray) -> int:
     """Append the blocks of rings, of up to ``size`` edges, from number n and ``ring`` on; return their end."""
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, boxes = blocks.first, blocks.last, blocks.boxes
@@ -70,7 +71,7 @@ def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int,
 
 
 @inline
-def box_of_blocks(boxes: Any, first: int, last: int) -> Box:
+def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
     """Return x_min, x_max, y_min, y_max of some blocks; inverted where there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
@@ -118,7 +119,9 @@ def cut_beyond(rings: RingArrays, box: Box, blocks: Blocks, ring: int, begin: in
 
 
 @inline
-def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, dx: Any, dy: Any, stop: Any) -> None:
+def mark_blocks(
+    rings: RingArrays, margin: float, blocks: Blocks, ring: int, dx: FloatArray, dy: FloatArray, stop: FlagArray
+) -> None:
     """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be.
 
     Active are chords, blocks that head no way, and those that may have a vertex where their ring does not turn, or one
@@ -184,7 +187,7 @@ _VISITS: Final = 8
 
 
 @merged
-def _are_near(boxes: Any, i: int, others: Any, j: int, gap: float) -> bool:
+def _are_near(boxes: FloatArray, i: int, others: FloatArray, j: int, gap: float) -> bool:
     """Tell whether two boxes may be no further apart than ``gap``."""
     return (
         (boxes[i, 0] - others[j, 1] <= gap)
@@ -205,7 +208,7 @@ def count_active(blocks: Blocks, n: int) -> int:
 
 
 @inline
-def wake_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: Any) -> bool:
+def wake_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: FlagArray) -> bool:
     """Make blocks active whose boxes may be no further apart than ``gap``; tell whether few enough are.
 
     tree: built, with marks of which the last of each ring has all bits. n_most: edges of active blocks that are too
@@ -241,7 +244,7 @@ def _head_together(mark: int, other: int) -> bool:
 
 
 @inline
-def _wake_in_leaves(blocks: Blocks, n: int, gap: float, places: Any, leaf: int, other: int) -> int:
+def _wake_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf: int, other: int) -> int:
     """Make active those of two leaves that are near each other; return how many edges these are, not active before."""
     first, last, boxes, marks, is_active = blocks.first, blocks.last, blocks.boxes, blocks.marks, blocks.is_active
     n_woken = 0
@@ -286,6 +289,6 @@ def wake_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxTree) -> Non
 
 
 @merged
-def _is_above(boxes: Any, i: int, x: float, y: float, ceiling: float) -> bool:
+def _is_above(boxes: FloatArray, i: int, x: float, y: float, ceiling: float) -> bool:
     """Tell whether a box holds points above a point, a step to its right, and below a ceiling."""
     return not (boxes[i, 0] > x or boxes[i, 1] <= x or boxes[i, 3] < y or boxes[i, 2] > ceiling)

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings
 from engine.polygon_overlay.compiled.boundary.ring_nesting import NO_ROOM, write_evidence
@@ -87,7 +88,7 @@ def _spread(ranking: Ranking, keys: Any, n: int) -> None:
 
 
 @inline
-def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: Any) -> None:
+def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: FlagArray) -> None:
     """Sort the first n entries of ``ranking.order``: merging runs of doubling length that are not in order.
 
     is_by_piece: pieces differ.
@@ -126,7 +127,7 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 
 
 @inline
-def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: Any) -> bool:
+def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: FloatArray) -> bool:
     """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
 
     Rounding keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box
@@ -154,8 +155,9 @@ def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, 
 
 @inline
 def rank_rings(
-    rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Any, boxes: Any, stop: Any
-) -> int:
+    rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Int32Array,
+    boxes: FloatArray, stop: FlagArray,
+) -> int:  # fmt: skip
     """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
 
     is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
@@ -196,7 +198,7 @@ def rank_rings(
 
 
 @inline
-def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: Any) -> int:
+def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: FlagArray) -> int:
     """Find the first vertex of a ring, and return the sign of the turn there, 0 where the call is to end."""
     x, y = rounded.x, rounded.y
     first, last = rings.offset[ring], rings.offset[ring + 1]
@@ -254,7 +256,7 @@ def _source_of(w: Any, n: int, i: int) -> tuple[int, int]:
 
 
 @merged
-def write_rings(w: Any, n: int, n_found: int, output: Output, filled: Filled, stop: Any) -> None:
+def write_rings(w: Any, n: int, n_found: int, output: Output, filled: Filled, stop: FlagArray) -> None:
     """Append the rings in their order to the output."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
     for k in range(n_found):

@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, Int32Array
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import (
     Edges,
@@ -199,8 +200,9 @@ def distance_of(error_x: float, error_y: float) -> float:
 
 @inline
 def round_points(
-    edges: Edges, events: Events, points: Any, n: int, n_crossings: int, n_points: int, rounded: Rounded, stop: Any
-) -> float:
+    edges: Edges, events: Events, points: Int32Array, n: int, n_crossings: int, n_points: int, rounded: Rounded,
+    stop: FlagArray,
+) -> float:  # fmt: skip
     """Round the points of all rings, vertices and crossings; return how far a point moved, or LOST."""
     x, y, error = edges.x, edges.y, rounded.error
     error[:n_crossings] = _NOT_YET

@@ -17,11 +17,13 @@ Source: J. D. Hobby, Practical segment intersection with finite precision output
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import called, inline, kernel, merged
+from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, boxes_meet, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, is_before, load_rings
 from engine.polygon_overlay.compiled.workspace import rows_of
@@ -55,7 +57,9 @@ def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reac
 
 
 @kernel
-def scale(values: Any, divisor: float, factor: float, more: float, near_by: float, least: float, scaled: Any) -> float:
+def scale(
+    values: FloatArray, divisor: float, factor: float, more: float, near_by: float, least: float, scaled: FloatArray
+) -> float:
     """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; return the largest of
     these, without its sign.
 
@@ -73,7 +77,7 @@ def scale(values: Any, divisor: float, factor: float, more: float, near_by: floa
 
 
 @inline
-def _find_pixels(vertices: Any, pixels: Any, stop: Any) -> int:
+def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> int:
     """Fill ``pixels`` with the whole points in whose pixels vertices lie; return how many are not there already."""
     n_moved = 0
     for k in range(vertices.shape[0]):
@@ -85,7 +89,9 @@ def _find_pixels(vertices: Any, pixels: Any, stop: Any) -> int:
 
 
 @inline
-def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: Any, stop: Any) -> int:
+def _find_corners(
+    pixels: FloatArray, offsets: IntArray, pieces: IntArray, corners: Int32Array, starts: IntArray, stop: FlagArray
+) -> int:
     """Fill ``corners`` with the vertices where rings turn, ``starts`` with where those of each ring begin there.
 
     Returns how many, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order.
@@ -126,7 +132,7 @@ def _find_corners(pixels: Any, offsets: Any, pieces: Any, corners: Any, starts: 
 
 
 @merged
-def _add_passage(passages: Any, m: int, edges: Any, e: int, f: int, px: float, py: float) -> int:
+def _add_passage(passages: Int32Array, m: int, edges: Edges, e: int, f: int, px: float, py: float) -> int:
     """Append that edge e passes the pixel about (px, py), of vertex f, if it does; return how many there are then."""
     x, y, b = edges.x, edges.y, edges.after[e]
     if not _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
@@ -138,8 +144,8 @@ def _add_passage(passages: Any, m: int, edges: Any, e: int, f: int, px: float, p
 
 @kernel
 def snap(
-    vertices: Any, offsets: Any, pieces: Any, stop: Any, words: Any, pixels: Any, corners: Any, starts: Any,
-    passages: Any,
+    vertices: FloatArray, offsets: IntArray, pieces: IntArray, stop: FlagArray, words: IntArray, pixels: FloatArray,
+    corners: Int32Array, starts: IntArray, passages: Int32Array,
 ) -> tuple[int, int, int, bool]:  # fmt: skip
     """Fill what tells what becomes of valid rings, coordinates below 2^51.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -205,7 +205,7 @@ def words_of(buffers: Buffers, output: Output) -> IntArray:
 
 
 @merged
-def output_at(words: Any) -> Output:
+def output_at(words: IntArray) -> Output:
     """Return the output of a `Scratch` by its words."""
     n, n_rings, first = words[5], words[6], _N_SIZES + _N_BUFFERS
     return Output(
@@ -216,7 +216,7 @@ def output_at(words: Any) -> Output:
 
 
 @merged
-def rows_of(words: Any) -> Workspace:
+def rows_of(words: IntArray) -> Workspace:
     """Return the rows of the buffers of a `Scratch` by name; those that are in one place are not in use at one time."""
     n, n_rings, k, m, n_nodes = words[0], words[1], words[2], words[3], words[4]
     at = words[_N_SIZES : _N_SIZES + _N_BUFFERS]

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.jit import allocating_kernel, called, inline
 from engine.segment_clipping.on_boundary.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe
 from engine.segment_clipping.on_boundary.mesh_streams import gather_contacts, streams_for
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.on_boundary.touching_cut import (
     UNSURE,
     Crossings,
@@ -37,7 +39,9 @@ def group_size(n: int) -> int:
 
 
 @inline
-def emit(segments: Any, item: int, source: int, is_inside: bool, cuts: Crossings, n: int, out: Pieces, row: int) -> int:
+def emit(
+    segments: FloatArray, item: int, source: int, is_inside: bool, cuts: Crossings, n: int, out: Pieces, row: int
+) -> int:
     """Write the pieces between n crossings to the rows of `out` from `row` on; return the row after them."""
     is_flat, end = segments.shape[2] == 2, 1 if is_inside else 0
     if is_inside:
@@ -56,7 +60,7 @@ def emit(segments: Any, item: int, source: int, is_inside: bool, cuts: Crossings
 
 
 @inline
-def all_proper(kinds: Any, first: int, last: int) -> bool:
+def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
     """Tell whether some contacts are proper crossings."""
     are_proper = True
     for i in range(first, last):
@@ -65,7 +69,7 @@ def all_proper(kinds: Any, first: int, last: int) -> bool:
 
 
 @inline
-def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
+def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
     """Make the crossings of a segment, in order along it; False where not all is surely rounded, or two are one."""
     first, last = contacts.offsets[item], contacts.offsets[item + 1]
     if first < last and not is_item_safe(segments, item):
@@ -84,8 +88,8 @@ def cut_segment(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Cr
 
 @called
 def cut_group(
-    segments: Any, locations: Any, first: int, boundary: Any, contacts: Any, cuts: Crossings, stop: Any, out: Pieces,
-    row: int, state: Any,
+    segments: FloatArray, locations: Int8Array, first: int, boundary: Any, contacts: Any, cuts: Crossings,
+    stop: FlagArray, out: Pieces, row: int, state: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Cut the segments of a group, those from `first` on, at their contacts; return the place reached, and the row.
 
@@ -113,7 +117,10 @@ def cut_group(
 
 
 @allocating_kernel
-def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
+def cut_on_outline(
+    segments: FloatArray, locations: Int8Array, outline: Outline, stop: FlagArray, out: Pieces, state: FlagArray,
+    n: IntArray,
+) -> None:  # fmt: skip
     """Cut segments (m, 2, 2) float64 on a polygon, as far as double-doubles and filters go.
 
     locations: (m, 2) int8 of their ends, the second where the first is 0 at least. outline: see `Outline`. stop: one
@@ -134,7 +141,9 @@ def cut_on_outline(segments: Any, locations: Any, outline: Any, stop: Any, out: 
 
 
 @allocating_kernel
-def cut_on_mesh(segments: Any, locations: Any, mesh: Any, stop: Any, out: Pieces, state: Any, n: Any) -> None:
+def cut_on_mesh(
+    segments: FloatArray, locations: Int8Array, mesh: Mesh, stop: FlagArray, out: Pieces, state: FlagArray, n: IntArray
+) -> None:
     """Cut segments (m, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
     size = group_size(locations.shape[0] - n[0])
     contacts, cuts, last = streams_for(mesh, size, n[2]), crossings_for(2 * n[2], 3), n[0]

@@ -86,7 +86,9 @@ def _turns(
 
 
 @kernel
-def leave_parted(elements: Any, met: Any, owners: Any, segments: Any, inner: Any, is_told: Any) -> None:
+def leave_parted(
+    elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_told: BoolArray
+) -> None:
     """Set is_told (n,) False where an element met does not have the first ends of a segment and of the one beside it
     strictly on one side."""
     for place in range(met.size):

@@ -26,6 +26,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray
 from engine.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
@@ -94,7 +95,7 @@ def place_of(code: int) -> int:
 
 
 @merged
-def axis_of(segments: Any, item: int) -> int:
+def axis_of(segments: FloatArray, item: int) -> int:
     """Return the axis along which a segment is longest."""
     best = 0
     for k in range(1, segments.shape[2]):
@@ -105,7 +106,7 @@ def axis_of(segments: Any, item: int) -> int:
 
 
 @inline
-def are_one(elements: Any, first: int, code: int, second: int, other: int) -> bool:
+def are_one(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
     """Tell whether what two codes say of two elements is one point: an end, or a corner or one side of both."""
     n, m = place_of(code), place_of(other)
     if n >= START or m >= START:
@@ -121,7 +122,7 @@ def are_one(elements: Any, first: int, code: int, second: int, other: int) -> bo
 
 
 @inline
-def _are_equal(elements: Any, first: int, place: int, second: int, other: int) -> bool:
+def _are_equal(elements: FloatArray, first: int, place: int, second: int, other: int) -> bool:
     """Tell whether a corner of one element is one of another."""
     are_equal = True
     for k in range(elements.shape[2]):
@@ -152,7 +153,7 @@ def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
 
 
 @inline
-def edge_contact(edge: Any, segment: Any) -> int:
+def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
     """Return how a segment and an edge of the plane meet, (2, 2) float64 both: what touches by its code."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
@@ -169,7 +170,7 @@ def edge_contact(edge: Any, segment: Any) -> int:
 
 
 @inline
-def may_meet(segment: Any, box: Any) -> bool:
+def may_meet(segment: FloatArray, box: FloatArray) -> bool:
     """Tell whether a segment may meet a closed box; False only where some axis surely separates them."""
     n = segment.shape[1]
     largest = 0.0
@@ -194,7 +195,7 @@ def may_meet(segment: Any, box: Any) -> bool:
 
 
 @inline
-def append_edges(contacts: EdgeContacts, outline: Any, segment: Any, found: int) -> int:
+def append_edges(contacts: EdgeContacts, outline: Any, segment: FloatArray, found: int) -> int:
     """Append the contacts of a segment (2, 2) to the `found` first ones; return how many these are then, or NO_ROOM."""
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.stack
     stack[0], depth = 1, 1
@@ -220,7 +221,7 @@ def append_edges(contacts: EdgeContacts, outline: Any, segment: Any, found: int)
 
 
 @inline
-def is_point(segment: Any) -> bool:
+def is_point(segment: FloatArray) -> bool:
     """Tell whether a segment has no length."""
     are_equal = True
     for k in range(segment.shape[1]):
@@ -229,7 +230,7 @@ def is_point(segment: Any) -> bool:
 
 
 @called
-def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, stop: Any) -> int:
+def gather_edges(contacts: EdgeContacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
 
     Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
@@ -248,7 +249,7 @@ def gather_edges(contacts: EdgeContacts, outline: Any, segments: Any, n: int, st
 
 
 @allocating_kernel
-def find_contacts_2d(segments: Any, outline: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
+def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
     """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these.
 
     elements met and kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from engine.arrays import FloatArray
 from engine.jit import called, inline, merged
 from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_div
@@ -79,7 +80,7 @@ def dot(n: Normal, w: Vector) -> Triple:
 
 
 @merged
-def line_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
+def line_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
     """Return s(p) and d for one of some edges (k, 2, 2) as double-doubles, each with its bound."""
     ax, ay = elements[element, 0, 0], elements[element, 0, 1]
     px, py = segments[item, 0, 0], segments[item, 0, 1]
@@ -97,7 +98,7 @@ def line_values(elements: Any, element: int, segments: Any, item: int) -> tuple[
 
 
 @merged
-def plane_values(elements: Any, element: int, segments: Any, item: int) -> tuple[Any, Any]:
+def plane_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
     """Return s(p) and d for one of some triangles (k, 3, 3) as double-doubles, each with its bound."""
     a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
@@ -108,7 +109,7 @@ def plane_values(elements: Any, element: int, segments: Any, item: int) -> tuple
 
 
 @merged
-def is_item_safe(items: Any, item: int) -> bool:
+def is_item_safe(items: FloatArray, item: int) -> bool:
     """Tell whether every coordinate of an item is zero or of a size for which double-doubles keep their bounds."""
     safe = True
     for place in range(items.shape[1]):
@@ -118,7 +119,9 @@ def is_item_safe(items: Any, item: int) -> bool:
 
 
 @merged
-def cut_at(segments: Any, item: int, elements: Any, element: int, points: Any, row: int) -> tuple[float, bool]:
+def cut_at(
+    segments: FloatArray, item: int, elements: FloatArray, element: int, points: FloatArray, row: int
+) -> tuple[float, bool]:
     """Set a row of `points` to where a segment crosses an element; return t and whether all is surely nearest."""
     if segments.shape[2] == 2:
         at_p, along = line_values(elements, element, segments, item)
@@ -146,7 +149,7 @@ def cut_at(segments: Any, item: int, elements: Any, element: int, points: Any, r
 
 
 @called
-def _size_at(elements: Any, element: int, segments: Any, item: int, end: int, e: Components) -> int:
+def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
     """Set e, 192 places, to |s| at an end of a segment; return its length.
 
     Of a triangle a b c the sum over k of component k of (b - a) x (c - a) times (x - a)_k; of an edge a b the last
@@ -168,7 +171,9 @@ def _size_at(elements: Any, element: int, segments: Any, item: int, end: int, e:
 
 
 @called
-def cross_exactly(segments: Any, item: int, elements: Any, element: int, point: Any) -> tuple[float, bool]:
+def cross_exactly(
+    segments: FloatArray, item: int, elements: FloatArray, element: int, point: FloatArray
+) -> tuple[float, bool]:
     """Set `point` to where a segment crosses an element, where double-doubles leave that open; return t and whether all
     is sure.
 

@@ -31,12 +31,14 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrays import FlagArray, FloatArray
 from engine.jit import allocating, allocating_kernel, called, inline, merged
 from engine.lanes.boxes import EMPTY, enter_boxes
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.segment_clipping.on_boundary.contacts import APART, NO_ROOM, STOPPED, is_point
+from engine.segment_clipping.on_boundary.prepared_boundary import Mesh
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_contact
 from engine.types import Point3
 
@@ -133,7 +135,7 @@ class Streams(NamedTuple):
 
 
 @allocating
-def streams_for(mesh: Any, n_segments: int, n_contacts: int) -> Streams:
+def streams_for(mesh: Mesh, n_segments: int, n_contacts: int) -> Streams:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
     n_pairs = _PAIRS * n_segments
     return Streams(
@@ -147,7 +149,7 @@ def streams_for(mesh: Any, n_segments: int, n_contacts: int) -> Streams:
 
 
 @inline
-def _load(streams: Any, mesh: Any, segments: Any, n: int) -> int:
+def _load(streams: Streams, mesh: Mesh, segments: FloatArray, n: int) -> int:
     """Bring the first n of some segments (m, 2, 3) to the tree; list those that come near it, return how many."""
     n_near = 0
     for item in range(n):
@@ -164,7 +166,9 @@ def _load(streams: Any, mesh: Any, segments: Any, n: int) -> int:
 
 
 @inline
-def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contacts: int, stop: Any) -> int:
+def _settle_pairs(
+    streams: Streams, mesh: Mesh, segments: FloatArray, n_pairs: int, n_contacts: int, stop: FlagArray
+) -> int:
     """Append the contacts of the pairs that wait; return how many there are then, or what `gather_contacts` does."""
     corners, pairs, waiting = mesh.corners, streams.pairs, streams.waiting
     n_kept = 0
@@ -203,7 +207,7 @@ def _settle_pairs(streams: Any, mesh: Any, segments: Any, n_pairs: int, n_contac
 
 
 @inline
-def _settle_triangles(streams: Any, mesh: Any, segments: Any, n_waiting: int, n_contacts: int) -> int:
+def _settle_triangles(streams: Streams, mesh: Mesh, segments: FloatArray, n_waiting: int, n_contacts: int) -> int:
     """Append the contacts of the triangles that wait, as `_settle_pairs` does."""
     waiting = streams.waiting
     for place in range(n_waiting):
@@ -223,7 +227,7 @@ def _settle_triangles(streams: Any, mesh: Any, segments: Any, n_waiting: int, n_
 
 
 @inline
-def _by_segment(streams: Any, n: int, n_contacts: int) -> None:
+def _by_segment(streams: Streams, n: int, n_contacts: int) -> None:
     """Sort contacts by segment, those of one stay in order."""
     offsets = streams.offsets
     offsets[: n + 1] = 0
@@ -242,7 +246,7 @@ def _by_segment(streams: Any, n: int, n_contacts: int) -> None:
 
 
 @called
-def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -> int:
+def gather_contacts(streams: Streams, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3); return how many.
 
     Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
@@ -303,7 +307,7 @@ def gather_contacts(streams: Any, mesh: Any, segments: Any, n: int, stop: Any) -
 
 
 @allocating_kernel
-def find_mesh_contacts(segments: Any, mesh: Any, stop: Any, room: int) -> tuple[int, Any, Any, Any]:
+def find_mesh_contacts(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
     """Return the contacts of segments (n, 2, 3) float64, GROUP at most, with triangles: see `find_contacts_2d`."""
     streams = streams_for(mesh, segments.shape[0], room)
     found = gather_contacts(streams, mesh, segments, segments.shape[0], stop)

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.arrays import FloatArray, Int8Array
 from engine.jit import allocating, called, inline
 from engine.segment_clipping.on_boundary.chords import INSIDE_BEFORE
 from engine.segment_clipping.on_boundary.contacts import (
@@ -38,7 +39,7 @@ element, see contacts.py; order: of t."""
 
 
 @called
-def cut_touching(segments: Any, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> int:
+def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> int:
     """Make the crossings and touches of a segment, in order along it; return how many, UNSURE where not all is."""
     first, last, n = contacts.offsets[item], contacts.offsets[item + 1], 0
     if not is_item_safe(segments, item) or 2 * (last - first) > cuts.t.size:
@@ -59,7 +60,7 @@ def cut_touching(segments: Any, item: int, boundary: Any, contacts: Any, cuts: C
 
 
 @called
-def _put_place(segments: Any, item: int, elements: Any, code: int, cuts: Crossings, n: int) -> int:
+def _put_place(segments: FloatArray, item: int, elements: FloatArray, code: int, cuts: Crossings, n: int) -> int:
     """Write parameter and point of a crossing or touch of ``cuts.met[n]``; return n + 1, UNSURE where not all is."""
     place, element, dimension = place_of(code), cuts.met[n], segments.shape[2]
     cuts.codes[n] = code
@@ -81,7 +82,7 @@ def _put_place(segments: Any, item: int, elements: Any, code: int, cuts: Crossin
 
 
 @inline
-def _put_stretch(segments: Any, item: int, elements: Any, cuts: Crossings, n: int) -> int:
+def _put_stretch(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
     """Write where a segment begins to run along an edge of its line, and where it ends to; as `_put_place` does."""
     k, element, face = axis_of(segments, item), cuts.met[n], cuts.faces[n]
     p, q = segments[item, 0, k], segments[item, 1, k]
@@ -100,7 +101,7 @@ def _put_stretch(segments: Any, item: int, elements: Any, cuts: Crossings, n: in
 
 
 @inline
-def _is_in_before(elements: Any, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
+def _is_in_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
     """Return whether the line beside the segment is inside before the first of n contacts, -1 where that does not
     matter unless there is a span off the boundary; -2 where contacts round alike that are not one."""
     begin, turns = 0, False
@@ -121,7 +122,9 @@ def _is_in_before(elements: Any, cuts: Crossings, n: int, of_p: int, of_q: int) 
 
 
 @inline
-def _put_node(out: Pieces, row: int, end: int, segments: Any, item: int, cuts: Crossings, i: int, face: int) -> None:
+def _put_node(
+    out: Pieces, row: int, end: int, segments: FloatArray, item: int, cuts: Crossings, i: int, face: int
+) -> None:
     """Write an end of a piece at a contact; where the segment itself begins or ends there, as its own end."""
     if place_of(cuts.codes[i]) == START + end:
         put_own_end(out, row, end, segments, item, segments.shape[2] == 2)
@@ -133,8 +136,9 @@ def _put_node(out: Pieces, row: int, end: int, segments: Any, item: int, cuts: C
 
 @called
 def emit_touching(
-    segments: Any, item: int, source: int, ends: Any, elements: Any, cuts: Crossings, n: int, out: Pieces, row: int
-) -> int:
+    segments: FloatArray, item: int, source: int, ends: Int8Array, elements: FloatArray, cuts: Crossings, n: int,
+    out: Pieces, row: int,
+) -> int:  # fmt: skip
     """Write the pieces between n contacts to the rows of `out` from `row` on, n + 1 at most; return the row after them,
     or UNSURE. ends: (2,) int8 locations of the segment's ends, the second where the first is 0 at least, or what
     `look_before` sets."""

@@ -21,8 +21,9 @@ one open span of the segment to the next the location turns over as often as tha
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
+from engine.arrays import FloatArray
 from engine.jit import called, inline, merged
 from engine.lanes.triangles import AXES_BEFORE, longest_axis
 from engine.predicates.error_free import workspace
@@ -126,7 +127,7 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 
 
 @merged
-def triangle_contact(elements: Any, element: int, segments: Any, item: int) -> int:
+def triangle_contact(elements: FloatArray, element: int, segments: FloatArray, item: int) -> int:
     """Return how one of some segments (m, 2, 3) and one of some triangles (k, 3, 3) meet."""
     a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
@@ -135,7 +136,7 @@ def triangle_contact(elements: Any, element: int, segments: Any, item: int) -> i
 
 
 @merged
-def corner(elements: Any, element: int, place: int) -> Point3:
+def corner(elements: FloatArray, element: int, place: int) -> Point3:
     """Return a corner of one of some elements (k, corners, 3)."""
     return Point3(
         float(elements[element, place, 0]), float(elements[element, place, 1]), float(elements[element, place, 2])
@@ -143,6 +144,6 @@ def corner(elements: Any, element: int, place: int) -> Point3:
 
 
 @merged
-def triangle_at(elements: Any, element: int) -> tuple[Point3, Point3, Point3]:
+def triangle_at(elements: FloatArray, element: int) -> tuple[Point3, Point3, Point3]:
     """Return the corners of one of some triangles (k, 3, 3)."""
     return corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)

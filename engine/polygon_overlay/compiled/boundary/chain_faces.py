@@ -9,9 +9,10 @@ doubles.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 from engine.arrangement.union_find import root_of
+from engine.arrays import FlagArray, Int32Array
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chains import (
     Chains,
@@ -50,7 +51,7 @@ def _following(chains: Chains, stars: Stars, half: int) -> int:
 
 
 @inline
-def number_cycles(chains: Chains, stars: Stars, cycle: Any, n_chains: int, stop: Any) -> int:
+def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int, stop: FlagArray) -> int:
     """Fill ``cycle``, by half-chain; return how many cycles."""
     cycle[: 2 * n_chains] = -1
     n_cycles = 0
@@ -125,7 +126,7 @@ def test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 
 @inline
-def edge_above(edges: Edges, tree: BoxTree, names: Any, v: int, n: int) -> int:
+def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -> int:
     """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
 
     tree: of n edges, ``names`` their numbers. Edges that begin or pass through v are not above it: caller guarantees
@@ -152,7 +153,7 @@ def edge_above(edges: Edges, tree: BoxTree, names: Any, v: int, n: int) -> int:
 
 
 @inline
-def half_below(edges: Edges, events: Events, along: Along, points: Any, chains: Chains, e: int, v: int) -> int:
+def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, chains: Chains, e: int, v: int) -> int:
     """Return the half-chain whose face is below edge e, right of vertex v. points: forest of those that are one."""
     x = edges.x
     runs_right = x[e] < x[edges.after[e]]

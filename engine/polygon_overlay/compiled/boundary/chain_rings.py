@@ -7,9 +7,10 @@ and lists the points where the boundary turns or rings meet.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 from engine.arrangement.union_find import root_of, unite
+from engine.arrays import FlagArray, Int32Array
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chains import (
@@ -43,7 +44,7 @@ Walk = namedtuple("Walk", "path place")
 
 
 @inline
-def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: Any) -> None:
+def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) -> None:
     """Fill ``state`` where ``inside`` is filled."""
     cycle, inside, state = faces.cycle, faces.inside, faces.state
     for chain in range(n_chains):
@@ -58,7 +59,7 @@ def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: Any) -> Non
 
 @inline
 def join_regions(
-    chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: Any
+    chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: FlagArray
 ) -> None:
     """Join the regions of faces, and fill ``fan``; ``state`` is filled.
 
@@ -125,7 +126,7 @@ def pass_point(
 
 @merged
 def pass_vertex(
-    edges: Edges, marks: Any, v: int, edge: int, rings: Rings, start: int, at: int, doubt: int
+    edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, start: int, at: int, doubt: int
 ) -> tuple[int, int]:
     """Pass an input vertex, from which the boundary goes on along ``edge``; returns as `pass_point`."""
     turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
@@ -134,8 +135,8 @@ def pass_vertex(
 
 @inline
 def _emit(
-    edges: Edges, chains: Chains, points: Any, state: Any, marks: Any, path: Any, first: int, last: int, rings: Rings,
-    n_points: int, sizes: tuple[int, int, int, int], stop: Any,
+    edges: Edges, chains: Chains, points: Int32Array, state: FlagArray, marks: FlagArray, path: Int32Array, first: int,
+    last: int, rings: Rings, n_points: int, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
     """Write the points of the ring of the half-chains ``path[first:last]``, straight ones left out; return how many."""
     _, _, n, n_simple = sizes
@@ -162,8 +163,8 @@ def _emit(
 
 @inline
 def walk_rings(
-    edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: Any, walk: Walk, rings: Rings, holders: Holders,
-    is_named: bool, sizes: tuple[int, int, int, int], stop: Any,
+    edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: FlagArray, walk: Walk, rings: Rings,
+    holders: Holders, is_named: bool, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
 

@@ -18,9 +18,10 @@ exclusive or of theirs.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final
+from typing import Final
 
 from engine.arrangement.union_find import root_of
+from engine.arrays import FlagArray, Int32Array, IntArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Events, Unions
@@ -119,8 +120,8 @@ def _begin_chain(chains: Chains, chain: int, node: int, edge: int, mask: int) ->
 
 @inline
 def build_chains(
-    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Any,
-    sizes: tuple[int, int, int], stop: Any,
+    given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Int32Array,
+    sizes: tuple[int, int, int], stop: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Walk every ring from its top vertex and cut it at its nodes.
 
@@ -201,7 +202,7 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 
 
 @called
-def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int, masks: Any) -> int:
+def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, last: int, masks: IntArray) -> int:
     """Let the lowest chain of each direction stand for all, and close the gaps; return where the star then ends.
 
     The other end of coinciding chains finds the same chains together, so it chooses the same one.
@@ -232,7 +233,7 @@ def _unite_twins(edges: Edges, chains: Chains, star: Any, first: int, last: int,
 
 @inline
 def _group_loose(
-    chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: Any
+    chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
     """Put the loose half-chains of each node together, in any order."""
     starts, ends = stars.starts, stars.ends
@@ -257,7 +258,7 @@ def _group_loose(
 
 
 @inline
-def _sort_star(edges: Edges, chains: Chains, star: Any, loose: Loose, first: int, last: int) -> bool:
+def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, first: int, last: int) -> bool:
     """Sort the half-chains ``star[first:last]`` by direction; tell whether some leave in the same."""
     x, y, dx, dy = edges.x, edges.y, loose.dx, loose.dy
     has_twins = False
@@ -291,7 +292,7 @@ def _sort_star(edges: Edges, chains: Chains, star: Any, loose: Loose, first: int
 
 @inline
 def build_stars(
-    edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: Any
+    edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
     """Fill the stars of the nodes from n_simple on; of chains that coincide one is left, which stands for all."""
     _group_loose(chains, stars, loose, n_simple, n_nodes, n_loose, stop)

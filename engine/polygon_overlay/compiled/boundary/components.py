@@ -22,6 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING, edge_above, half_below, test_edge
 from engine.polygon_overlay.compiled.crossing_signs import Edges
@@ -44,7 +45,7 @@ following: the next ring of the component, or -1; first: its first vertex. By nu
 
 
 @inline
-def _find_components(given: Given, rings: Any, n: int, n_rings: int, components: Components) -> int:
+def _find_components(given: Given, rings: IntArray, n: int, n_rings: int, components: Components) -> int:
     """Fill ``components``; return how many."""
     edges = given.edges
     x, y, highest, following = edges.x, edges.y, components.highest, components.following
@@ -81,7 +82,7 @@ def _box_of(edges: Edges, components: Components, k: int) -> tuple[float, float,
 
 
 @inline
-def _test_component(edges: Edges, marks: Any, components: Components, v: int, k: int, nearest: int) -> int:
+def _test_component(edges: Edges, marks: FlagArray, components: Components, v: int, k: int, nearest: int) -> int:
     """Return what is nearest above vertex v, of the edges of component k and ``nearest``, or TOO_MANY."""
     ring, n = components.ring[k], 0
     while ring >= 0:  # bound: the rings of the component
@@ -98,7 +99,7 @@ def _test_component(edges: Edges, marks: Any, components: Components, v: int, k:
 
 
 @merged
-def _may_hold(boxes: Any, i: int, low: Any, high: Any) -> bool:
+def _may_hold(boxes: FloatArray, i: int, low: Any, high: Any) -> bool:
     """Tell whether a box reaches beyond the innermost of some boxes' sides, as one that holds any of them does."""
     return (boxes[i, 0] <= low[0]) & (boxes[i, 1] >= high[0]) & (boxes[i, 2] <= low[1]) & (boxes[i, 3] >= high[1])
 
@@ -140,7 +141,7 @@ def _look_in_boxes(edges: Edges, components: Components, begin: int, n: int, tre
 
 
 @inline
-def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Any) -> int:
+def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Int32Array) -> int:
     """Fill ``names`` and ``boxes`` with the edges of all components that hold another; return how many."""
     x, y, boxes = edges.x, edges.y, tree.boxes
     m = 0
@@ -161,7 +162,7 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 
 
 @inline
-def join_faces(w: Any, names: Any, sizes: tuple[int, int, int, int], stop: Any) -> None:
+def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int, int], stop: FlagArray) -> None:
     """Join the outer cycle of each component of rings to the face it lies in.
 
     w: the `Workspace`, whose tree is scratch, but for its marks: RUN of the edges that stand for many; caller

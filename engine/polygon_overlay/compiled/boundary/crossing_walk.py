@@ -10,8 +10,7 @@ the rest of it hangs together. Their union is one part, whose boundary all rings
 
 from __future__ import annotations
 
-from typing import Any
-
+from engine.arrays import FlagArray, Int32Array
 from engine.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, pass_point, pass_vertex
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
@@ -22,7 +21,7 @@ from engine.polygon_overlay.compiled.loading import Given
 
 
 @inline
-def do_nothing_but_cross(given: Given, events: Events, contacts: Contacts, n_rings: int, kept: Any) -> bool:
+def do_nothing_but_cross(given: Given, events: Events, contacts: Contacts, n_rings: int, kept: FlagArray) -> bool:
     """Tell whether two rings, one of each polygon, are simple and cross in simple nodes, and the rule above holds."""
     if n_rings != 2 or contacts.n_exact > 0 or contacts.n_crossings == 0 or kept[1] ^ kept[2] ^ kept[3] != 1:
         return False
@@ -40,8 +39,8 @@ def _turns_left(given: Given, ring: int) -> bool:
 
 @inline
 def _follow(
-    edges: Edges, events: Events, along: Along, place: Any, marks: Any, event: int, is_forward: bool, rings: Rings,
-    start: int, n: int, stop: Any,
+    edges: Edges, events: Events, along: Along, place: Int32Array, marks: FlagArray, event: int, is_forward: bool,
+    rings: Rings, start: int, n: int, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Write the crossing of an event, and the vertices from there to the next of its ring; return that, and how many
     points there are then."""
@@ -61,8 +60,8 @@ def _follow(
 
 @inline
 def walk_crossings(
-    given: Given, events: Events, along: Along, place: Any, marks: Any, kept: Any, n_crossings: int, rings: Rings,
-    stop: Any,
+    given: Given, events: Events, along: Along, place: Int32Array, marks: FlagArray, kept: FlagArray, n_crossings: int,
+    rings: Rings, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Write the boundary rings of two rings that `do_nothing_but_cross`; return how many, and how many points.
 

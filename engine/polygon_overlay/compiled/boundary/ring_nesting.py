@@ -25,6 +25,7 @@ from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of
+from engine.arrays import FlagArray, Int32Array, IntArray
 from engine.jit import called, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chains import Chains, is_live
@@ -93,7 +94,7 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
 
 
 @merged
-def _part_of(rule: int, h: Holders, kept: Any, n_held: int) -> int:
+def _part_of(rule: int, h: Holders, kept: FlagArray, n_held: int) -> int:
     """Return the part of the result that a face is in, 0 for none, by a rule other than AGAIN."""
     if rule == PAIR:
         return int(kept[n_held])
@@ -129,8 +130,8 @@ def _judge(nesting: Nesting, h: Holders, face: int, n_held: int, n: int) -> tupl
 
 @called
 def spread_sources(
-    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, kept: Any, sizes: tuple[int, int],
-    stop: Any,
+    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, kept: FlagArray, sizes: tuple[int, int],
+    stop: FlagArray,
 ) -> int:  # fmt: skip
     """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM.
 
@@ -179,7 +180,7 @@ def spread_sources(
 
 
 @called
-def gather_evidence(faces: Faces, h: Holders, n_entries: int, n_cycles: int, n_rings: int, stop: Any) -> None:
+def gather_evidence(faces: Faces, h: Holders, n_entries: int, n_cycles: int, n_rings: int, stop: FlagArray) -> None:
     """Put the entries of each region together, each ring once; ``faces.regions`` is filled."""
     for i in range(n_cycles + 1):
         h.region[i] = h.entered[i] = -1  # order: from here on `entered` tells which ring of the result was beyond last
@@ -204,7 +205,7 @@ def gather_evidence(faces: Faces, h: Holders, n_entries: int, n_cycles: int, n_r
 
 
 @merged
-def enter_beyond(faces: Faces, h: Holders, path: Any, first: int, last: int, n_rings: int) -> None:
+def enter_beyond(faces: Faces, h: Holders, path: Int32Array, first: int, last: int, n_rings: int) -> None:
     """Enter the regions beyond the ring of the half-chains ``path[first:last]``."""
     n = h.offset[n_rings]
     for k in range(first, last):
@@ -217,7 +218,7 @@ def enter_beyond(faces: Faces, h: Holders, path: Any, first: int, last: int, n_r
 
 @called
 def write_evidence(
-    h: Holders, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: Any, n: int
+    h: Holders, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: IntArray, n: int
 ) -> int:  # fmt: skip
     """Append rows ``name``, number of a ring that a ring of the result comes from; return how many, or NO_ROOM.
 
