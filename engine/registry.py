@@ -75,7 +75,7 @@ ROWS: Final = (
         n_faces=lambda solid: 2 * int(solid.dimension),
         clip=segments.on_box,
         planes=planes.planes_of_rows,
-        meets={2: "outline", 3: "mesh"},
+        meets={2: "box", 3: "box"},
     ),
     Row(
         solid=Convex,

@@ -19,8 +19,7 @@ from engine.collision.meshes.mesh_mesh import mesh_mesh
 from engine.collision.planar.outline_batch import collide_outlines
 from engine.collision.result import (
     BODIES,
-    MESHES,
-    OUTLINES,
+    FACES,
     UNCOUNTED,
     UNNAMED,
     Collision,
@@ -28,6 +27,7 @@ from engine.collision.result import (
     Poses,
     Witness,
     Work,
+    meets_as,
 )
 from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.against_half_space import collide_half_space_body
@@ -47,31 +47,34 @@ TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surfa
 
 
 PAIRS: dict[tuple[int, str, str], PairFunction] = {
-    **{(3, first, second): mesh_mesh for first in MESHES for second in MESHES},
-    **{(2, first, second): collide_outlines for first in OUTLINES for second in OUTLINES},
+    **{(3, first, second): mesh_mesh for first in FACES[3] for second in FACES[3]},
+    **{(2, first, second): collide_outlines for first in FACES[2] for second in FACES[2]},
     **{(d, "half_space", body): collide_half_space_body for d, body in BODIES},
     **{(d, body, "sphere"): collide_body_sphere for d, body in BODIES},
 }
 for _dimension in (2, 3):
-    PAIRS[_dimension, "aabb", "aabb"] = by_forms_or(mesh_mesh if _dimension == 3 else collide_outlines)
-    PAIRS[_dimension, "aabb", "sphere"] = by_forms_or(collide_form_sphere)
+    PAIRS[_dimension, "box", "box"] = by_forms_or(mesh_mesh if _dimension == 3 else collide_outlines)
+    PAIRS[_dimension, "box", "sphere"] = by_forms_or(collide_form_sphere)
     PAIRS[_dimension, "half_space", "half_space"] = collide_half_spaces
     PAIRS[_dimension, "half_space", "sphere"] = collide_half_space_sphere
     PAIRS[_dimension, "sphere", "sphere"] = by_forms_or(collide_form_sphere)
-"""Dimension and the two types to the function of that pair; a pair may stand in one order only."""
+"""Dimension and as what two solids meet (`Row.meets`) to the function of that pair, in one order or both."""
 
-_BOTH_ORDERS = {
-    **{(d, second, d, first): (function, True) for (d, first, second), function in PAIRS.items()},
-    **{(d, first, d, second): (function, False) for (d, first, second), function in PAIRS.items()},
-}
+_BY_TYPE: dict[tuple[int, str, int, str], tuple[PairFunction, bool]] = {}
+"""What `PAIRS` says of types that were asked about."""
 
 
 def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, bool]:
     """Return the function of a pair and whether it wants the two in the other order."""
     if isinstance(first, Solid) and isinstance(second, Solid):
-        found = _BOTH_ORDERS.get((first.dimension, first.type, second.dimension, second.type))
-        if found is not None:
-            return found
+        types = first.dimension, first.type, second.dimension, second.type
+        if (known := _BY_TYPE.get(types)) is not None:
+            return known
+        if first.dimension == second.dimension:
+            one, other = meets_as(first), meets_as(second)
+            for key, is_swapped in (((first.dimension, one, other), False), ((first.dimension, other, one), True)):
+                if (function := PAIRS.get(key)) is not None:
+                    return _BY_TYPE.setdefault(types, (function, is_swapped))
     for name, solid in (("first", first), ("second", second)):
         if not isinstance(solid, Solid):
             raise UnsupportedSolidError(

@@ -21,7 +21,7 @@ from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
-from engine.collision.result import MESHES, RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work
+from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work, has_faces
 from engine.collision.scenes.batches import posed_batch
 from engine.collision.simple.against_ball import centers_in_frame, named
 from engine.collision.simple.ball_on_mesh import relate_balls
@@ -123,7 +123,7 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
         told = told_by_forms(first, second, motion_of(None, first.dimension), motion, work)
         if told is not None:
             return told
-    if first.dimension == 3 and first.type in MESHES and second.type in MESHES:
+    if first.dimension == 3 and has_faces(first) and has_faces(second):
         answer = told_by_kernel(mesh_body_of(first), mesh_body_of(second), (STILL, poses), work)
         if isinstance(answer, Collision):
             return answer
@@ -168,7 +168,7 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
     is_named = witnesses is not None  # then a search for contacts has to follow, and tells all relations
     has_detail = answers.details is not None
     batch = posed_batch(first, second, poses, relations, answers.boolean or is_named, has_detail, budget)
-    if first.dimension == 2 or first.type not in MESHES or second.type not in MESHES:
+    if first.dimension == 2 or not (has_faces(first) and has_faces(second)):
         return batch
     a, b = mesh_body_of(first), mesh_body_of(second)
     seek = what_to_seek(a, b, Work(budget, is_named, answers.boolean))

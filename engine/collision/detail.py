@@ -20,7 +20,7 @@ from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_mesh import mesh_parts
 from engine.collision.planar.outline import live_edges, outline_of
 from engine.collision.planar.outline_batch import outline_parts
-from engine.collision.result import BODIES, MESHES, OUTLINES, Parts, Poses, Work
+from engine.collision.result import BODIES, FACES, Parts, Poses, Work, meets_as
 from engine.collision.simple.against_ball import body_sphere_parts
 from engine.collision.simple.against_half_space import half_space_body_parts
 from engine.collision.simple.boundary import live_parts
@@ -84,11 +84,12 @@ def detail_of(first: Solid, second: Solid, poses: Poses, relation: Relation, wor
         return UNLESS_OVERLAPPING[relation]
     if poses[0] is not None and poses[0] == poses[1]:
         poses = None, None
-    function = PARTS.get((first.dimension, first.type, second.type))
+    one, other = meets_as(first), meets_as(second)
+    function = PARTS.get((first.dimension, one, other))
     if function is not None:
         parts = function(first, second, poses, work)
     else:
-        function = PARTS[first.dimension, second.type, first.type]
+        function = PARTS[first.dimension, other, one]
         parts = function(second, first, poses[::-1], work).swapped()
     if parts.first:
         return Rcc8.PO if parts.second else (Rcc8.TPPI if parts.meet else Rcc8.NTPPI)
@@ -136,8 +137,8 @@ def _half_space_sphere(space: HalfSpace, ball: Sphere, poses: Poses, work: Work)
 
 
 PARTS: dict[tuple[int, str, str], PartsFunction] = {
-    **{(3, first, second): mesh_parts for first in MESHES for second in MESHES},
-    **{(2, first, second): outline_parts for first in OUTLINES for second in OUTLINES},
+    **{(3, first, second): mesh_parts for first in FACES[3] for second in FACES[3]},
+    **{(2, first, second): outline_parts for first in FACES[2] for second in FACES[2]},
     **{(d, "half_space", body): half_space_body_parts for d, body in BODIES},
     **{(d, body, "sphere"): body_sphere_parts for d, body in BODIES},
 }

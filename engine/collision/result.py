@@ -12,7 +12,9 @@ from typing import Any, Literal, NamedTuple
 
 from engine.arrays import FloatArray
 from engine.budget import UNLIMITED, Budget
+from engine.solids.base import Solid
 from engine.solids.pose import Pose
+from engine.solids.registry import row_of
 from engine.types import Rcc8, Relation
 
 Kind = Literal[
@@ -73,10 +75,20 @@ class Collision:
         return Collision(SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
 
 
-MESHES = ("polyhedron", "surface", "aabb")
-OUTLINES = ("polygon", "triangle", "aabb")
-BODIES = [(3, mesh) for mesh in MESHES] + [(2, outline) for outline in OUTLINES]
-"""Types with faces and with edges, and of both the dimension and the type."""
+FACES = {3: ("mesh", "box"), 2: ("outline", "box")}
+"""By dimension, as what bodies with faces or edges meet others (`Row.meets`)."""
+BODIES = [(d, kind) for d, kinds in FACES.items() for kind in kinds]
+
+
+def meets_as(solid: Solid) -> str:
+    """Return as what a solid meets others, nothing where it is not taken."""
+    return row_of(solid).meets.get(solid.dimension, "")
+
+
+def has_faces(solid: Solid) -> bool:
+    """Tell whether a solid is met by its faces, or its edges in the plane."""
+    return meets_as(solid) in FACES[solid.dimension]
+
 
 RELATIONS = tuple(Relation)
 UNNAMED = tuple(map(Collision, RELATIONS))

@@ -16,6 +16,7 @@ import numpy as np
 from engine.arrays import FloatArray
 from engine.errors import UnsupportedSolidError
 from engine.solids.base import Solid
+from engine.solids.mesh import Mesh
 
 Where = tuple[str | int, ...]
 Box = tuple[FloatArray, FloatArray, float]
@@ -64,7 +65,8 @@ class Row:
     planes: Callable[[Any, Any], Any] | None = None
     """(solid, check) -> the integer rows that polygons are clipped by."""
     meets: Mapping[int, str] = field(default_factory=dict)
-    """By dimension, as what it collides: mesh, outline, sphere or half_space."""
+    """By dimension, as what it meets others: mesh (a `Mesh`), outline (with vertices and ring_offsets, as a polygon),
+    box, sphere or half_space."""
 
     @property
     def name(self) -> str:
@@ -82,6 +84,8 @@ def register(row: Row) -> None:
     """Add a row. Raises: ValueError where its name or its class has one."""
     if row.name in _ROWS or row.solid in _BY_CLASS:
         raise ValueError(f"there is a row for {row.name} already")
+    if "mesh" in row.meets.values() and not issubclass(row.solid, Mesh):
+        raise ValueError(f"a {row.name} meets others as a mesh, so its class must be a Mesh")
     _ROWS[row.name] = _BY_CLASS[row.solid] = row
 
 

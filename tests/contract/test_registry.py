@@ -63,6 +63,15 @@ def test_a_type_has_one_row() -> None:
         registry.register(registry.Row(solid=engine.Sphere, about=""))
 
 
+def test_a_mesh_is_a_mesh() -> None:
+    class Sponge(engine.Solid):
+        __slots__ = ()
+        type = "sponge"
+
+    with pytest.raises(ValueError, match="must be a Mesh"):
+        registry.register(registry.Row(solid=Sponge, about="", meets={3: "mesh"}))
+
+
 def test_every_public_solid_has_a_row() -> None:
     named = {value for value in vars(engine).values() if isinstance(value, type) and issubclass(value, engine.Solid)}
     assert {row.solid for row in engine.solid_types.values()} == named - {engine.Solid}

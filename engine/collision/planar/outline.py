@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,6 @@ from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
-from engine.solids.triangle import Triangle
 from engine.types import Location, Relation
 
 Point = tuple[Fraction, ...]
@@ -91,14 +90,13 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     return Outline(points, ends, low, high, floats, pose is not None)
 
 
-def rings_of(body: Solid) -> tuple[FloatArray, IntArray]:
+def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
     if isinstance(body, Polygon):
         body.check_not_empty()
-    if isinstance(body, (Polygon, Triangle)):
-        return body.vertices, body.ring_offsets
-    assert isinstance(body, Aabb)
-    (x0, y0), (x1, y1) = body.min, body.max
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])
+    if isinstance(body, Aabb):
+        (x0, y0), (x1, y1) = body.min, body.max
+        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])
+    return body.vertices, body.ring_offsets
 
 
 def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangement, list[list[int]]]:

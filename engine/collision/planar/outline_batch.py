@@ -23,7 +23,6 @@ from engine.collision.planar.outline import collide_outline_outline, parts_by_ar
 from engine.collision.planar.sectors import IN_BOTH, OUT_OF_FIRST, OUT_OF_SECOND, at_contact, is_in_box
 from engine.collision.result import (
     FIRST_WITHIN,
-    OUTLINES,
     RELATIONS,
     SECOND_WITHIN,
     UNNAMED,
@@ -33,6 +32,7 @@ from engine.collision.result import (
     Poses,
     Witness,
     Work,
+    has_faces,
 )
 from engine.direct import entry_of
 from engine.jit import allocating_kernel, inline, kernel
@@ -69,7 +69,7 @@ within its body; sides (n,): as `find_sides` does; firsts (n_bodies + 1,): of ea
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     """Return the bodies as arrays, and for each its number there, -1 for one that the batches do not take."""
-    outlines = [outline_arrays(body) if body.type in OUTLINES else _NONE for body in bodies]
+    outlines = [outline_arrays(body) if has_faces(body) else _NONE for body in bodies]
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _, _ in outlines]))
     vertices, following, sides = map(np.concatenate, zip(_NONE, *outlines))
     numbers = [

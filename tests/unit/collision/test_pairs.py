@@ -6,7 +6,9 @@ import random
 
 import pytest
 
+import engine
 from engine.collision.collide import PAIRS, TAKEN, pair_function
+from engine.collision.result import meets_as
 from tests.unit.collision import lattices
 
 MAKERS = {
@@ -20,9 +22,10 @@ def test_every_pair_has_one_function(d: int) -> None:
     rng = random.Random(d)
     bodies = {name: lattices.solid(getattr(lattices, name)(rng, d)) for name in MAKERS[d]}
     assert ", ".join(bodies) == TAKEN[d]
+    assert {*bodies} == {row.name for row in engine.solid_types.values() if d in row.meets}
     for first in bodies.values():
         for second in bodies.values():
             function, is_swapped = pair_function(first, second)
-            types = (second.type, first.type) if is_swapped else (first.type, second.type)
-            assert PAIRS[d, *types] is function
+            kinds = (second, first) if is_swapped else (first, second)
+            assert PAIRS[d, *map(meets_as, kinds)] is function
             assert is_swapped or pair_function(second, first)[0] is function or first.type == second.type
