@@ -140,26 +140,40 @@ class _Guest:
     @asynccontextmanager
     async def lifespan(self, app: FastAPI) -> AsyncIterator[None]:
         """Start with the application, end with it."""
-        async with _running(self._started(app)):
+        state = self._started(app)
+        if hasattr(state, "pool") and not state.is_ending:  # the router was included twice: the first ends it
+            yield
+            return
+        async with _running(state):
             yield
 
     async def start_once(self, request: Request) -> None:
         """Start with the first request where nobody runs the application's lifespan."""
-        if not hasattr(request.app.state, "geometry"):
-            state = self._started(request.app)
+        state = self._started(request.app)
+        if not hasattr(state, "pool"):
             warming = _start(state)
             atexit.register(_end, state, warming)
 
     def _started(self, app: FastAPI) -> State:
-        state = app.state.geometry = State()
+        """Return what the calls share in `app`; what has ended is made again."""
+        state: State = getattr(app.state, "geometry", None) or State({"guest": self, "is_ending": True})
+        if state.guest is not self:
+            raise RuntimeError(
+                "this application has two service routers, and would answer by the settings of one: include one twice, "
+                "or mount an application of its own for the second: app.mount(path, FastAPI())"
+            )
+        if not state.is_ending:
+            return state
+        state = app.state.geometry = State({"guest": self})
         _prepare(state, self._settings, owns_process=False)
-        make = app.openapi
+        make = getattr(app.openapi, "made_by", app.openapi)
 
         def document() -> dict[str, Any]:
             if app.openapi_schema is None:
                 app.openapi_schema = completed(make(), self._settings)
             return app.openapi_schema
 
+        document.made_by = make  # type: ignore[attr-defined]
         app.openapi_schema, app.openapi = None, document  # type: ignore[method-assign]
         return state
 

@@ -16,6 +16,7 @@ from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from functools import cached_property
 from typing import Any, Final
+from urllib.parse import quote
 
 import numpy as np
 from fastapi import routing
@@ -40,6 +41,8 @@ log = logging.getLogger("service")
 LEAST_COMPRESSED: Final = 2**14
 """Bytes from which an answer is compressed for those who take it so."""
 _CODING: Final = re.compile(rb"([a-z0-9*-]+)\s*(?:;\s*q=([01](?:\.\d{0,3})?))?\s*(?:,|$)")
+_OF_BODY: Final = (b"content-length", b"content-type")
+"""Headers that are not a dependency's."""
 Part = bytes | memoryview
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
 Answer = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -90,18 +93,19 @@ class GeometryRoute(APIRoute):
         guard = _guard_of(self)
 
         async def handle(request: Request) -> Response:
-            if guard is not None:
-                await guard(request)
+            given = [] if guard is None else (await guard(request)).raw_headers
             state = state_of(request.app)
             call = Call(state.settings, state.store, state.memory)
+            call.path = _path_of(request)
             response = None
             try:
                 response = await answer(request, call)
             finally:
                 if not isinstance(response, _Answer):  # it ended early, and what it held is gone
                     call.free()
+            response.raw_headers += [header for header in given if header[0] not in _OF_BODY]
             operation = self.operation_id or self.name
-            state_of(request.app).metrics.count(operation, response.status_code, call.seconds)
+            state.metrics.count(operation, response.status_code, call.seconds)
             traces.note(operation, call.seconds)
             return response
 
@@ -166,6 +170,12 @@ def _receive_of(request: Request) -> Receive:
         return {"type": "http.request", "body": known}
 
     return receive
+
+
+def _path_of(request: Request) -> str:
+    """Return the path that the client asked for, as it stands in a URL."""
+    root, path = request.scope.get("root_path", ""), request.scope["path"]
+    return quote(path if path.startswith(root) else root + path)
 
 
 def _nothing() -> None:

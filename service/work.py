@@ -71,7 +71,7 @@ class Call(Cancel):
 
     __slots__ = (
         "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead",
-        "is_light", "may_wait", "media_type", "seconds", "settings", "status", "store",
+        "is_light", "may_wait", "media_type", "path", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
@@ -90,6 +90,7 @@ class Call(Cancel):
         self.may_wait = False  # on the event loop it would hold up everybody
         self.start_clock()
         self.seconds = dict.fromkeys(PHASES, 0.0)
+        self.path = ""  # where the request asks
         self.status: int | None = None
         self.headers: dict[str, str] = {}
 

@@ -75,4 +75,4 @@ def import_solid(question: Octets, format: Format, call: CallOf, type: MeshType 
     """Keep a mesh from a file, vertices at equal coordinates merged, as `POST /v1/solids` keeps a solid. It must be
     closed unless it is to be a surface. Polygons are cut into triangles."""
     solid, n_collapsed = octets.to_solid(question, format, type, call)
-    return answers.from_stored(put(solid, "solids", call), solid, n_collapsed or None)
+    return answers.from_stored(put(solid, call), solid, n_collapsed or None)

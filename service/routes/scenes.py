@@ -49,7 +49,7 @@ def put_scene(question: SceneModel, call: CallOf) -> StoredSceneSummary:
     """Keep a scene, so that later questions can name it and find it prepared. The same bodies in the same places have
     the same id everywhere; it may leave the store when others need the room."""
     scene = convert.to_scene(question.bodies, call)
-    return convert.from_stored(put(scene, "scenes", call), scene)
+    return convert.from_stored(put(scene, call), scene)
 
 
 @lookup.get("/v1/scenes/{scene_id}", operation_id="get_scene", responses=KNOWN)

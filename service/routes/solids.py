@@ -33,14 +33,14 @@ def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same
     id everywhere; it may leave the store when others need the room."""
     solid = questions.to_solid(question, call, ())
-    return answers.from_stored(put(solid, "solids", call), solid)
+    return answers.from_stored(put(solid, call), solid)
 
 
-def put(value: Kept, kind: str, call: Call) -> str:
+def put(value: Kept, call: Call) -> str:
     """Put a solid or a scene into the store, say so, and return its name."""
     name, is_new = call.store.put(value)
     call.status = 201 if is_new else 200
-    call.headers.update({"Location": f"{call.settings.root_path}/v1/{kind}/{name}", "ETag": f'"{name}"'})
+    call.headers.update({"Location": f"{call.path.removesuffix('/import')}/{name}", "ETag": f'"{name}"'})
     return name
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import httpx
 import pytest
-from fastapi import Depends, FastAPI, Header, HTTPException, Request
+from fastapi import Depends, FastAPI, Header, HTTPException, Request, Response
 
 import engine
 import service
@@ -133,3 +133,64 @@ async def test_a_mounted_application_starts_with_its_first_request(
             assert answer.json()["contained"] == [True, False]
         assert (await client.get("/geometry/readyz")).status_code == 200
         assert "x-limit" not in json.dumps((await client.get("/geometry/openapi.json")).json())
+
+
+@pytest.mark.parametrize("how", ["prefix", "mount", "root_path", "prefix of letters"])
+async def test_location_is_where_the_host_has_the_calls(host: FastAPI, anyio_backend: str, how: str) -> None:
+    """It left out the host's prefix, and what it named was not there."""
+    app, before = host, "/geo métrie 日本" if how == "prefix of letters" else "/geo"
+    if how == "mount":
+        app = FastAPI()
+        app.mount("/geo", host)
+    elif how == "root_path":  # which a proxy takes off
+        host.root_path = "/geo"
+    host.include_router(service.router(Settings()), prefix=before if how.startswith("prefix") else "")
+    async with app.router.lifespan_context(app):
+        client, asked = client_of(app), "" if how == "root_path" else before
+        answer = await client.post(f"{asked}/v1/solids", json=SPHERE)
+        place = answer.headers["location"]
+        assert place.startswith("/geo")
+        assert (await client.get(place.removeprefix("/geo" if how == "root_path" else ""))).json() == answer.json()
+        scene = await client.post(f"{asked}/v1/scenes", json={"bodies": [{"solid": SPHERE}]})
+        assert scene.headers["location"].endswith(f"/v1/scenes/{scene.json()['id']}")
+
+
+async def test_headers_of_the_hosts_dependencies_are_sent(host: FastAPI, anyio_backend: str) -> None:
+    def count(response: Response) -> None:
+        response.headers["X-Rate"] = "1"
+
+    host.include_router(service.router(Settings()), dependencies=[Depends(count)])
+    async with host.router.lifespan_context(host):
+        for body in (QUESTION, {}, {"solid": SPHERE, "points": [[0, 0, 0]] * 3000}):
+            answer = await client_of(host).post("/v1/contains", json=body)
+            assert answer.headers.get_list("x-rate") == ["1"]
+            assert len(answer.headers.get_list("content-length")) == 1
+
+
+@pytest.mark.parametrize("has_lifespan", [True, False])
+async def test_two_routers_in_one_application_are_refused(
+    host: FastAPI, anyio_backend: str, has_lifespan: bool
+) -> None:
+    """The settings of the last counted for both."""
+    host.include_router(service.router(Settings(max_points=1)), prefix="/a")
+    host.include_router(service.router(Settings()), prefix="/b")
+    if has_lifespan:
+        with pytest.raises(RuntimeError, match="two service routers"):
+            async with host.router.lifespan_context(host):
+                pass
+    else:
+        assert (await client_of(host).post("/a/v1/contains", json=QUESTION)).status_code == 422
+        with pytest.raises(RuntimeError, match="two service routers"):
+            await client_of(host).post("/b/v1/contains", json=QUESTION)
+
+
+async def test_one_router_may_stand_in_two_places_and_start_again(host: FastAPI, anyio_backend: str) -> None:
+    router = service.router(Settings(max_points=3))
+    for prefix in ("/a", "/b"):
+        host.include_router(router, prefix=prefix)
+    many = {"solid": SPHERE, "points": [[0, 0, 0]] * 3}
+    for _ in range(2):
+        async with host.router.lifespan_context(host):
+            for prefix in ("/a", "/b"):
+                answer = await client_of(host).post(f"{prefix}/v1/contains", json=many)
+                assert answer.json()["contained"] == [True] * 3
