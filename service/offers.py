@@ -44,7 +44,7 @@ class Parser:
 
     def _parse_again(self) -> None:
         protocol, method = self._protocol, self._parser.get_method()
-        lines = [method + b" " + protocol.url + b" HTTP/1.1"]
+        lines = [method + b" " + protocol.url + b" HTTP/" + self._parser.get_http_version().encode()]
         lines += [name + b": " + value for name, value in protocol.headers if name not in _OFFER]
         if not self._parser.should_keep_alive():
             lines.append(b"connection: close")

@@ -132,19 +132,20 @@ async def test_bodies_may_be_compressed(client: httpx.AsyncClient, pack: Any) ->
     assert answer.content == b"\1" * 5
 
 
-async def test_a_gzip_body_may_have_several_members(client: httpx.AsyncClient) -> None:
-    """RFC 1952, 2.2: as `cat a.gz b.gz` makes them, and tools that compress in blocks."""
-    headers = {**JSON, "Content-Encoding": "gzip"}
+@pytest.mark.parametrize("pack", [gzip.compress, zstandard.compress], ids=["gzip", "zstd"])
+async def test_a_body_may_have_several_members_or_frames(client: httpx.AsyncClient, pack: Any) -> None:
+    """RFC 1952, 2.2, RFC 8878, 3.1: as `cat a.gz b.gz` makes them, and tools that compress in blocks."""
+    headers = {**JSON, "Content-Encoding": "gzip" if pack is gzip.compress else "zstd"}
     body = json.dumps({"solid": SPHERE, "points": [[0, 0, 0]] * 20_000}).encode()
-    members = [gzip.compress(body[start : start + 50_000]) for start in range(0, len(body), 50_000)]
-    members[1:1] = [gzip.compress(b"")] * 5_000
-    members += [gzip.compress(bytes([byte])) for byte in b" " * 5_000]
+    members = [pack(body[start : start + 50_000]) for start in range(0, len(body), 50_000)]
+    members[1:1] = [pack(b"")] * 5_000
+    members += [pack(bytes([byte])) for byte in b" " * 5_000]
     whole = b"".join(members)
     answer = await client.post("/v1/contains", content=whole, headers=headers)
     assert answer.json()["contained"] == [True] * 20_000
-    for wrong in (whole[:-5], whole + b"junk", whole + b"\x1f", whole + gzip.compress(b"")[:12]):
+    for wrong in (whole[:-5], whole + b"junk", whole + b"\x1f", whole + pack(b"some text")[:12]):
         check_problem(await client.post("/v1/contains", content=wrong, headers=headers), 400, "bad_request")
-    bomb = gzip.compress(b" " * 2**18) * 2**6
+    bomb = pack(b" " * 2**18) * 2**6
     check_problem(await client.post("/v1/contains", content=bomb, headers=headers), 413, "body_too_large")
 
 

@@ -162,6 +162,7 @@ async def test_what_rows_copy_is_counted_before_it_is_copied(
     ("path", "place", "member"),
     [
         ("overlay", "/left/features/0/id", "NaN"),
+        ("union", "/layer/features/0/id", "NaN"),
         ("overlay", "/left/crs/a", "-Infinity"),
         ("union", "/layer/features/0/properties/a/0", "1e400"),
         ("contains", "/points/features/0/id", "Infinity"),
