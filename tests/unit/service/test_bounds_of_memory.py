@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import gzip
 import json
-from collections.abc import AsyncIterator
+import tracemalloc
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import httpx
@@ -70,6 +71,42 @@ async def test_large_answers_are_refused_before_they_are_there(
         assert any(word in detail for word in ("fewer", "split", "window"))
         with app.state.memory.lock:
             assert app.state.memory.taken == app.state.memory.leaving
+
+
+class Ledger(engine.Cancel):
+    """Hears what a call is about to hold."""
+
+    taken = 0
+
+    def take(self, n_bytes: int) -> None:
+        self.taken += n_bytes
+
+
+def peak_of(ask: Callable[[Ledger], object]) -> tuple[int, int]:
+    """Return how many bytes a call held at most, and how many it counted."""
+    ask(Ledger())  # compiled, prepared
+    ledger = Ledger()
+    tracemalloc.start()
+    try:
+        ask(ledger)
+        return tracemalloc.get_traced_memory()[1], ledger.taken
+    finally:
+        tracemalloc.stop()
+
+
+def test_what_the_engine_holds_for_a_question_is_counted() -> None:
+    """Pairs that are named, vertices in a smallest sphere and points in many bodies are copied several times."""
+    ball, turns = engine.Sphere([0, 0, 0], 1), np.linspace(0, 6, 50_000)
+    pairs = np.array([[0, 1]] * 200_000)
+    rings = iter([engine.Polygon([np.stack([np.cos(turns), np.sin(turns)], axis=1)]) for _ in range(2)])
+    for ask in (
+        lambda ledger: engine.collide_scene([ball] * 3, only=pairs, workers=1, cancel=ledger),
+        lambda ledger: engine.collide_scene([ball] * 3, skip=pairs, workers=1, cancel=ledger),
+        lambda ledger: engine.bounds(next(rings), cancel=ledger),
+        lambda ledger: engine.locate_scene(np.zeros((2_000, 3)), [ball] * 100, workers=1, cancel=ledger),
+    ):
+        held, counted = peak_of(ask)
+        assert 10**6 < held < 1.1 * counted, (held, counted)
 
 
 async def test_what_others_hold_is_not_given_twice(app: FastAPI, anyio_backend: str) -> None:
