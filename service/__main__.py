@@ -1,23 +1,61 @@
-"""`python -m service`: starts uvicorn with the settings, each of which is a flag too."""
+"""`python -m service`: starts uvicorn with the settings, each of which is a flag too, and writes logs."""
 
 from __future__ import annotations
 
 import argparse
 import gc
 import ipaddress
+import logging
 import logging.config
 import os
 import signal
 import sys
 import tempfile
+import time
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NoReturn
 
+import orjson
 from pydantic import ValidationError
 
-from service import logs
 from service.settings import Settings
+
+
+class JsonFormatter(logging.Formatter):
+    """Writes time, level, logger and message, and the fields that a record brings along."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line."""
+        line: dict[str, Any] = {
+            "time": f"{_second(int(record.created))}.{int(record.msecs):03d}Z",
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **getattr(record, "fields", {}),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return orjson.dumps(line, default=str).decode()
+
+
+@lru_cache(2)
+def _second(moment: int) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(moment))
+
+
+def config_of(level: str) -> dict[str, Any]:
+    """Return the configuration for `logging.config.dictConfig`; worker processes set it up anew."""
+    own = {"handlers": ["stderr"], "level": level.upper(), "propagate": False}
+    return {
+        "version": 1,
+        "disable_existing_loggers": False,
+        "formatters": {"json": {"()": "service.__main__.JsonFormatter"}},
+        "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+        "loggers": {"engine": own, "service": own, "uvicorn": own},
+    }
+
 
 log = logging.getLogger("service")
 
@@ -38,7 +76,7 @@ def main(arguments: list[str] | None = None) -> None:
         )
     except OSError as error:
         _refuse(f"{_variable('store_folder')}={settings.store_folder}: {error.strerror or error}")
-    config = logs.config_of(settings.log_level)
+    config = config_of(settings.log_level)
     logging.config.dictConfig(config)
     # uvicorn drains, restores these handlers and raises the signal again: that must end in 0, not in a kill
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

@@ -20,29 +20,15 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 import engine
-from service import traces
+from service import pages, traces
 from service.errors import faults_of, http_fault, problem
 from service.gate import Gate
 from service.memory import Memory
 from service.metrics import Metrics
 from service.openapi import completed, openapi_of
-from service.pages import add_pages
 from service.process import freeze
 from service.route import posts_of
-from service.routes import (
-    binary,
-    bounds,
-    clearance,
-    clipping,
-    collision,
-    compare,
-    containment,
-    health,
-    layers,
-    overlay,
-    scenes,
-    solids,
-)
+from service.routes import questions, stored
 from service.settings import WARM_UP, Settings
 from service.store import Store
 from service.tools import add_tools, running
@@ -51,11 +37,12 @@ from service.work import Pool
 log = logging.getLogger("service")
 
 ROUTERS: Final = (
-    *(module.router for module in (containment, collision, clearance, clipping, overlay, layers, bounds, compare)),
-    *(module.router for module in (solids, scenes, binary, health)),
-    solids.lookup,
-    scenes.lookup,
-    scenes.binary,
+    questions.router,
+    stored.router,
+    stored.binary,
+    pages.router,
+    stored.lookup,
+    stored.scene_binary,
 )
 END_SECONDS: Final = 0.7
 """How long a service that ends waits for its threads, which look at their switch, and then for its warm-up, which looks
@@ -84,7 +71,7 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
     for router in ROUTERS:
         app.include_router(router)
-    add_pages(app)
+    pages.add_pages(app)
     app.state.tools = add_tools(app, settings, ROUTERS)
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx
 import pytest
 
-from service.schemas.bounds import BoundsResponse
+from service.schemas.points import BoundsResponse
 from tests.unit.service.asking import check_problem
 
 pytestmark = pytest.mark.anyio

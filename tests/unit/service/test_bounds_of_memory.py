@@ -17,7 +17,7 @@ from fastapi import FastAPI
 
 import engine
 from service import wire
-from service.schemas.containment import ContainsSceneResponse
+from service.schemas.points import ContainsSceneResponse
 from service.work import SMALL
 from tests.unit.service.asking import SPHERE, check_problem, client_of
 

@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas.compare import CompareResponse
+from service.schemas.points import CompareResponse
 from tests.unit.service.asking import check_problem
 
 pytestmark = pytest.mark.anyio

@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas.containment import ContainsResponse, ContainsSceneResponse
+from service.schemas.points import ContainsResponse, ContainsSceneResponse
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio

@@ -19,9 +19,8 @@ import pytest
 import engine
 from engine.solids import registry
 from service import mesh_reader
-from service.disk import Folder
 from service.errors import ServiceError
-from service.store import Store, solid_id
+from service.store import Folder, Store, solid_id
 from tests.unit.service.test_store import SOLIDS, sphere
 
 

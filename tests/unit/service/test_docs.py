@@ -7,7 +7,7 @@ import re
 import httpx
 import pytest
 
-from service.schemas.scenes import SCENE_ID
+from service.schemas.bodies import SCENE_ID
 from tests.unit.service.asking import examples
 
 pytestmark = pytest.mark.anyio

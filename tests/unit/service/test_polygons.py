@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas.polygons import ClipPolygonsResponse
+from service.schemas.clipping import ClipPolygonsResponse
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio

@@ -5,7 +5,7 @@ from __future__ import annotations
 import httpx
 import pytest
 
-from service.schemas.segments import ClipLinesResponse, ClipSegmentsResponse
+from service.schemas.clipping import ClipLinesResponse, ClipSegmentsResponse
 from tests.unit.service.asking import check_problem
 
 pytestmark = pytest.mark.anyio

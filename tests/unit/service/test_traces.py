@@ -13,7 +13,7 @@ import time
 import httpx
 import pytest
 
-from service.logs import JsonFormatter
+from service.__main__ import JsonFormatter
 from service.traces import trace_of
 from tests.unit.service.asking import SPHERE
 from tests.unit.service.test_live import Service
