@@ -15,12 +15,20 @@ import time
 from contextlib import ExitStack
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import orjson
 from pydantic import ValidationError
 
 from service.settings import Settings
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
+
+log = logging.getLogger("service")
+SWITCH_SECONDS: Final = 0.0002
+"""How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
+with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
 
 
 class JsonFormatter(logging.Formatter):
@@ -57,12 +65,9 @@ def config_of(level: str) -> dict[str, Any]:
     }
 
 
-log = logging.getLogger("service")
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Serve until SIGTERM or SIGINT, finish what is under way, exit with 0."""
-    gc.disable()  # while modules are imported (process.py): an eighth of the time until ready
+    gc.disable()  # while modules are imported (`create_app`): an eighth of the time until ready
     _take_flags(sys.argv[1:] if arguments is None else arguments)
     try:
         settings = Settings()
@@ -101,6 +106,19 @@ def main(arguments: list[str] | None = None) -> None:
         _serve(settings, config, stack)
 
 
+def create_app() -> FastAPI:
+    """Return the service for a process that is all its own: nowhere else is a process changed."""
+    from service.app import create_app
+    from service.memory import configure_malloc
+
+    gc.enable()  # all is imported (`main`)
+    configure_malloc()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    # what the lines leave out need not be looked up for each of them: it takes as long as writing the line
+    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
+    return create_app(owns_process=True)
+
+
 def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> None:
     """Serve until a signal comes; stack: what is to be cleaned up at the end."""
     import uvicorn
@@ -109,7 +127,7 @@ def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> 
     from service.server import HEALTH_SECONDS, Server, Supervisor
 
     config = uvicorn.Config(
-        "service.process:create_app",
+        "service.__main__:create_app",
         factory=True,
         host=settings.host,
         port=settings.port,

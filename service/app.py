@@ -18,20 +18,20 @@ from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.routing import Route
 
 import engine
 from service import pages, traces
 from service.errors import faults_of, http_fault, problem
 from service.gate import Gate
-from service.memory import Memory
+from service.memory import Memory, freeze
 from service.metrics import Metrics
 from service.openapi import completed, openapi_of
-from service.process import freeze
 from service.route import posts_of
 from service.routes import questions, stored
 from service.settings import WARM_UP, Settings
 from service.store import Store
-from service.tools import add_tools, running
+from service.tools import PATH, Tools
 from service.work import Pool
 
 log = logging.getLogger("service")
@@ -44,6 +44,7 @@ ROUTERS: Final = (
     stored.lookup,
     stored.scene_binary,
 )
+_SHOWN: Final = "ETag, Geometry-Accuracy, Location, Retry-After, Server-Timing, Traceresponse, X-Request-ID"
 END_SECONDS: Final = 0.7
 """How long a service that ends waits for its threads, which look at their switch, and then for its warm-up, which looks
 between two parts whether it is still wanted."""
@@ -56,7 +57,7 @@ object and the header `Server-Timing` (decode, prepare, compute, encode). Errors
 
 
 def create_app(settings: Settings | None = None, owns_process: bool = False) -> FastAPI:
-    """Return the service as an ASGI application; owns_process: whether nothing else lives there (process.py)."""
+    """Return the service as an ASGI application; owns_process: whether nothing else lives there (`__main__`)."""
     settings = settings or Settings()
     app = FastAPI(
         title="exact-geometry",
@@ -72,7 +73,8 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
     for router in ROUTERS:
         app.include_router(router)
     pages.add_pages(app)
-    app.state.tools = add_tools(app, settings, ROUTERS)
+    app.state.tools = Tools(app, settings, ROUTERS)
+    app.router.routes.append(Route(PATH, app.state.tools, methods=["POST"], include_in_schema=False))
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
     app.add_middleware(Gate, settings=settings, posts=posts_of(ROUTERS), metrics=app.state.metrics)
@@ -82,15 +84,7 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
             allow_origins=list(settings.cors_origins),
             allow_methods=["GET", "HEAD", "POST"],
             allow_headers=["Authorization", "Content-Type", "Traceparent", "X-API-Key", "X-Request-ID"],
-            expose_headers=[
-                "ETag",
-                "Geometry-Accuracy",
-                "Location",
-                "Retry-After",
-                "Server-Timing",
-                "Traceresponse",
-                "X-Request-ID",
-            ],
+            expose_headers=[_SHOWN],
         )
     traces.export(app)
     return app
@@ -177,7 +171,7 @@ def _prepare(state: State, settings: Settings, owns_process: bool) -> None:
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    async with _running(app.state), running(app.state.tools):
+    async with _running(app.state), app.state.tools:
         yield
 
 

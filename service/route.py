@@ -14,6 +14,7 @@ import logging
 import re
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 from urllib.parse import quote
@@ -192,28 +193,21 @@ def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
     }
 
 
+@dataclass(slots=True)
 class _Job:
     """The steps of one request that need no event loop."""
 
-    def __init__(
-        self,
-        endpoint: Callable[..., Any],
-        adapter: TypeAdapter[Any] | None,
-        arguments: dict[str, Any],
-        call: Call,
-        takes_body: bool,
-    ) -> None:
-        self.endpoint = endpoint
-        self.takes_body = takes_body
-        self.adapter = adapter
-        self.body: Body = b""
-        self.coding: str | None = None
-        self.arguments = arguments
-        self.call = call
-        self.question: Any = None
-        self.document: Any = None
-        """A body that was decoded elsewhere, or is long: it is let go of in steps."""
-        self.finish: Callable[[Any], Iterable[Part]] = self._encoded
+    endpoint: Callable[..., Any]
+    adapter: TypeAdapter[Any] | None
+    arguments: dict[str, Any]
+    call: Call
+    takes_body: bool
+    body: Body = b""
+    coding: str | None = None
+    question: Any = None
+    document: Any = None
+    """A body that was decoded elsewhere, or is long: it is let go of in steps."""
+    finish: Callable[[Any], Iterable[Part]] | None = None
 
     def decode(self) -> None:
         """Turn the body into the endpoint's model, and let go of it."""
@@ -253,7 +247,7 @@ class _Job:
             if answer is None:
                 return []
             with call.phase("encode"):
-                return self._gathered(self.finish(answer))
+                return self._gathered((self.finish or self._encoded)(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
             forget_frames(error)

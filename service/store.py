@@ -3,16 +3,13 @@
 The store holds engine objects, so structures prepared for one request serve the next. The name of a solid is a hash
 over a version tag, its type and its arrays as little-endian bytes, each with its shape: equal input has equal names in
 every process, so replicas agree without talking. -0.0 is 0.0 (the engine made it so), a CSG tree hashes the names of
-its operands, a scene
-those of its solids, and the poses of its bodies.
+its operands, a scene those of its solids, and the poses of its bodies.
 
-With a folder the memory holds what was used last, and the folder more, for other processes and after a start.
-
-In the folder, which replicas may share over a common volume, a file is named by its solid and written under another
-name first, so that a name never leads to half a file. Since a name is a hash of the content, a file that was damaged
-all the same is found out when it is read: it is not served, and taken away. Files used longest ago leave when the
-folder grows beyond its budget. What the system refuses is told as what it is: `store_full`, or `store_unavailable`;
-what is no file, a pipe for example, is never waited for.
+With a folder, which replicas may share over a common volume, the memory holds what was used last, and the folder more.
+A file is named by its solid and written under another name first, so that a name never leads to half a file; one that
+was damaged all the same is known when it is read, since its name is a hash of the content: it is not served, and taken
+away. Files used longest ago leave when the folder grows beyond its budget. What the system refuses is `store_full`, or
+`store_unavailable`; what is no file, a pipe for example, is never waited for.
 """
 
 from __future__ import annotations
@@ -30,7 +27,7 @@ import tempfile
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -70,10 +67,9 @@ def _told(path: Path) -> Iterator[None]:
 class Folder:
     """Writes, reads and forgets files of solids; safe to share between threads and processes."""
 
-    def __init__(self, path: Path, budget: int, name_of: Callable[[Any], str]) -> None:
+    def __init__(self, path: Path, budget: int) -> None:
         self._path = path
         self._budget = budget
-        self._name_of = name_of
         self._written = 0  # bytes since the folder was last looked through
         self._lock = threading.Lock()
         path.mkdir(parents=True, exist_ok=True)
@@ -84,31 +80,29 @@ class Folder:
 
         Raises: `store_full`, `store_unavailable`.
         """
-        with _told(self._path):
-            return self._put(name, solid)
-
-    def _put(self, name: str, solid: Solid | Scene) -> bool:
         final = self._path / name
-        if self._touch(final):
-            return False
-        octets = to_octets(solid)
-        handle, partial = tempfile.mkstemp(_PARTIAL, name[:8], self._path)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(octets)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(partial, final)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.unlink(partial)
-            raise
-        self._sync()
+        with _told(self._path):
+            if self._touch(final):
+                return False
+            octets = to_octets(solid)
+            handle, partial = tempfile.mkstemp(_PARTIAL, name[:8], self._path)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(octets)
+                    file.flush()
+                    os.fsync(file.fileno())
+                os.replace(partial, final)
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    os.unlink(partial)
+                raise
+            self._sync()
         with self._lock:
             self._written += len(octets)
             is_time = self._written > self._budget // 16
         if is_time:
-            self._shrink()
+            with _told(self._path):
+                self._shrink()
         return True
 
     def get(self, name: str) -> Solid | Scene | None:
@@ -129,7 +123,7 @@ class Folder:
             raise
         except Exception as error:  # whatever damaged bytes lead to
             solid, reason = None, f"{type(error).__name__}: {error}"
-        if solid is None or self._name_of(solid) != name:
+        if solid is None or solid_id(solid) != name:
             log.warning(
                 "the file %s is damaged (%s) and taken away", path, reason if solid is None else "another solid"
             )
@@ -323,7 +317,7 @@ class Store:
     ) -> None:
         self._budget = budget
         self._metrics = metrics or Metrics()
-        self._folder = None if folder is None else Folder(folder, folder_budget, solid_id)
+        self._folder = None if folder is None else Folder(folder, folder_budget)
         self._solids: OrderedDict[str, Kept] = OrderedDict()
         self._sizes: dict[str, int] = {}
         self._looked: dict[str, int] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any, Final
 
@@ -125,16 +126,19 @@ def from_comparison(found: engine.Comparison, accuracy: engine.Accuracy) -> Comp
 def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> ClipSegmentsResponse:
     """Return the answer of `clip/segments`."""
     columns = (pieces.source, pieces.start, pieces.end, pieces.t, pieces.faces)
-
-    def some(start: int, stop: int) -> list[Any]:
-        return [
-            {"segment": source, "start": start, "end": end, "t": t, "faces": faces}
-            for source, start, end, t, faces in zip(*(column[start:stop].tolist() for column in columns))
-        ]
-
+    some = _rows(("segment", "start", "end", "t", "faces"), columns)
     return ClipSegmentsResponse.made(
         pieces=Series(len(pieces.source), some, weight=10), accuracy=from_accuracy(accuracy)
     )
+
+
+def _rows(names: tuple[str, ...], columns: Iterable[Any]) -> Callable[[int, int], list[Any]]:
+    """Return what makes some rows of arrays, each an object."""
+
+    def some(start: int, stop: int) -> list[Any]:
+        return [dict(zip(names, row)) for row in zip(*(column[start:stop].tolist() for column in columns))]
+
+    return some
 
 
 def from_line_pieces(pieces: engine.LinePieces, accuracy: engine.Accuracy) -> ClipLinesResponse:
@@ -280,12 +284,8 @@ def clipped_in_scene(scene: Scene, segments: Any, keep: Keep | None, call: Call)
     found, accuracy = call.compute(scene.clip_segments, segments, keep=keep or "all", retold=questions.tell_of_scene)
     if isinstance(found, np.ndarray):
         return ClipSegmentsSceneResponse.made(pieces=None, met=found, accuracy=from_accuracy(accuracy))
-    columns = [getattr(found, name) for name in ("source", "body", "start", "end", "t", "faces", "ranks")]
-
-    def some(start: int, stop: int) -> list[Any]:
-        names = ("segment", "body", "start", "end", "t", "faces", "ranks")
-        return [dict(zip(names, row)) for row in zip(*(column[start:stop].tolist() for column in columns))]
-
+    names = ("source", "body", "start", "end", "t", "faces", "ranks")
+    some = _rows(("segment", *names[1:]), [getattr(found, name) for name in names])
     return ClipSegmentsSceneResponse.made(
         pieces=Series(len(found), some, weight=12), met=None, accuracy=from_accuracy(accuracy)
     )

@@ -18,7 +18,7 @@ from service.schemas.bodies import Keep, Moved, MovedBody
 from service.schemas.clipping import ClipSegmentsRequest
 from service.schemas.points import BoundsRequest, ContainsRequest
 from service.schemas.solids import Body
-from service.work import Call, Where
+from service.work import Call, T, Where
 
 _LIGHT_SOLIDS: Final = ("half_space", "sphere", "aabb", "convex", "triangle")
 
@@ -75,7 +75,7 @@ class _Builder:
             raise ServiceError("too_deep", detail, where)
 
 
-def _checked(where: Where, build: Callable[[], Solid]) -> Solid:
+def _checked(where: Where, build: Callable[[], T]) -> T:
     try:
         return build()
     except EngineError as error:
@@ -112,12 +112,8 @@ def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[
 
 def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
     """Return the engine's pose for `model`, which stands at `where` in the request."""
-    try:
-        if model.tolerance is None:
-            return engine.Pose(model.rotation, model.translation)
-        return engine.Pose(model.rotation, model.translation, tolerance=model.tolerance)
-    except EngineError as error:
-        raise error.at(*where) from None
+    given = {} if model.tolerance is None else {"tolerance": model.tolerance}
+    return _checked(where, lambda: engine.Pose(model.rotation, model.translation, **given))
 
 
 def to_poses(models: list[solids.RigidPose], dimension: int) -> tuple[Any, Any]:

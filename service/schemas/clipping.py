@@ -116,6 +116,8 @@ class ClipPolygonsResponse(Schema):
 LinearRing = Annotated[Array, Numbers(Axis(4, None), Axis(2, 2))]
 _SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 
+Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
+
 
 class OverlayRequest(Schema):
     """What is the intersection, union, difference or symmetric difference of these two polygons?"""
@@ -142,9 +144,7 @@ class OverlayRequest(Schema):
 
     subject: Solid = Field(description="A polygon.")
     clip: Solid = Field(description="A polygon.")
-    operation: Literal["intersection", "union", "difference", "symmetric_difference"] = Field(
-        description="How the two are combined; difference is the subject without the clip."
-    )
+    operation: Operation = Field(description="How the two are combined; difference is the subject without the clip.")
     area: bool = left_out("Compute the area; if left out, where it costs next to nothing: up to 100 vertices.")
     grid: Number = left_out(
         "Snap the result to multiples of this power of two or ten, so that borders that nearly coincide do; no edge "
@@ -168,7 +168,7 @@ class OverlayBatchRequest(Schema):
 
     subjects: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="Polygons.")
     clips: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="As many polygons, each for one subject.")
-    operation: Literal["intersection", "union", "difference", "symmetric_difference"] = Field(
+    operation: Operation = Field(
         description="How the two of each pair are combined; difference is the subject without the clip."
     )
 

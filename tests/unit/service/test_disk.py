@@ -56,7 +56,7 @@ def test_damaged_files_are_never_served(tmp_path: Path, caplog: pytest.LogCaptur
             at = source.randrange(len(octets))
             octets[at : at + 4] = source.randbytes(4)
         (tmp_path / name).write_bytes(octets)
-        found = Folder(tmp_path, 2**30, solid_id).get(name)
+        found = Folder(tmp_path, 2**30).get(name)
         assert (found is None) != (tmp_path / name).exists()
         if found is not None:
             served += 1  # bytes that mean nothing, such as times in the archive
@@ -120,7 +120,7 @@ def test_a_file_under_another_name_is_not_served(tmp_path: Path, caplog: pytest.
 
 
 def test_the_files_used_longest_ago_leave(tmp_path: Path) -> None:
-    folder = Folder(tmp_path, 2**40, solid_id)
+    folder = Folder(tmp_path, 2**40)
     names = [solid_id(sphere(x)) for x in range(6)]
     for x, name in enumerate(names):
         folder.put(name, sphere(x))
@@ -130,7 +130,7 @@ def test_the_files_used_longest_ago_leave(tmp_path: Path) -> None:
     os.utime(stale, (1, 1))
     assert folder.get(names[0])
     size = (tmp_path / names[0]).stat().st_size
-    Folder(tmp_path, 3 * size, solid_id)
+    Folder(tmp_path, 3 * size)
     assert {path.name for path in tmp_path.iterdir()} == {names[0], names[4], names[5]}
 
 
