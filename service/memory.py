@@ -14,7 +14,6 @@ import time
 from typing import Any, Final
 
 import engine
-from service.errors import ServiceError
 
 FOOTPRINT: Final = 4
 """Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
@@ -97,11 +96,3 @@ class Memory:
             self.taken -= taken
             self.leaving -= taken
             self.has_left.notify_all()
-
-    def refusal(self, size: int) -> ServiceError:
-        """Return what is said where there is no room for so many bytes more."""
-        detail = (
-            f"requests under way hold {self.taken} bytes, and {size} more would be too many; try again, send less at "
-            "once, or raise GEOMETRY_REQUEST_BYTES"
-        )
-        return ServiceError("out_of_memory", detail)

@@ -122,16 +122,12 @@ def _finished(node: Any, settings: Settings) -> Any:
     return done
 
 
-def _answers() -> dict[str, list[Any]]:
-    found: dict[str, list[Any]] = json.loads(ANSWERS.read_text("utf-8")) if ANSWERS.is_file() else {}
-    return found
-
-
 def _illustrate(made: dict[str, Any]) -> None:
     """Give every operation a line, every property a description and an example, its own or the first that an example of
     a model holds."""
     schemas = made["components"]["schemas"]
-    for name, answers in _answers().items():
+    known: dict[str, list[Any]] = json.loads(ANSWERS.read_text("utf-8")) if ANSWERS.is_file() else {}
+    for name, answers in known.items():
         if name in schemas:
             schemas[name].setdefault("examples", answers)
     for schema in schemas.values():

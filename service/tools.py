@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from importlib.util import find_spec
 from ipaddress import ip_address
@@ -137,7 +137,8 @@ class Tools:
         from mcp.server.streamable_http_manager import StreamableHTTPSessionManager
 
         document = self._app.openapi()
-        calls = {name: (path, operation) for name, path, operation in _calls(document)}
+        posts = [(path, item["post"]) for path, item in document["paths"].items() if "post" in item]
+        calls = {each["operationId"]: (path, each) for path, each in posts if JSON in each["requestBody"]["content"]}
         tools = [
             types.Tool(
                 name=name, description=_short(operation["description"]), input_schema=_input(path, operation, document)
@@ -254,12 +255,6 @@ def _replayed(text: bytes, gone: asyncio.Task[None]) -> Receive:
 
 def _count(value: Any) -> int | None:
     return value if type(value) is int and value >= 0 else None
-
-
-def _calls(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    for path, item in document["paths"].items():
-        if JSON in item.get("post", {}).get("requestBody", {}).get("content", {}):
-            yield item["post"]["operationId"], path, item["post"]
 
 
 def _parameters(path: str) -> list[str]:

@@ -130,7 +130,11 @@ class Call(Cancel):
             if self._taken + n_bytes > self._memory.limit:
                 raise self._too_large(self._memory.limit, "GEOMETRY_REQUEST_BYTES")
             if self._memory.taken + n_bytes > self._memory.limit:
-                raise self._memory.refusal(n_bytes)
+                raise ServiceError(
+                    "out_of_memory",
+                    f"requests under way hold {self._memory.taken} bytes, and {n_bytes} more would be too many; try "
+                    "again, send less at once, or raise GEOMETRY_REQUEST_BYTES",
+                )
 
     def take_part(self, part: Sized) -> None:
         """Account for a part of the answer; `answer_too_large` beyond its limit."""
