@@ -140,7 +140,8 @@ class GeometryRoute(APIRoute):
             except ClientDisconnect:
                 return Response(status_code=STATUS["bad_request"])  # nobody reads it
             except Exception as error:
-                return _failed(error, request)
+                faults = _faults_in(error, f"{request.method} {request.url.path}")
+                return problem(faults, getattr(error, "headers", None) or {})
 
         return handle
 
@@ -155,10 +156,8 @@ def _guard_of(route: APIRoute) -> Answer | None:
     if not effective.dependencies:
         return None
     provider = effective.dependency_overrides_provider
-    made = APIRoute(
-        effective.path, _nothing, dependencies=effective.dependencies, dependency_overrides_provider=provider
-    )
-    return made.get_route_handler()
+    given: Any = {"dependencies": effective.dependencies, "dependency_overrides_provider": provider}
+    return APIRoute(effective.path, lambda: None, **given).get_route_handler()
 
 
 def _receive_of(request: Request) -> Receive:
@@ -177,10 +176,6 @@ def _path_of(request: Request) -> str:
     """Return the path that the client asked for, as it stands in a URL."""
     root, path = request.scope.get("root_path", ""), request.scope["path"]
     return quote(path if path.startswith(root) else root + path)
-
-
-def _nothing() -> None:
-    """Stands for an endpoint behind dependencies."""
 
 
 def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
@@ -315,12 +310,6 @@ class _InvalidBody(Exception):
     def __init__(self, error: ValidationError, document: Any) -> None:
         super().__init__()
         self.faults = faults_of_validation(error, document)
-
-
-def _failed(error: Exception, request: Request) -> Response:
-    """Return the problem for `error`."""
-    faults = _faults_in(error, f"{request.method} {request.url.path}")
-    return problem(faults, getattr(error, "headers", None) or {})
 
 
 def _faults_in(error: Exception, what: str) -> list[Fault]:

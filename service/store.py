@@ -29,7 +29,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -272,8 +272,8 @@ def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
 VERSION: Final = b"exact-geometry/1"
 """Changes when the meaning of any stored field does."""
 
-
 Kept = Solid | Scene
+K = TypeVar("K", Solid, Scene)
 
 
 def solid_id(solid: Kept, known: dict[int, str] | None = None) -> str:
@@ -340,17 +340,17 @@ class Store:
 
     def get(self, name: str) -> Solid:
         """Return the solid called `name`; `unknown_solid` if it is not here (any more)."""
-        found = self._get(name)
-        if isinstance(found, Solid):
-            return found
-        raise ServiceError("unknown_solid", f"no solid {name[:64]!r} is stored here; put it again: POST /v1/solids")
+        return self._of_kind(name, Solid, "solid")
 
     def get_scene(self, name: str) -> Scene:
         """Return the scene called `name`; `unknown_scene` if it is not here (any more)."""
-        found = self._get(name)
-        if isinstance(found, Scene):
+        return self._of_kind(name, Scene, "scene")
+
+    def _of_kind(self, name: str, kind: type[K], what: str) -> K:
+        if isinstance(found := self._get(name), kind):
             return found
-        raise ServiceError("unknown_scene", f"no scene {name[:64]!r} is stored here; put it again: POST /v1/scenes")
+        detail = f"no {what} {name[:64]!r} is stored here; put it again: POST /v1/{what}s"
+        raise ServiceError(f"unknown_{what}", detail)
 
     def _get(self, name: str) -> Kept | None:
         with self._lock:

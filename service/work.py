@@ -230,11 +230,8 @@ class Call(Cancel):
         return ", ".join(f"{name};dur={1e3 * seconds:.3f}" for name, seconds in self.seconds.items())
 
 
-def _no_call() -> None:
-    """The route class passes the call itself; this only keeps the parameter out of the OpenAPI document."""
-
-
-CallOf = Annotated[Call, Depends(_no_call)]
+CallOf = Annotated[Call, Depends(lambda: None)]
+"""The route class passes the call itself; this only keeps the parameter out of the OpenAPI document."""
 
 
 class _Lane:
