@@ -248,7 +248,7 @@ def kept(name: str) -> bytes | None:
     for folder in (cache_folder(), seed()):
         if folder is not None:
             try:
-                if not (folder / name).exists() or not _is_trusted((folder / name).parent):
+                if not (folder / name).is_file() or not _is_trusted((folder / name).parent):
                     continue
                 check_owner(folder / name)
                 written = (folder / name).read_bytes()

@@ -1,30 +1,73 @@
-"""`python -m service`: starts uvicorn with the settings, each of which is a flag too."""
+"""`python -m service`: starts uvicorn with the settings, each of which is a flag too, and writes logs."""
 
 from __future__ import annotations
 
 import argparse
 import gc
 import ipaddress
+import logging
 import logging.config
 import os
 import signal
 import sys
 import tempfile
+import time
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
+import orjson
 from pydantic import ValidationError
 
-from service import logs
 from service.settings import Settings
 
+if TYPE_CHECKING:
+    from fastapi import FastAPI
+
 log = logging.getLogger("service")
+SWITCH_SECONDS: Final = 0.0002
+"""How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
+with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
+
+
+class JsonFormatter(logging.Formatter):
+    """Writes time, level, logger and message, and the fields that a record brings along."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line."""
+        line: dict[str, Any] = {
+            "time": f"{_second(int(record.created))}.{int(record.msecs):03d}Z",
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "message": record.getMessage(),
+            **getattr(record, "fields", {}),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return orjson.dumps(line, default=str).decode()
+
+
+@lru_cache(2)
+def _second(moment: int) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(moment))
+
+
+def config_of(level: str) -> dict[str, Any]:
+    """Return the configuration for `logging.config.dictConfig`; worker processes set it up anew."""
+    own = {"handlers": ["stderr"], "level": level.upper(), "propagate": False}
+    return {
+        "version": 1,
+        "disable_existing_loggers": False,
+        "formatters": {"json": {"()": "service.__main__.JsonFormatter"}},
+        "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+        "loggers": {"engine": own, "service": own, "uvicorn": own},
+    }
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Serve until SIGTERM or SIGINT, finish what is under way, exit with 0."""
-    gc.disable()  # while modules are imported (process.py): an eighth of the time until ready
+    gc.disable()  # while modules are imported (`create_app`): an eighth of the time until ready
     _take_flags(sys.argv[1:] if arguments is None else arguments)
     try:
         settings = Settings()
@@ -38,7 +81,7 @@ def main(arguments: list[str] | None = None) -> None:
         )
     except OSError as error:
         _refuse(f"{_variable('store_folder')}={settings.store_folder}: {error.strerror or error}")
-    config = logs.config_of(settings.log_level)
+    config = config_of(settings.log_level)
     logging.config.dictConfig(config)
     # uvicorn drains, restores these handlers and raises the signal again: that must end in 0, not in a kill
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -63,6 +106,19 @@ def main(arguments: list[str] | None = None) -> None:
         _serve(settings, config, stack)
 
 
+def create_app() -> FastAPI:
+    """Return the service for a process that is all its own: nowhere else is a process changed."""
+    from service.app import create_app
+    from service.memory import configure_malloc
+
+    gc.enable()  # all is imported (`main`)
+    configure_malloc()
+    sys.setswitchinterval(SWITCH_SECONDS)
+    # what the lines leave out need not be looked up for each of them: it takes as long as writing the line
+    logging.logThreads = logging.logProcesses = logging.logMultiprocessing = False
+    return create_app(owns_process=True)
+
+
 def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> None:
     """Serve until a signal comes; stack: what is to be cleaned up at the end."""
     import uvicorn
@@ -71,7 +127,7 @@ def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> 
     from service.server import HEALTH_SECONDS, Server, Supervisor
 
     config = uvicorn.Config(
-        "service.process:create_app",
+        "service.__main__:create_app",
         factory=True,
         host=settings.host,
         port=settings.port,

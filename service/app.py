@@ -18,45 +18,33 @@ from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
 from starlette.responses import Response
+from starlette.routing import Route
 
 import engine
-from service import traces
+from service import pages, traces
 from service.errors import faults_of, http_fault, problem
 from service.gate import Gate
-from service.memory import Memory
+from service.memory import Memory, freeze
 from service.metrics import Metrics
 from service.openapi import completed, openapi_of
-from service.pages import add_pages
-from service.process import freeze
 from service.route import posts_of
-from service.routes import (
-    binary,
-    bounds,
-    clearance,
-    clipping,
-    collision,
-    compare,
-    containment,
-    health,
-    layers,
-    overlay,
-    scenes,
-    solids,
-)
+from service.routes import questions, stored
 from service.settings import WARM_UP, Settings
 from service.store import Store
-from service.tools import add_tools, running
+from service.tools import PATH, Tools
 from service.work import Pool
 
 log = logging.getLogger("service")
 
 ROUTERS: Final = (
-    *(module.router for module in (containment, collision, clearance, clipping, overlay, layers, bounds, compare)),
-    *(module.router for module in (solids, scenes, binary, health)),
-    solids.lookup,
-    scenes.lookup,
-    scenes.binary,
+    questions.router,
+    stored.router,
+    stored.binary,
+    pages.router,
+    stored.lookup,
+    stored.scene_binary,
 )
+_SHOWN: Final = "ETag, Geometry-Accuracy, Location, Retry-After, Server-Timing, Traceresponse, X-Request-ID"
 END_SECONDS: Final = 0.7
 """How long a service that ends waits for its threads, which look at their switch, and then for its warm-up, which looks
 between two parts whether it is still wanted."""
@@ -69,7 +57,7 @@ object and the header `Server-Timing` (decode, prepare, compute, encode). Errors
 
 
 def create_app(settings: Settings | None = None, owns_process: bool = False) -> FastAPI:
-    """Return the service as an ASGI application; owns_process: whether nothing else lives there (process.py)."""
+    """Return the service as an ASGI application; owns_process: whether nothing else lives there (`__main__`)."""
     settings = settings or Settings()
     app = FastAPI(
         title="exact-geometry",
@@ -84,8 +72,9 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
     app.openapi = openapi_of(app, settings)  # type: ignore[method-assign]
     for router in ROUTERS:
         app.include_router(router)
-    add_pages(app)
-    app.state.tools = add_tools(app, settings, ROUTERS)
+    pages.add_pages(app)
+    app.state.tools = Tools(app, settings, ROUTERS)
+    app.router.routes.append(Route(PATH, app.state.tools, methods=["POST"], include_in_schema=False))
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
     app.add_middleware(Gate, settings=settings, posts=posts_of(ROUTERS), metrics=app.state.metrics)
@@ -95,15 +84,7 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
             allow_origins=list(settings.cors_origins),
             allow_methods=["GET", "HEAD", "POST"],
             allow_headers=["Authorization", "Content-Type", "Traceparent", "X-API-Key", "X-Request-ID"],
-            expose_headers=[
-                "ETag",
-                "Geometry-Accuracy",
-                "Location",
-                "Retry-After",
-                "Server-Timing",
-                "Traceresponse",
-                "X-Request-ID",
-            ],
+            expose_headers=[_SHOWN],
         )
     traces.export(app)
     return app
@@ -140,26 +121,40 @@ class _Guest:
     @asynccontextmanager
     async def lifespan(self, app: FastAPI) -> AsyncIterator[None]:
         """Start with the application, end with it."""
-        async with _running(self._started(app)):
+        state = self._started(app)
+        if hasattr(state, "pool") and not state.is_ending:  # the router was included twice: the first ends it
+            yield
+            return
+        async with _running(state):
             yield
 
     async def start_once(self, request: Request) -> None:
         """Start with the first request where nobody runs the application's lifespan."""
-        if not hasattr(request.app.state, "geometry"):
-            state = self._started(request.app)
+        state = self._started(request.app)
+        if not hasattr(state, "pool"):
             warming = _start(state)
             atexit.register(_end, state, warming)
 
     def _started(self, app: FastAPI) -> State:
-        state = app.state.geometry = State()
+        """Return what the calls share in `app`; what has ended is made again."""
+        state: State = getattr(app.state, "geometry", None) or State({"guest": self, "is_ending": True})
+        if state.guest is not self:
+            raise RuntimeError(
+                "this application has two service routers, and would answer by the settings of one: include one twice, "
+                "or mount an application of its own for the second: app.mount(path, FastAPI())"
+            )
+        if not state.is_ending:
+            return state
+        state = app.state.geometry = State({"guest": self})
         _prepare(state, self._settings, owns_process=False)
-        make = app.openapi
+        make = getattr(app.openapi, "made_by", app.openapi)
 
         def document() -> dict[str, Any]:
             if app.openapi_schema is None:
                 app.openapi_schema = completed(make(), self._settings)
             return app.openapi_schema
 
+        document.made_by = make  # type: ignore[attr-defined]
         app.openapi_schema, app.openapi = None, document  # type: ignore[method-assign]
         return state
 
@@ -176,7 +171,7 @@ def _prepare(state: State, settings: Settings, owns_process: bool) -> None:
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    async with _running(app.state), running(app.state.tools):
+    async with _running(app.state), app.state.tools:
         yield
 
 

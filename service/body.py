@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from io import BytesIO
-from typing import Final
+from typing import Any, Final
 
 import zstandard
 from starlette.requests import ClientDisconnect
@@ -116,7 +116,7 @@ def inflated(body: Body, coding: str, call: Call) -> bytes:
     """Return what `body` was before it was compressed."""
     limit, size, whole = call.settings.max_body_bytes, 0, BytesIO()
     try:
-        for part in _unzipped(body) if coding == "gzip" else _unpacked(body):
+        for part in _inflated(body, coding):
             call.remaining()
             size += len(part)
             if size > limit:
@@ -128,36 +128,26 @@ def inflated(body: Body, coding: str, call: Call) -> bytes:
     return whole.getvalue()
 
 
-def _unzipped(body: Body) -> Iterator[bytes]:
-    """Yield what the members of a gzip body (RFC 1952, 2.2) hold, part by part."""
-    inflater = None
-    for start in range(0, len(body), _STEP_IN):
-        rest = body[start : start + _STEP_IN]
+def _inflated(body: Body, coding: str) -> Iterator[bytes]:
+    """Yield what the members of a gzip body (RFC 1952, 2.2), or the frames of a zstd body (RFC 8878, 3.1), hold."""
+    packed: Any = None  # a member or frame that is not over
+    is_gzip, unpacker = coding == "gzip", zstandard.ZstdDecompressor(max_window_size=_WINDOW)
+    step, most = (_STEP_IN, (_STEP,)) if is_gzip else (_BLOCKS, ())
+    for start in range(0, len(body), step):
+        rest = body[start : start + step]
         while rest:  # bound: each turn takes bytes, or gives a whole part
-            inflater = inflater or zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
-            yield inflater.decompress(rest, _STEP)
-            rest = inflater.unconsumed_tail
-            if inflater.eof:
-                rest, inflater = inflater.unused_data, None
-    while inflater is not None and not inflater.eof:  # bound: each turn gives a part
-        part = inflater.decompress(b"", _STEP)
+            packed = packed or (zlib.decompressobj(wbits=16 + zlib.MAX_WBITS) if is_gzip else unpacker.decompressobj())
+            yield packed.decompress(rest, *most)
+            rest = packed.unconsumed_tail
+            if packed.eof:
+                rest, packed = packed.unused_data, None
+    while packed is not None and not packed.eof:  # bound: each turn gives a part
+        part = packed.decompress(b"", *most)
         if not part:
             break
         yield part
-    if not len(body) or (inflater is not None and not inflater.eof):
+    if not len(body) or (packed is not None and not packed.eof):
         raise EOFError("it ends too early")
-
-
-def _unpacked(body: Body) -> Iterator[bytes]:
-    inflater = zstandard.ZstdDecompressor(max_window_size=_WINDOW).decompressobj()
-    for start in range(0, len(body), _BLOCKS):
-        if inflater.eof:
-            break
-        yield inflater.decompress(body[start : start + _BLOCKS])
-    if not inflater.eof:
-        raise EOFError("it ends too early")
-    if inflater.unused_data or start + _BLOCKS < len(body):
-        raise EOFError("something follows its end")
 
 
 def _room(size: int) -> bytearray | mmap.mmap:

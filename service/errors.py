@@ -14,6 +14,7 @@ import orjson
 from pydantic import ValidationError
 from starlette.responses import Response
 
+import engine
 from engine import EngineError
 from service.metrics import count_refusal
 from service.schemas.arrays import MAX_ERRORS, Fault, Path
@@ -21,30 +22,10 @@ from service.schemas.arrays import MAX_ERRORS, Fault, Path
 PROBLEM_TYPE: Final = "urn:exact-geometry:problem:"
 MEDIA_TYPE: Final = "application/problem+json"
 
+_KINDS: Final = [kind for kind in vars(engine).values() if isinstance(kind, type) and issubclass(kind, EngineError)]
 ENGINE_STATUS: Final[dict[str, int]] = {
-    "engine_error": 422,
-    "invalid_input": 422,
-    "invalid_array": 422,
-    "wrong_dimension": 422,
-    "not_finite": 422,
-    "empty_geometry": 422,
-    "index_out_of_range": 422,
-    "repeated_index": 422,
-    "not_closed": 422,
-    "inconsistent_orientation": 422,
-    "face_not_simple": 422,
-    "ring_too_short": 422,
-    "min_above_max": 422,
-    "negative_radius": 422,
-    "zero_normal": 422,
-    "invalid_polynomial": 422,
-    "invalid_operation": 422,
-    "not_rigid": 422,
-    "too_deep": 422,
-    "unsupported_solid": 422,
-    "unsupported_pair": 422,
-    "not_representable": 422,
-    "too_complex": 422,
+    EngineError.code: 422,
+    **{kind.code: 422 for kind in _KINDS},
     "deadline_exceeded": 504,
     "cancelled": 503,
 }
@@ -80,16 +61,11 @@ SERVICE_STATUS: Final[dict[str, int]] = {
 }
 STATUS: Final = {**ENGINE_STATUS, **SERVICE_STATUS}
 
-_RETRY_AFTER: Final = {"Retry-After": "1"}
+_AGAIN: Final = ("queue_full", "not_ready", "store_unavailable", "cancelled", "out_of_memory")
 _HEADERS: Final[dict[str, dict[str, str]]] = {
-    "queue_full": _RETRY_AFTER,
-    "not_ready": _RETRY_AFTER,
-    "store_unavailable": _RETRY_AFTER,
-    "cancelled": _RETRY_AFTER,
-    "out_of_memory": _RETRY_AFTER,
+    **{code: {"Retry-After": "1"} for code in _AGAIN},
     "missing_key": {"WWW-Authenticate": "Bearer"},
-    "slow_body": {"Connection": "close"},
-    "body_too_large": {"Connection": "close"},
+    **{code: {"Connection": "close"} for code in ("slow_body", "body_too_large")},
 }
 _PYDANTIC_CODES: Final = {
     "missing": "missing_field",

@@ -24,7 +24,7 @@ from service.errors import ServiceError, faults_of, problem
 from service.metrics import Metrics
 from service.route import Answer
 from service.settings import Settings
-from service.traces import Trace, trace_of
+from service.traces import trace_of
 
 log = logging.getLogger("service.access")
 
@@ -67,7 +67,7 @@ class Gate:
         headers = dict(scope["headers"])
         given = headers.get(b"x-request-id", b"")
         name = given if _NAME.fullmatch(given) else secrets.token_hex(8).encode()
-        trace = trace_of(headers)
+        trace, span = trace_of(headers)
         metrics = self._metrics
         metrics.in_flight.inc()
 
@@ -79,8 +79,8 @@ class Gate:
                 there = {key for key, _ in own}
                 added = [header for header in _SAFETY if header[0] not in there]
                 message["headers"] = [*own, *added, (b"x-request-id", name)]
-                if trace is not None:
-                    message["headers"].append((b"traceresponse", trace.header))
+                if span:
+                    message["headers"].append((b"traceresponse", span))
             else:
                 n_bytes += len(message.get("body", b""))
             await send(message)
@@ -127,7 +127,7 @@ def _digest(key: bytes) -> bytes:
     return hashlib.sha256(key).digest()
 
 
-def _record(scope: Scope, status: int, seconds: float, name: bytes, trace: Trace | None) -> None:
+def _record(scope: Scope, status: int, seconds: float, name: bytes, trace: dict[str, str]) -> None:
     if not log.isEnabledFor(logging.INFO):
         return
     # as log.info() makes it, without the search for the line that called it: half of what a log line costs
@@ -140,7 +140,5 @@ def _record(scope: Scope, status: int, seconds: float, name: bytes, trace: Trace
         "status": status,
         "milliseconds": round(1e3 * seconds, 3),
     }
-    if trace is not None:
-        fields |= {"trace_id": trace.trace_id, "span_id": trace.span_id}
-    record.fields = fields
+    record.fields = fields | trace
     log.handle(record)

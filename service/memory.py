@@ -14,7 +14,6 @@ import time
 from typing import Any, Final
 
 import engine
-from service.errors import ServiceError
 
 FOOTPRINT: Final = 4
 """Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
@@ -33,6 +32,8 @@ _FEW: Final = 2**20
 _libc: Final = ctypes.CDLL(None) if os.name == "posix" else None
 _trim = getattr(_libc, "malloc_trim", None)
 """glibc keeps what was freed in arenas of each thread, some hundred MB after a large request."""
+_NEVER: Final = 2**31 - 1
+"""Collections of younger objects until the oldest are looked at."""
 _OF_MALLOC: Final = {-8: 2, -1: 2**20, -3: 2**20}
 """M_ARENA_MAX, M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of mallopt(3): glibc raises the last two to 64 and 32 MB itself,
 and keeps that much at the end of each thread's arena: 256 MB given, 4 to 8 hostile clients took 320 and now 240."""
@@ -46,10 +47,17 @@ def configure_malloc() -> None:
             mallopt(option, value)
 
 
+def freeze() -> None:
+    """Have no later collection walk through what lives long; `Memory` collects when there is little else."""
+    if not gc.get_freeze_count():
+        gc.freeze()  # half a million objects of modules and compiler
+    gc.set_threshold(*gc.get_threshold()[:2], _NEVER)
+
+
 class Memory:
     """Bytes that requests under way hold, or may come to hold; safe to share between threads.
 
-    collects: whether the process has turned Python's own search of old objects for cycles off (process.py).
+    collects: whether the process has turned Python's own search of old objects for cycles off (`freeze`).
     """
 
     def __init__(self, limit: int, collects: bool = False) -> None:
@@ -88,11 +96,3 @@ class Memory:
             self.taken -= taken
             self.leaving -= taken
             self.has_left.notify_all()
-
-    def refusal(self, size: int) -> ServiceError:
-        """Return what is said where there is no room for so many bytes more."""
-        detail = (
-            f"requests under way hold {self.taken} bytes, and {size} more would be too many; try again, send less at "
-            "once, or raise GEOMETRY_REQUEST_BYTES"
-        )
-        return ServiceError("out_of_memory", detail)

@@ -1,20 +1,23 @@
 """The OpenAPI document: FastAPI's, with the limits of this service's settings, an example of every part, the keys that
-it may ask for, and without what generators choke on."""
+it may ask for, and without what generators choke on; and the errors that each route documents."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Callable, Iterator
+from enum import Enum
 from pathlib import Path
 from typing import Any, Final
 
-from fastapi import FastAPI
+import orjson
+from fastapi import APIRouter, FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from service.errors import MEDIA_TYPE
-from service.schemas.arrays import LIMIT
-from service.schemas.problem import Problem
+from service.errors import MEDIA_TYPE, STATUS, problem
+from service.route import GeometryRoute
+from service.schemas.arrays import LIMIT, Fault
+from service.schemas.base import Problem
 from service.settings import Settings
 
 ANSWERS: Final = Path(__file__).with_name("answers.json")
@@ -119,16 +122,12 @@ def _finished(node: Any, settings: Settings) -> Any:
     return done
 
 
-def _answers() -> dict[str, list[Any]]:
-    found: dict[str, list[Any]] = json.loads(ANSWERS.read_text("utf-8")) if ANSWERS.is_file() else {}
-    return found
-
-
 def _illustrate(made: dict[str, Any]) -> None:
     """Give every operation a line, every property a description and an example, its own or the first that an example of
     a model holds."""
     schemas = made["components"]["schemas"]
-    for name, answers in _answers().items():
+    known: dict[str, list[Any]] = json.loads(ANSWERS.read_text("utf-8")) if ANSWERS.is_file() else {}
+    for name, answers in known.items():
         if name in schemas:
             schemas[name].setdefault("examples", answers)
     for schema in schemas.values():
@@ -175,3 +174,44 @@ def _parts(schema: dict[str, Any], value: Any, schemas: dict[str, Any]) -> Itera
             if key in value:
                 yield part, value[key]
                 yield from _parts(part, value[key], schemas)
+
+
+_SCHEMA: Final = {"$ref": "#/components/schemas/Problem"}
+_OF_ANY: Final = {
+    401: "The service asks for a key, in the header Authorization (Bearer) or X-API-Key.",
+    403: "The key is wrong.",
+    431: "The headers are too long.",
+    500: "A fault of the service; it is logged.",
+    503: "Too many requests are under way, or the store cannot be used: try again after the time in Retry-After.",
+}
+_OF_BODY: Final = {
+    400: "The body is not JSON.",
+    404: "A stored solid is not there (any more): put it again.",
+    408: "The body did not arrive in time.",
+    413: "The body is too large.",
+    415: "The header Content-Type is another; the header Accept-Post of the answer names the right one.",
+    422: "The geometry breaks a rule; `code` says which, each pointer where.",
+    504: "The deadline passed: ask for less at once.",
+}
+_TEXTS: Final = {**_OF_ANY, **_OF_BODY, 501: "Reading files is not installed.", 507: "The store is full."}
+
+
+def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the description of the error answers with these statuses, and of those that any call may have."""
+    return {
+        status: {
+            "description": _TEXTS[status],
+            "content": {MEDIA_TYPE: {"schema": _SCHEMA, "example": _example(status)}},
+        }
+        for status in sorted({*statuses, *_OF_ANY})
+    }
+
+
+def _example(status: int) -> dict[str, Any]:
+    code = next(code for code, known in STATUS.items() if known == status)
+    return dict(orjson.loads(problem([Fault((), code, _TEXTS[status])]).body))
+
+
+def router_of(*statuses: int, tags: list[str | Enum] | None = None) -> APIRouter:
+    """Return a router whose calls may have errors of these statuses; without any, those of calls with a JSON body."""
+    return APIRouter(route_class=GeometryRoute, tags=tags, responses=responses(*(statuses or _OF_BODY)))

@@ -1,5 +1,6 @@
-"""The pages: / is the playground, which asks this service and draws the answers; /docs is Swagger UI with *try it*,
-/redoc the same to read. Nothing of them comes from another host: their files are those that fastapi-offline keeps.
+"""What the service shows of itself: /healthz, /readyz, /metrics, and pages: / is the playground, which asks this
+service and draws the answers; /docs is Swagger UI with *try it*, /redoc the same to read. Nothing of them comes from
+another host: their files are those that fastapi-offline keeps.
 
 With API keys the pages open all the same and ask for the key; what they show is the same for everybody.
 """
@@ -9,15 +10,70 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
+import time
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from fastapi.openapi.docs import get_redoc_html, get_swagger_ui_html
+from starlette.datastructures import State
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse
+from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
+
+from service.errors import problem
+from service.openapi import responses
+from service.route import state_of
+from service.schemas.arrays import Fault
+from service.schemas.base import Schema, with_example
+
+router = APIRouter(tags=["health"], responses=responses())
+
+
+class Health(Schema):
+    """Alive, or ready."""
+
+    model_config = with_example({"status": "ok"})
+
+    status: Literal["ok"]
+
+
+@router.head("/healthz", include_in_schema=False)
+@router.get("/healthz", operation_id="healthz", response_model=Health)
+async def healthz() -> Response:
+    """Alive: the process answers."""
+    return _ok()
+
+
+@router.head("/readyz", include_in_schema=False)
+@router.get("/readyz", operation_id="readyz", response_model=Health)
+async def readyz(request: Request) -> Response:
+    """Ready: every kernel is compiled and no shutdown has begun."""
+    state = state_of(request.app)
+    if not state.warm.is_set():
+        return problem([Fault((), "not_ready", state.warm_error or _how_far(state))])
+    if state.pool.is_stuck():
+        detail = "every thread for large requests works on one whose deadline has passed; ask another replica, or wait"
+        return problem([Fault((), "not_ready", detail)])
+    return _ok()
+
+
+@router.get("/metrics", operation_id="metrics", response_class=PlainTextResponse)
+async def metrics(request: Request) -> Response:
+    """What is counted of requests, their phases, the queue, bytes, refusals and the store, for Prometheus."""
+    return PlainTextResponse(state_of(request.app).metrics.text(), media_type="text/plain; version=0.0.4")
+
+
+def _how_far(state: State) -> str:
+    seconds, done = time.perf_counter() - state.warm_begin, state.warm_hundredths
+    left = f", some {seconds * (100 - done) / done:.0f} s are left" if done else ""
+    return f"kernels are being compiled or loaded, {done} % after {seconds:.0f} s{left}; ask again in a second"
+
+
+def _ok() -> Response:
+    return Response(b'{"status":"ok"}', media_type="application/json")
+
 
 FOLDER: Final = Path(__file__).parent / "static_playground"
 OPEN: Final = ("/", "/docs", "/redoc", "/openapi.json", "/playground/", "/docs-files/")

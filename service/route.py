@@ -14,8 +14,10 @@ import logging
 import re
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
+from urllib.parse import quote
 
 import numpy as np
 from fastapi import routing
@@ -40,6 +42,8 @@ log = logging.getLogger("service")
 LEAST_COMPRESSED: Final = 2**14
 """Bytes from which an answer is compressed for those who take it so."""
 _CODING: Final = re.compile(rb"([a-z0-9*-]+)\s*(?:;\s*q=([01](?:\.\d{0,3})?))?\s*(?:,|$)")
+_OF_BODY: Final = (b"content-length", b"content-type")
+"""Headers that are not a dependency's."""
 Part = bytes | memoryview
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
 Answer = Callable[[Request], Coroutine[Any, Any, Response]]
@@ -90,18 +94,19 @@ class GeometryRoute(APIRoute):
         guard = _guard_of(self)
 
         async def handle(request: Request) -> Response:
-            if guard is not None:
-                await guard(request)
+            given = [] if guard is None else (await guard(request)).raw_headers
             state = state_of(request.app)
             call = Call(state.settings, state.store, state.memory)
+            call.path = _path_of(request)
             response = None
             try:
                 response = await answer(request, call)
             finally:
                 if not isinstance(response, _Answer):  # it ended early, and what it held is gone
                     call.free()
+            response.raw_headers += [header for header in given if header[0] not in _OF_BODY]
             operation = self.operation_id or self.name
-            state_of(request.app).metrics.count(operation, response.status_code, call.seconds)
+            state.metrics.count(operation, response.status_code, call.seconds)
             traces.note(operation, call.seconds)
             return response
 
@@ -135,7 +140,8 @@ class GeometryRoute(APIRoute):
             except ClientDisconnect:
                 return Response(status_code=STATUS["bad_request"])  # nobody reads it
             except Exception as error:
-                return _failed(error, request)
+                faults = _faults_in(error, f"{request.method} {request.url.path}")
+                return problem(faults, getattr(error, "headers", None) or {})
 
         return handle
 
@@ -150,10 +156,8 @@ def _guard_of(route: APIRoute) -> Answer | None:
     if not effective.dependencies:
         return None
     provider = effective.dependency_overrides_provider
-    made = APIRoute(
-        effective.path, _nothing, dependencies=effective.dependencies, dependency_overrides_provider=provider
-    )
-    return made.get_route_handler()
+    given: Any = {"dependencies": effective.dependencies, "dependency_overrides_provider": provider}
+    return APIRoute(effective.path, lambda: None, **given).get_route_handler()
 
 
 def _receive_of(request: Request) -> Receive:
@@ -168,8 +172,10 @@ def _receive_of(request: Request) -> Receive:
     return receive
 
 
-def _nothing() -> None:
-    """Stands for an endpoint behind dependencies."""
+def _path_of(request: Request) -> str:
+    """Return the path that the client asked for, as it stands in a URL."""
+    root, path = request.scope.get("root_path", ""), request.scope["path"]
+    return quote(path if path.startswith(root) else root + path)
 
 
 def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
@@ -182,28 +188,21 @@ def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
     }
 
 
+@dataclass(slots=True)
 class _Job:
     """The steps of one request that need no event loop."""
 
-    def __init__(
-        self,
-        endpoint: Callable[..., Any],
-        adapter: TypeAdapter[Any] | None,
-        arguments: dict[str, Any],
-        call: Call,
-        takes_body: bool,
-    ) -> None:
-        self.endpoint = endpoint
-        self.takes_body = takes_body
-        self.adapter = adapter
-        self.body: Body = b""
-        self.coding: str | None = None
-        self.arguments = arguments
-        self.call = call
-        self.question: Any = None
-        self.document: Any = None
-        """A body that was decoded elsewhere, or is long: it is let go of in steps."""
-        self.finish: Callable[[Any], Iterable[Part]] = self._encoded
+    endpoint: Callable[..., Any]
+    adapter: TypeAdapter[Any] | None
+    arguments: dict[str, Any]
+    call: Call
+    takes_body: bool
+    body: Body = b""
+    coding: str | None = None
+    question: Any = None
+    document: Any = None
+    """A body that was decoded elsewhere, or is long: it is let go of in steps."""
+    finish: Callable[[Any], Iterable[Part]] | None = None
 
     def decode(self) -> None:
         """Turn the body into the endpoint's model, and let go of it."""
@@ -243,7 +242,7 @@ class _Job:
             if answer is None:
                 return []
             with call.phase("encode"):
-                return self._gathered(self.finish(answer))
+                return self._gathered((self.finish or self._encoded)(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
             forget_frames(error)
@@ -311,12 +310,6 @@ class _InvalidBody(Exception):
     def __init__(self, error: ValidationError, document: Any) -> None:
         super().__init__()
         self.faults = faults_of_validation(error, document)
-
-
-def _failed(error: Exception, request: Request) -> Response:
-    """Return the problem for `error`."""
-    faults = _faults_in(error, f"{request.method} {request.url.path}")
-    return problem(faults, getattr(error, "headers", None) or {})
 
 
 def _faults_in(error: Exception, what: str) -> list[Fault]:

@@ -3,33 +3,277 @@
 The store holds engine objects, so structures prepared for one request serve the next. The name of a solid is a hash
 over a version tag, its type and its arrays as little-endian bytes, each with its shape: equal input has equal names in
 every process, so replicas agree without talking. -0.0 is 0.0 (the engine made it so), a CSG tree hashes the names of
-its operands, a scene
-those of its solids, and the poses of its bodies.
+its operands, a scene those of its solids, and the poses of its bodies.
 
-With a folder (disk.py) the memory holds what was used last, and the folder more, for other processes and after a start.
+With a folder, which replicas may share over a common volume, the memory holds what was used last, and the folder more.
+A file is named by its solid and written under another name first, so that a name never leads to half a file; one that
+was damaged all the same is known when it is read, since its name is a hash of the content: it is not served, and taken
+away. Files used longest ago leave when the folder grows beyond its budget. What the system refuses is `store_full`, or
+`store_unavailable`; what is no file, a pipe for example, is never waited for.
 """
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import hashlib
+import io
+import json
+import logging
+import os
+import re
+import stat
+import tempfile
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
+import engine
 from engine import Scene, Solid
-from service.disk import Folder, pose_rows, stored
 from service.errors import ServiceError
 from service.metrics import Metrics
+
+log = logging.getLogger("service")
+
+_NAME: Final = re.compile(r"[0-9a-f]{64}")
+_PARTIAL: Final = ".part"
+_STALE_SECONDS: Final = 3600.0
+"""Age at which a partial file has no writer any more."""
+
+_FULL: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn what the system refuses into what is said of it."""
+    try:
+        yield
+    except OSError as error:
+        log.error("the store folder %s: %s", path, error)
+        reason = error.strerror or type(error).__name__
+        if error.errno in _FULL:
+            detail = f"the store folder has no room ({reason}); send the solid with each request, or try again later"
+            raise ServiceError("store_full", detail) from None
+        detail = f"the store folder cannot be used ({reason}); send the solid with the request, or try again later"
+        raise ServiceError("store_unavailable", detail) from None
+
+
+class Folder:
+    """Writes, reads and forgets files of solids; safe to share between threads and processes."""
+
+    def __init__(self, path: Path, budget: int) -> None:
+        self._path = path
+        self._budget = budget
+        self._written = 0  # bytes since the folder was last looked through
+        self._lock = threading.Lock()
+        path.mkdir(parents=True, exist_ok=True)
+        self._shrink()
+
+    def put(self, name: str, solid: Solid | Scene) -> bool:
+        """Write `solid` unless it is there; return whether it is new. It is on the disk when this returns.
+
+        Raises: `store_full`, `store_unavailable`.
+        """
+        final = self._path / name
+        with _told(self._path):
+            if self._touch(final):
+                return False
+            octets = to_octets(solid)
+            handle, partial = tempfile.mkstemp(_PARTIAL, name[:8], self._path)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(octets)
+                    file.flush()
+                    os.fsync(file.fileno())
+                os.replace(partial, final)
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    os.unlink(partial)
+                raise
+            self._sync()
+        with self._lock:
+            self._written += len(octets)
+            is_time = self._written > self._budget // 16
+        if is_time:
+            with _told(self._path):
+                self._shrink()
+        return True
+
+    def get(self, name: str) -> Solid | Scene | None:
+        """Return the solid called `name`, or None if there is no file that holds it.
+
+        Raises: `store_unavailable`, `unsupported_solid`.
+        """
+        if _NAME.fullmatch(name) is None:
+            return None
+        path = self._path / name
+        with _told(path):
+            octets = _content(path)
+        if octets is None:
+            return None
+        try:
+            solid = from_octets(octets)
+        except ServiceError:  # a file of a later version: other processes of the volume read it
+            raise
+        except Exception as error:  # whatever damaged bytes lead to
+            solid, reason = None, f"{type(error).__name__}: {error}"
+        if solid is None or solid_id(solid) != name:
+            log.warning(
+                "the file %s is damaged (%s) and taken away", path, reason if solid is None else "another solid"
+            )
+            with contextlib.suppress(OSError):  # another user's
+                path.unlink(missing_ok=True)
+            return None
+        self._touch(path)
+        return solid
+
+    def _touch(self, path: Path) -> bool:
+        """Mark the file as used now; return whether it is there."""
+        try:
+            if not stat.S_ISREG(path.lstat().st_mode):
+                return False
+            with contextlib.suppress(PermissionError):  # another user's file on a shared volume
+                os.utime(path)
+        except FileNotFoundError:
+            return False
+        return True
+
+    def _sync(self) -> None:
+        """Make the new name last, where a folder can be opened (not on Windows)."""
+        with contextlib.suppress(OSError):
+            handle = os.open(self._path, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+
+    def _shrink(self) -> None:
+        """Take away partial files whose writer is gone, and the files used longest ago while there are too many."""
+        with self._lock:
+            self._written = 0
+        found = []
+        for entry in os.scandir(self._path):
+            with contextlib.suppress(OSError):  # another process took it away
+                status = entry.stat()
+                if entry.name.endswith(_PARTIAL) and time.time() - status.st_mtime > _STALE_SECONDS:
+                    os.unlink(entry.path)
+                elif _NAME.fullmatch(entry.name):
+                    found.append((status.st_mtime, status.st_size, entry.path))
+        total = sum(size for _, size, _ in found)
+        for _, size, path in sorted(found):
+            if total <= self._budget:
+                break
+            with contextlib.suppress(OSError):
+                os.unlink(path)
+            total -= size
+
+
+def _content(path: Path) -> bytes | None:
+    """Return what is in a file, None if there is none, or something else in its place."""
+    try:
+        handle = os.open(path, _READ)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO):  # a link, a socket
+            return None
+        raise
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        return None
+    with os.fdopen(handle, "rb") as file:
+        return file.read()
+
+
+def to_octets(solid: Solid | Scene) -> bytes:
+    """Return the file of `solid`: an npz archive of its arrays, and of the solids that it is made of, operands first,
+    each once."""
+    arrays: dict[str, Any] = {}
+    nodes: list[dict[str, Any]] = []
+    _add_node(solid, nodes, arrays, {})
+    file = io.BytesIO()
+    np.savez(file, nodes=np.frombuffer(json.dumps(nodes).encode(), np.uint8), **arrays)
+    return file.getvalue()
+
+
+def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], places: dict[int, int]) -> int:
+    """Add `solid` to the nodes, unless it is there; return its place. places: by `id`. Depth: capped by the engine."""
+    if id(solid) in places:
+        return places[id(solid)]
+    node: dict[str, Any] = {"type": solid.type}
+    if solid.type == "csg":
+        operands = [_add_node(operand, nodes, arrays, places) for operand in solid.operands]
+        node |= {"operation": solid.operation, "operands": operands}
+    elif solid.type == "scene":
+        node |= {"solids": [_add_node(body, nodes, arrays, places) for body in solid.solids], "poses": "poses"}
+        arrays["poses"] = pose_rows(solid)
+    else:
+        for field in stored(solid.type)[1]:
+            node[field] = f"array_{len(arrays)}"
+            arrays[node[field]] = np.asarray(getattr(solid, field))
+    nodes.append(node)
+    places[id(solid)] = len(nodes) - 1
+    return len(nodes) - 1
+
+
+def pose_rows(scene: Scene) -> Any:
+    """Return the numbers of each body's pose, rotation and translation, those of none at all where it has none."""
+    dimension = scene.solids[0].dimension
+    none = np.concatenate([np.eye(dimension).ravel(), np.zeros(dimension)])
+    rows = [none if pose is None else [*pose.rotation.ravel(), *pose.translation] for pose in scene.poses]
+    return np.array(rows).reshape(len(scene), -1)
+
+
+def _posed(row: Any, dimension: int) -> engine.Pose | None:
+    pose = engine.Pose(row[: dimension**2].reshape(dimension, dimension), row[dimension**2 :])
+    return None if pose.is_identity else pose
+
+
+def from_octets(octets: bytes) -> Solid | Scene:
+    """Return the solid or scene in a file; raises whatever comes up if it is damaged."""
+    made: list[Any] = []
+    with np.load(io.BytesIO(octets), allow_pickle=False) as arrays:
+        for node in json.loads(arrays["nodes"].tobytes()):
+            if node["type"] == "csg":
+                made.append(engine.Csg(node["operation"], [made[place] for place in node["operands"]]))
+            elif node["type"] == "scene":
+                solids = [made[place] for place in node["solids"]]
+                poses = [_posed(row, solids[0].dimension) for row in arrays[node["poses"]]]
+                return Scene(solids, poses)
+            else:
+                kind, names = stored(node["type"])
+                values = [arrays[node[name]] for name in names]
+                made.append(kind.restored(*(value if value.ndim else value.item() for value in values)))
+    found: Solid = made[-1]
+    return found
+
+
+def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
+    """Return the class of a type and the attributes that a file holds of it; `unsupported_solid` where there are none.
+
+    Csg and scenes are made of solids.
+    """
+    row = engine.solid_types.get(kind)
+    if row is not None and row.stored:
+        return row.solid, row.stored
+    raise ServiceError(
+        "unsupported_solid",
+        f"this version of the service stores no solid of type {kind[:64]!r}; send it with each request, or let every "
+        "service of the store folder run the version that wrote it",
+    )
+
 
 VERSION: Final = b"exact-geometry/1"
 """Changes when the meaning of any stored field does."""
 
-
 Kept = Solid | Scene
+K = TypeVar("K", Solid, Scene)
 
 
 def solid_id(solid: Kept, known: dict[int, str] | None = None) -> str:
@@ -73,7 +317,7 @@ class Store:
     ) -> None:
         self._budget = budget
         self._metrics = metrics or Metrics()
-        self._folder = None if folder is None else Folder(folder, folder_budget, solid_id)
+        self._folder = None if folder is None else Folder(folder, folder_budget)
         self._solids: OrderedDict[str, Kept] = OrderedDict()
         self._sizes: dict[str, int] = {}
         self._looked: dict[str, int] = {}
@@ -96,17 +340,17 @@ class Store:
 
     def get(self, name: str) -> Solid:
         """Return the solid called `name`; `unknown_solid` if it is not here (any more)."""
-        found = self._get(name)
-        if isinstance(found, Solid):
-            return found
-        raise ServiceError("unknown_solid", f"no solid {name[:64]!r} is stored here; put it again: POST /v1/solids")
+        return self._of_kind(name, Solid, "solid")
 
     def get_scene(self, name: str) -> Scene:
         """Return the scene called `name`; `unknown_scene` if it is not here (any more)."""
-        found = self._get(name)
-        if isinstance(found, Scene):
+        return self._of_kind(name, Scene, "scene")
+
+    def _of_kind(self, name: str, kind: type[K], what: str) -> K:
+        if isinstance(found := self._get(name), kind):
             return found
-        raise ServiceError("unknown_scene", f"no scene {name[:64]!r} is stored here; put it again: POST /v1/scenes")
+        detail = f"no {what} {name[:64]!r} is stored here; put it again: POST /v1/{what}s"
+        raise ServiceError(f"unknown_{what}", detail)
 
     def _get(self, name: str) -> Kept | None:
         with self._lock:

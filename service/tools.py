@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Iterable, Iterator
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Iterable
+from contextlib import suppress
 from importlib.util import find_spec
 from ipaddress import ip_address
 from typing import Any, Final
@@ -19,7 +19,6 @@ from urllib.parse import urlsplit
 import orjson
 from fastapi import APIRouter, FastAPI
 from starlette.requests import ClientDisconnect
-from starlette.routing import Route
 from starlette.types import Message, Receive, Scope, Send
 
 from engine import EngineError
@@ -62,7 +61,7 @@ _INSTRUCTIONS: Final = (
 
 
 class Tools:
-    """An ASGI application that answers MCP; `running` ends what it started.
+    """An ASGI application that answers MCP; to leave its context ends what it started.
 
     The library is handed a request without the arguments of its call, which are decoded here, as bodies are; and of an
     answer no more than is shown is ever written.
@@ -123,11 +122,14 @@ class Tools:
                 raise
             began.set_exception(error)
 
-    async def close(self) -> None:
-        """End it."""
+    async def __aenter__(self) -> None:
+        """Start nothing: the first request does."""
+
+    async def __aexit__(self, *_: object) -> None:
         self._ended.set()
         if self._task is not None:
-            await self._task
+            with suppress(asyncio.CancelledError):
+                await self._task
 
     def _made(self) -> Any:
         import mcp.types as types
@@ -135,7 +137,8 @@ class Tools:
         from mcp.server.streamable_http_manager import StreamableHTTPSessionManager
 
         document = self._app.openapi()
-        calls = {name: (path, operation) for name, path, operation in _calls(document)}
+        posts = [(path, item["post"]) for path, item in document["paths"].items() if "post" in item]
+        calls = {each["operationId"]: (path, each) for path, each in posts if JSON in each["requestBody"]["content"]}
         tools = [
             types.Tool(
                 name=name, description=_short(operation["description"]), input_schema=_input(path, operation, document)
@@ -250,31 +253,8 @@ def _replayed(text: bytes, gone: asyncio.Task[None]) -> Receive:
     return receive
 
 
-def add_tools(app: FastAPI, settings: Settings, routers: Iterable[APIRouter]) -> Tools:
-    """Offer the calls of these routers as tools at /mcp."""
-    tools = Tools(app, settings, routers)
-    app.router.routes.append(Route(PATH, tools, methods=["POST"], include_in_schema=False))
-    return tools
-
-
-@asynccontextmanager
-async def running(tools: Tools) -> AsyncIterator[None]:
-    """End the tools at the end."""
-    try:
-        yield
-    finally:
-        with suppress(asyncio.CancelledError):
-            await tools.close()
-
-
 def _count(value: Any) -> int | None:
     return value if type(value) is int and value >= 0 else None
-
-
-def _calls(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    for path, item in document["paths"].items():
-        if JSON in item.get("post", {}).get("requestBody", {}).get("content", {}):
-            yield item["post"]["operationId"], path, item["post"]
 
 
 def _parameters(path: str) -> list[str]:

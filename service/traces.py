@@ -1,6 +1,6 @@
-"""W3C trace context: a request that comes with `traceparent` is named by it in the log, and in the answer's
-`traceresponse`. With the extra `telemetry`, and OpenTelemetry's own variables set, each request is a span too, sent to
-where OTEL_EXPORTER_OTLP_ENDPOINT says.
+"""W3C trace context: a request that comes with `traceparent` is named by it in the log. With the extra `telemetry`, and
+OpenTelemetry's own variables set, each request is a span too, sent to where OTEL_EXPORTER_OTLP_ENDPOINT says, and named
+in the answer's `traceresponse`.
 """
 
 from __future__ import annotations
@@ -8,31 +8,17 @@ from __future__ import annotations
 import logging
 import os
 import re
-import secrets
 from collections.abc import Mapping
 from functools import cache
 from importlib.util import find_spec
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from fastapi import FastAPI
 
 log = logging.getLogger("service")
 
 _ASKED: Final = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_TRACES_EXPORTER")
-_PARENT: Final = re.compile(rb"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-([0-9a-f]{2})(?:-.*)?")
-
-
-class Trace(NamedTuple):
-    """The trace that a request belongs to, and its own span in it."""
-
-    trace_id: str
-    span_id: str
-    flags: str
-
-    @property
-    def header(self) -> bytes:
-        """The value of `traceresponse`."""
-        return f"00-{self.trace_id}-{self.span_id}-{self.flags}".encode()
+_PARENT: Final = re.compile(rb"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}(?:-.*)?")
 
 
 @cache
@@ -67,16 +53,17 @@ def export(app: FastAPI) -> None:
     app.add_middleware(OpenTelemetryMiddleware, excluded_urls=excluded, exclude_spans=["receive", "send"])
 
 
-def trace_of(headers: Mapping[bytes, bytes]) -> Trace | None:
-    """Return the trace of the request under way, None if it belongs to none."""
+def trace_of(headers: Mapping[bytes, bytes]) -> tuple[dict[str, str], bytes]:
+    """Return what a log line says of the trace that a request belongs to, and `traceresponse`, empty without a span."""
     if is_exporting():
         from opentelemetry import trace
 
         context = trace.get_current_span().get_span_context()
         if context.is_valid:
-            return Trace(f"{context.trace_id:032x}", f"{context.span_id:016x}", f"{context.trace_flags:02x}")
+            fields = {"trace_id": f"{context.trace_id:032x}", "span_id": f"{context.span_id:016x}"}
+            return fields, f"00-{'-'.join(fields.values())}-{context.trace_flags:02x}".encode()
     found = _PARENT.fullmatch(headers.get(b"traceparent", b""))
-    return found and Trace(found[1].decode(), secrets.token_hex(8), found[2].decode())
+    return {"trace_id": found[1].decode()} if found else {}, b""
 
 
 def note(operation: str, seconds: Mapping[str, float]) -> None:

@@ -22,7 +22,8 @@ import orjson
 import zstandard
 from pydantic import BaseModel
 
-from service.decoding import arrays, pieces, rings
+from service.decoding import arrays, pieces
+from service.decoding.numbers import Unfit
 from service.errors import ServiceError
 
 PART: Final = 20_000
@@ -103,7 +104,7 @@ def decode_fast(body: pieces.Body, take: Callable[[int], object] = lambda n: Non
 
     try:
         return arrays.decode(body, take_noted, poll)
-    except rings.Unfit:
+    except Unfit:
         take(-taken)
         return None
 

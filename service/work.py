@@ -71,7 +71,7 @@ class Call(Cancel):
 
     __slots__ = (
         "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead",
-        "is_light", "may_wait", "media_type", "seconds", "settings", "status", "store",
+        "is_light", "may_wait", "media_type", "path", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
@@ -90,6 +90,7 @@ class Call(Cancel):
         self.may_wait = False  # on the event loop it would hold up everybody
         self.start_clock()
         self.seconds = dict.fromkeys(PHASES, 0.0)
+        self.path = ""  # where the request asks
         self.status: int | None = None
         self.headers: dict[str, str] = {}
 
@@ -129,7 +130,11 @@ class Call(Cancel):
             if self._taken + n_bytes > self._memory.limit:
                 raise self._too_large(self._memory.limit, "GEOMETRY_REQUEST_BYTES")
             if self._memory.taken + n_bytes > self._memory.limit:
-                raise self._memory.refusal(n_bytes)
+                raise ServiceError(
+                    "out_of_memory",
+                    f"requests under way hold {self._memory.taken} bytes, and {n_bytes} more would be too many; try "
+                    "again, send less at once, or raise GEOMETRY_REQUEST_BYTES",
+                )
 
     def take_part(self, part: Sized) -> None:
         """Account for a part of the answer; `answer_too_large` beyond its limit."""
@@ -225,11 +230,8 @@ class Call(Cancel):
         return ", ".join(f"{name};dur={1e3 * seconds:.3f}" for name, seconds in self.seconds.items())
 
 
-def _no_call() -> None:
-    """The route class passes the call itself; this only keeps the parameter out of the OpenAPI document."""
-
-
-CallOf = Annotated[Call, Depends(_no_call)]
+CallOf = Annotated[Call, Depends(lambda: None)]
+"""The route class passes the call itself; this only keeps the parameter out of the OpenAPI document."""
 
 
 class _Lane:

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 from pydantic import BaseModel
 
 import engine
-from service.schemas.containment import ContainsRequest
+from service.schemas.points import ContainsRequest
 
 app = FastAPI()
 

@@ -42,6 +42,7 @@ IntPoint = tuple[int, ...]
 _UNIT: Final = 2.0**-53
 _TINY: Final = 2.0**-900  # above all that scaling to the unit ball can lose to underflow
 _two_sum: Final = getattr(two_sum, "py_func", two_sum)  # of arrays
+_BYTES: Final = 88  # of a coordinate, in differences, squares and the double-double pass (measured)
 _FEW: Final = 64  # candidates that are not worth a double-double pass
 
 
@@ -90,6 +91,7 @@ class _Walk:
         self.n_candidates = self.n_rational = 0
 
     def sphere(self) -> MinimalSphere:
+        self.budget.take(_BYTES * self.points.size)
         first = int(self._distances(self.points[0])[0].argmax())
         support: tuple[int, ...] = (first,)
         center, square = self.exact(first), Fraction(0)

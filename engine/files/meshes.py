@@ -5,13 +5,16 @@ from __future__ import annotations
 import io
 import logging
 import re
+from collections.abc import Callable
 from typing import IO, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.errors import EmptyGeometryError, IndexOutOfRangeError, InvalidInputError
-from engine.solids.checks import frozen, shown
+from engine.budget import UNLIMITED
+from engine.errors import EmptyGeometryError, FaceNotSimpleError, IndexOutOfRangeError, InvalidInputError
+from engine.solids.checks import as_points, frozen, shown
+from engine.solids.ear_cutting import cut_faces
 from engine.solids.mesh import Mesh, first_equal
 from engine.solids.polyhedron import Polyhedron
 
@@ -19,14 +22,10 @@ FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 _SOUPS: Final = ("stl",)
 """Formats of triangles without numbers of vertices."""
 M = TypeVar("M", bound=Mesh)
-_NAMES: Final = re.compile(rb"^[ \t]*(?:g|o|s|usemtl|mtllib)(?:[ \t][^\r\n]*)?$", re.MULTILINE)
-"""Lines of an OBJ file that say nothing of its shape: trimesh's time grows with their number squared."""
-_ELEMENT: Final = re.compile(rb"^[ \t]*([vf])[ \t]+([^\r\n]*)", re.MULTILINE)
-_ODD: Final = re.compile(
-    rb"^[ \t]*f[ \t](?:[^\r\n#]*[ \t])?(?:-|0+(?=[/\s]|\Z))|^[ \t]*f(?:[ \t]+[^\s\\]+){0,2}[ \t]*(?=[\r\n#]|\Z)",
-    re.MULTILINE,
-)
-"""Lines of an OBJ file that trimesh reads as something else: indices from 0 down, faces of fewer than three corners."""
+_ELEMENT: Final = re.compile(rb"^[ \t]*([vf])(?=\s|\Z)([^\n#]*)", re.MULTILINE)
+"""The lines of an OBJ file that say something of its shape."""
+_BESIDE: Final = re.compile(rb"/\S*")
+"""The numbers of texture and normal behind that of a vertex."""
 
 
 class _Arrays(NamedTuple):
@@ -38,8 +37,8 @@ class MeshOfFile(_Arrays):
     """Vertices and triangles, ``Polyhedron(*mesh)``; `solid` makes one too, and its errors speak of the file.
 
     n_collapsed: triangles that are left out, because two of their corners are at equal coordinates, though not by their
-    numbers. faces_in_file, vertices_in_file: by triangle and by vertex its number in the file, in which triangles are
-    counted from 0 and, of a format without numbers of vertices, triangle k has the vertices 3 k to 3 k + 2.
+    numbers. faces_in_file, vertices_in_file: by triangle the number of its face in the file, and by vertex its own,
+    counted from 0; of a format without numbers of vertices, triangle k has the vertices 3 k to 3 k + 2.
     """
 
     n_collapsed: int = 0
@@ -76,8 +75,9 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
 
     Vertices at equal coordinates become one, in the order of the file. Triangles of which that makes two corners one
     are left out and counted: rounded to single precision, small ones far from the origin are such, and closed meshes
-    stay closed, since two edges of each become one, there and back, and the third none. Nothing else is repaired, and
-    polygons are cut into triangles. Nothing that the file names is read.
+    stay closed, since two edges of each become one, there and back, and the third none; of a polygon such sides are
+    left out. Nothing else is repaired. Polygons are cut into triangles as the constructors do it. Nothing that the
+    file names is read.
 
     Parameters: file: open for reading bytes, or the bytes; file_format: stl, obj, ply, off or glb.
     Returns: vertices ``(n, 3) float64`` and indices of them ``(m, 3) int64``, as a tuple; its `n_collapsed` says how
@@ -86,7 +86,8 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
     double. The meshes of a GLB scene are put together; a node's transform is applied in floating point, so that its
     coordinates are rounded once.
     Raises: InvalidInputError for another format, a file that cannot be read, or where trimesh is not installed;
-    EmptyGeometryError for a file without faces; IndexOutOfRangeError where a face names a vertex that is not there.
+    EmptyGeometryError for a file without faces; IndexOutOfRangeError where a face names a vertex that is not there;
+    FaceNotSimpleError, NotFiniteError for a polygon that cannot be cut.
     """
     if not isinstance(file_format, str) or file_format not in FORMATS:
         raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {shown(file_format)}", ("format",))
@@ -102,14 +103,15 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
         ) from None
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
     try:
-        if file_format == "obj":
-            file = io.BytesIO(_counted(_NAMES.sub(b"", file.read())))
-        with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(
-                file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
-            )
-            mesh = scene.to_mesh()
-            vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+        if file_format in _READERS:
+            vertices, faces = _READERS[file_format](file)
+        else:
+            with np.errstate(all="ignore"):
+                scene = trimesh.load_scene(
+                    file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
+                )
+                mesh = scene.to_mesh()
+                vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
     except MemoryError:
         raise
     except Exception as error:  # the parsers raise whatever the bytes lead them to
@@ -118,42 +120,107 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
         ) from error
     if not len(faces):
         raise EmptyGeometryError(f"the {file_format} file holds no faces", ("file",))
-    if len(beyond := np.argwhere((faces < 0) | (faces >= len(vertices)))):
-        face, corner = beyond[0].tolist()
+    return _merged(vertices, *_cut(vertices, faces), file_format)
+
+
+def _read_obj(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
+    """Return vertices and faces of an OBJ file, negative indices counted from the last vertex before the face."""
+    vertices, faces = list[list[bytes]](), list[list[int]]()
+    text = re.sub(rb"\r\n?", b"\n", file.read()).removeprefix(b"\xef\xbb\xbf").replace(b"\\\n", b" ")
+    for kind, fields in _ELEMENT.findall(text):
+        if kind == b"v":
+            vertices.append(fields.split()[:3])
+            continue
+        if b"/" in fields:
+            fields = _BESIDE.sub(b"", fields)
+        corners = [*map(int, fields.split())]
+        if len(corners) < 3 or min(corners) < 1:
+            given, n = corners, len(vertices) + 1
+            corners = [number + n if number < 0 else number for number in given]
+            if len(corners) < 3 or min(corners) < 1 or 0 in given:
+                raise ValueError(
+                    f"face {len(faces)} has the corners {given!s:.100}; it needs three or more, from 1, or from -1 for "
+                    f"the last of {len(vertices)} vertices before it"
+                )
+        faces.append(corners)
+    if not all(len(row) == 3 for row in vertices):
+        raise ValueError("a vertex has fewer than three coordinates")
+    return np.array(vertices, np.bytes_).astype(np.float64), [[number - 1 for number in face] for face in faces]
+
+
+def _read_off(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
+    """Return vertices and faces of an OFF file."""
+    _, _, text = re.split(rb"(C?OFF)", re.sub(rb"#[^\r\n]*", b"", file.read()), maxsplit=1)
+    (n_vertices, n_faces, *_), *rows = [[*row.split()] for row in text.splitlines() if row.strip()]
+    vertices = np.array([row[:3] for row in rows[: int(n_vertices)]], np.float64).reshape(int(n_vertices), 3)
+    faces = [[*map(int, row)] for row in rows[int(n_vertices) : int(n_vertices) + int(n_faces)]]
+    if len(faces) < int(n_faces) or not all(2 < row[0] < len(row) for row in faces):
+        raise ValueError(f"expected {int(n_faces)} faces, each the number of its corners, 3 or more, and these")
+    return vertices, [row[1 : row[0] + 1] for row in faces]
+
+
+def _read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
+    """Return vertices and faces of a PLY file before trimesh cuts them, as fans."""
+    from trimesh.exchange.ply import load_ply
+
+    elements = load_ply(file, skip_materials=True)["metadata"]["_ply_raw"]
+    vertices = np.column_stack([elements["vertex"]["data"][axis] for axis in "xyz"]).astype(np.float64)
+    if "face" not in elements or not elements["face"]["length"]:
+        return vertices, []
+    faces = elements["face"]["data"]
+    names = faces if isinstance(faces, dict) else getattr(faces, "dtype", np.dtype(int)).names or ()
+    if len(names):
+        name = next((name for name in ("vertex_index", "vertex_indices") if name in names), next(iter(names)))
+        faces = faces[name] if isinstance(faces, dict) else faces[name]["f1"]
+    return vertices, faces
+
+
+_READERS: Final[dict[str, Callable[[IO[bytes]], tuple[FloatArray, Any]]]] = {
+    "obj": _read_obj,
+    "off": _read_off,
+    "ply": _read_ply,
+}
+"""Of formats that have polygons: trimesh cuts them as fans, also those that are not convex."""
+
+
+def _cut(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
+    """Return the triangles of faces, cut by the rule of constructors (ear_cutting.py), and the face that each is of."""
+    counts, numbers = np.fromiter(map(len, faces), np.int64), np.arange(len(faces))
+    indices = (
+        np.asarray(faces, np.int64).ravel()
+        if counts.min() == counts.max()
+        else np.concatenate([np.asarray(face, np.int64) for face in faces])
+    )
+    if len(beyond := np.flatnonzero((indices < 0) | (indices >= len(vertices)))):
+        face = int(np.searchsorted(np.cumsum(counts), beyond[0], "right"))
         raise IndexOutOfRangeError(
-            f"triangle {face} names vertex {faces[face, corner]}, the file holds {len(vertices)}; correct the file",
+            f"face {face} names vertex {indices[beyond[0]]}, the file holds {len(vertices)}; correct the file",
             ("file",),
         )
-    return _merged(vertices, faces, file_format)
+    if counts.max() == 3 == counts.min():
+        return indices.reshape(-1, 3), numbers
+    points = frozen(as_points(vertices, 3, ("vertices",)))
+    first, owners = first_equal(points), np.repeat(numbers, counts)
+    merged = indices if first is None else first[indices]
+    ends = np.cumsum(counts)
+    following = np.arange(1, len(indices) + 1)
+    following[ends - 1] = ends - counts
+    stands = (merged == merged[following]) & (indices != indices[following]) & (counts[owners] > 3)
+    left = np.flatnonzero(~stands)
+    left = left[np.bincount(owners[left], minlength=len(faces))[owners[left]] > 2]
+    numbers, counts = np.unique(owners[left], return_counts=True)
+    offsets = np.append(np.int64(0), np.cumsum(counts))
+    try:
+        triangles, cut_from = cut_faces(points, offsets, indices[left], indices[left], UNLIMITED)
+    except FaceNotSimpleError as error:
+        face = int(numbers[int(error.where[1])])
+        error.message = error.message.replace(f"faces[{error.where[1]}]", f"faces[{face}]", 1)
+        error.where, error.args = ("faces", face), (error.message,)
+        raise
+    return triangles.reshape(-1, 3), numbers[cut_from]
 
 
-def _counted(text: bytes) -> bytes:
-    """Return an OBJ file with its relative indices counted, from the last vertex before the face; ValueError for faces
-    that are none. trimesh counts from the end of the file, takes 0 for 1, and drops faces of fewer than three corners.
-    """
-    if _ODD.search(text) is None:
-        return text
-    n_vertices = n_faces = 0
-
-    def rewritten(match: re.Match[bytes]) -> bytes:
-        nonlocal n_vertices, n_faces
-        if match[1] == b"v":
-            n_vertices += 1
-            return match[0]
-        given = [int(corner.partition(b"/")[0]) for corner in match[2].partition(b"#")[0].split()]
-        corners = [n_vertices + 1 + number if number < 0 else number for number in given]
-        if len(corners) < 3 or min(corners) < 1 or 0 in given:
-            raise ValueError(
-                f"face {n_faces} has the corners {given!s:.100}; it needs three or more, from 1, or from -1 for the "
-                f"last of {n_vertices} vertices before it"
-            )
-        n_faces += 1
-        return b"f " + b" ".join(b"%d" % number for number in corners)
-
-    return _ELEMENT.sub(rewritten, text.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))
-
-
-def _merged(vertices: FloatArray, faces: IntArray, file_format: str) -> MeshOfFile:
+def _merged(vertices: FloatArray, faces: IntArray, numbers: IntArray, file_format: str) -> MeshOfFile:
     """Return the vertices at different coordinates in their first order, and the faces with their new indices but for
     those that this collapses."""
     n_faces, remaining = len(faces), np.arange(len(faces))
@@ -168,7 +235,11 @@ def _merged(vertices: FloatArray, faces: IntArray, file_format: str) -> MeshOfFi
             f"all triangles of the {file_format} file have two equal corners; write it with more digits", ("file",)
         )
     made = MeshOfFile(vertices, faces)
-    made.n_collapsed, made.faces_in_file, made.vertices_in_file = n_faces - len(remaining), remaining, originals
+    made.n_collapsed, made.faces_in_file, made.vertices_in_file = (
+        n_faces - len(remaining),
+        numbers[remaining],
+        originals,
+    )
     made._is_soup = file_format in _SOUPS
     return made
 

@@ -134,9 +134,10 @@ def dissolve_features(
     side = collection_of(layer, ("layer",), limits)
     crs = crs_of([side], limits)
     names = _checked_names(by)
-    checked = texts_of(side, side.properties, "properties", limits)  # none may be what JSON cannot hold
-    limits.budget().take(-sum(map(len, checked)))
-    del checked
+    for member, kept in (("properties", side.properties), ("id", ({"id": each.get("id")} for each in side.features))):
+        checked = texts_of(side, kept, member, limits)  # none may be what JSON cannot hold
+        limits.budget().take(-sum(map(len, checked)))
+        del checked
     groups, values = groups_of(side, names, limits)
     rows = dissolved(polygons_of(side, limits), groups, len(values), limits)
     counts = np.bincount(groups, minlength=len(rows)).tolist()

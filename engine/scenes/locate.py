@@ -30,8 +30,8 @@ from engine.solids.polyhedron import Polyhedron
 from engine.solids.ragged import Ragged
 from engine.types import UNDECIDED, Accuracy
 
-_BYTES: Final = 40
-"""Of a body and point that it may hold, in its part and in the answer."""
+_BYTES: Final = 72
+"""Of a body and point that it may hold: its key in its part and with the others, sorted, its point, body, location."""
 _MOST_SORTED: Final = 32
 """Bodies that hold a point, put in order one by one."""
 _FEW_POINTS, _FEW_PAIRS, _FEW_BESIDE_TABLES = 32, 16, 2

@@ -186,9 +186,9 @@ class Scene(Immutable):
             relations = np.full(len(met), TOUCHING, np.int8) if asked.boolean else relations[order]
             return ScenePairs(first, second, relations), Accuracy("exact", None, len(keys), 0, 0, "named pairs")
         if asked.only is not None:
-            keys = keys[np.isin(keys, pair_keys(asked.only, n, "only"))]
+            keys = keys[np.isin(keys, pair_keys(asked.only, n, "only", budget))]
         if asked.skip is not None:
-            keys = keys[~np.isin(keys, pair_keys(asked.skip, n, "skip"))]
+            keys = keys[~np.isin(keys, pair_keys(asked.skip, n, "skip", budget))]
         pairs = np.stack(np.divmod(keys, n), axis=1)
         bodies, local = np.unique(pairs, return_inverse=True)
         asked = asked._replace(skip=None, only=local.reshape(-1, 2))

@@ -67,3 +67,18 @@ def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Cal
         mesh = mesh_reader.read(octets, kind, call)
     with call.phase("prepare"):
         return mesh.solid(engine.Polyhedron if solid_type == "polyhedron" else engine.Surface), mesh.n_collapsed
+
+
+def from_scene_pieces(found: Any, call: Call) -> Any:
+    """Return pieces as rows of float64, or whether each segment meets a body as int8."""
+    if isinstance(found, np.ndarray):
+        return found.astype(np.int8)
+    call.take(8 * len(found) * (4 + 2 * found.start.shape[1]))
+    return np.column_stack([found.source, found.body, found.t, found.start, found.end])
+
+
+def from_locations(found: engine.SceneLocations, call: Call) -> Any:
+    """Return rows of point, body and location."""
+    call.take(24 * len(found.indices))
+    points = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets))
+    return np.column_stack([points, found.indices, 1 - found.on_boundary.astype(np.int64)])

@@ -1,22 +1,24 @@
-"""Questions: JSON models to the engine's solids, poses and arrays, and its paths back into the request."""
+"""Questions: JSON models to the engine's solids, poses, scenes and arrays, and its paths back into the request."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import BaseModel, RootModel
+from fastapi import Query
+from pydantic import BaseModel, RootModel, TypeAdapter, ValidationError
 
 import engine
-from engine import EngineError, Solid
+from engine import EngineError, Scene, Solid
 from service.errors import ServiceError
 from service.schemas import solids
-from service.schemas.bounds import BoundsRequest
-from service.schemas.containment import ContainsRequest
-from service.schemas.segments import ClipSegmentsRequest
-from service.work import Call, Where
+from service.schemas.bodies import Keep, Moved, MovedBody
+from service.schemas.clipping import ClipSegmentsRequest
+from service.schemas.points import BoundsRequest, ContainsRequest
+from service.schemas.solids import Body
+from service.work import Call, T, Where
 
 _LIGHT_SOLIDS: Final = ("half_space", "sphere", "aabb", "convex", "triangle")
 
@@ -73,7 +75,7 @@ class _Builder:
             raise ServiceError("too_deep", detail, where)
 
 
-def _checked(where: Where, build: Callable[[], Solid]) -> Solid:
+def _checked(where: Where, build: Callable[[], T]) -> T:
     try:
         return build()
     except EngineError as error:
@@ -110,12 +112,8 @@ def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[
 
 def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
     """Return the engine's pose for `model`, which stands at `where` in the request."""
-    try:
-        if model.tolerance is None:
-            return engine.Pose(model.rotation, model.translation)
-        return engine.Pose(model.rotation, model.translation, tolerance=model.tolerance)
-    except EngineError as error:
-        raise error.at(*where) from None
+    given = {} if model.tolerance is None else {"tolerance": model.tolerance}
+    return _checked(where, lambda: engine.Pose(model.rotation, model.translation, **given))
 
 
 def to_poses(models: list[solids.RigidPose], dimension: int) -> tuple[Any, Any]:
@@ -180,3 +178,50 @@ def is_light(question: Any) -> bool:
     if isinstance(question, ClipSegmentsRequest):
         return question.region.root.type in ("half_space", "aabb", "sphere")
     return False
+
+
+KeepQuery = Annotated[Keep, Query(description="As in JSON: all, first or any.")]
+_MOVED: TypeAdapter[list[MovedBody]] = TypeAdapter(Moved)
+
+
+def to_scene(bodies: list[Body], call: Call) -> Scene:
+    """Return the engine's scene of these bodies."""
+    solids, poses = to_bodies(bodies, call)
+    with call.phase("prepare"):
+        try:
+            return Scene(solids, poses)
+        except EngineError as error:
+            tell_of_scene(error)
+            raise
+
+
+def to_moved(scene: Scene, moved: list[MovedBody] | None, call: Call) -> Scene:
+    """Return a scene with some of its bodies elsewhere."""
+    if not moved:
+        return scene
+    poses: dict[int, engine.Pose | None] = {}
+    with call.phase("prepare"):
+        for place, item in enumerate(moved):
+            if item.body in poses or item.body >= len(scene):
+                why = "twice" if item.body in poses else f"which is not there; the scene has {len(scene)}"
+                raise engine.IndexOutOfRangeError(
+                    f"moved[{place}] names body {item.body}, {why}", ("moved", place, "body")
+                )
+            pose = to_pose(item.pose, ("moved", place, "pose"))
+            if pose.dimension != scene.solids[item.body].dimension:
+                raise engine.WrongDimensionError(
+                    f"moved[{place}] has a pose of dimension {pose.dimension}, the scene is "
+                    f"{scene.solids[item.body].dimension}D",
+                    ("moved", place, "pose"),
+                )
+            poses[item.body] = pose
+        return scene.moved(poses)
+
+
+def read_moved(text: str, call: Call) -> list[MovedBody]:
+    """Return what moved, from the query of the binary lane."""
+    try:
+        return _MOVED.validate_json(text, context=call)
+    except ValidationError as error:
+        reason = str(error.errors()[0]["msg"])
+        raise ServiceError("invalid_request", f"query parameter 'moved': {reason:.200}, got {text!r:.100}") from None

@@ -13,9 +13,8 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from service.decoding import pieces
-from service.decoding.numbers import Decoder
+from service.decoding.numbers import Decoder, Unfit
 from service.decoding.pieces import Body
-from service.decoding.rings import Unfit
 
 STEP: Final = 2**22
 """Bytes searched at once: 0.3 ms."""

@@ -6,7 +6,10 @@ simdjson holds the interpreter's lock while it parses, and a piece keeps it for 
 simdjson's buffer of a nested array is flat and says nothing of the rows. The brackets and commas of the text do: they
 are compared with those that the shape of the first rows asks for. Integers that float64 cannot hold would be rounded
 there, so pieces with numbers from 2**53 on are looked at one number at a time. Rings of several lengths become an array
-each (rings.py).
+each: how long each is, the brackets and commas tell alone.
+
+A point of two numbers is ``[,]`` there. With a dot for each, rings read ``[[.,.,.],[.,.,.,.]]``, and polygons are lists
+of such. Nothing is looked at point by point: two rings of one length have one text.
 """
 
 from __future__ import annotations
@@ -22,8 +25,50 @@ import jiter
 import numpy as np
 import simdjson
 
-from service.decoding import rings
-from service.decoding.rings import Unfit
+COST: Final = 300
+"""Bytes that the arrays of a ring take beside its numbers."""
+
+
+class Unfit(Exception):
+    """The text, or an array in it, is none that is taken here."""
+
+
+def lengths_of(tokens: bytes, depth: int) -> tuple[int, list[list[int]]]:
+    """Return the dimension of the points, and the lengths of the rings by polygon.
+
+    tokens: brackets and commas of a list of rings (depth 3: one polygon) or of polygons (depth 4).
+    Raises: Unfit for anything else.
+
+    >>> lengths_of(b"[[[,],[,]],[[,],[,],[,]]]", 3)
+    (2, [[2, 3]])
+    >>> lengths_of(b"[[[[,,]],[[,,]]],[[[,,],[,,]]]]", 4)
+    (3, [[1, 1], [2]])
+    """
+    dimension = tokens.find(b"]") - depth + 1
+    if dimension not in (2, 3):
+        raise Unfit
+    dotted = tokens.replace(b"[%b]" % (b"," * (dimension - 1)), b".")
+    level = depth - 1
+    if not dotted.startswith(b"[" * level + b".") or not dotted.endswith(b"." + b"]" * level):
+        raise Unfit
+    polygons = dotted[level:-level].split(b"]],[[") if depth == 4 else [dotted[level:-level]]
+    rings = [polygon.split(b"],[") for polygon in polygons]
+    if not all(ring == b",".join([b"."] * len(ring[::2])) for ring in set().union(*rings)):
+        raise Unfit
+    return dimension, [[len(ring[::2]) for ring in polygon] for polygon in rings]
+
+
+def cut(rows: Any, groups: list[list[int]], depth: int) -> list[Any]:
+    """Return the rings, views of `rows`; at depth 4 a list of them for each polygon."""
+    found, start = [], 0
+    for lengths in groups:
+        rings = []
+        for length in lengths:
+            rings.append(rows[start : start + length])
+            start += length
+        found.append(rings)
+    return found if depth == 4 else [ring for rings in found for ring in rings]
+
 
 PIECE: Final = 2**16
 """Bytes parsed at once: 0.2 ms, and text and result stay in the processor's cache."""
@@ -90,7 +135,7 @@ class Decoder:
         for start, end in _pieces(text, depth, stop):
             self._poll()
             piece, n_before = b"".join((b"[", text[start:end], b"]")), self._n_numbers
-            dimension, lengths = rings.lengths_of(piece.translate(None, _NO_TOKENS), depth)
+            dimension, lengths = lengths_of(piece.translate(None, _NO_TOKENS), depth)
             try:
                 array: Any = self._parser.parse(piece)
                 self._append(array, (stop - start) / (end - start))
@@ -105,8 +150,8 @@ class Decoder:
         if len(dimensions) != 1 or 0 in dimensions:
             raise Unfit
         rows = self._checked(text, depth).reshape(-1, dimensions.pop())
-        self._take(rings.COST * sum(map(len, groups)))
-        return rings.cut(rows, groups, depth)
+        self._take(COST * sum(map(len, groups)))
+        return cut(rows, groups, depth)
 
     def _checked(self, text: memoryview, depth: int) -> Any:
         """Return the numbers found, unless one is not what the text says."""

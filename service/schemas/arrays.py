@@ -46,6 +46,7 @@ class Axis(NamedTuple):
 
 DIMENSION: Final = Axis(2, 3)
 POINTS: Final = Axis(0, "max_points")
+PAIR: Final = Axis(2, 2)
 
 _KINDS: Final[dict[str, tuple[npt.DTypeLike, frozenset[type], dict[str, Any]]]] = {
     "number": (np.float64, frozenset({float, int}), {"type": "number", "format": "double"}),

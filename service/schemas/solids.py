@@ -7,12 +7,16 @@ from typing import Annotated, Any, Literal, Union
 from pydantic import Field, RootModel, WithJsonSchema, create_model
 
 import engine
-from service.schemas.arrays import DIMENSION, Array, Axis, Numbers
-from service.schemas.limits import AtMost, left_out
-from service.schemas.problem import Count, Schema, with_example
+from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
+from service.schemas.base import AtMost, Count, Schema, left_out, with_example
 
 Number = Annotated[float, Numbers()]
 Position = Annotated[Array, Numbers(DIMENSION)]
+Points = Annotated[Array, Numbers(POINTS, DIMENSION)]
+Booleans = Annotated[Array, Numbers(Axis(0, None), kind="boolean")]
+Indices = Annotated[Array, Numbers(Axis(0, None), kind="integer", minimum=0)]
+IndexLists = Annotated[list[list[int]], Numbers(Axis(0, None), Axis(0, None), kind="integer", ragged=True, minimum=0)]
+Segments = Annotated[Array, Numbers(POINTS, PAIR, DIMENSION)]
 Vertices2 = Annotated[Array, Numbers(Axis(1, "max_points"), Axis(2, 2))]
 Vertices3 = Annotated[Array, Numbers(Axis(1, "max_points"), Axis(3, 3))]
 Faces = Annotated[Any, Numbers(Axis(1, "max_faces"), Axis(3, "max_points"), kind="integer", ragged=True, minimum=0)]

@@ -17,7 +17,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas.scenes import SCENE_ID
+from service.schemas.bodies import SCENE_ID
 from tests.unit.service.asking import SPHERE, examples
 from tests.unit.service.test_live import Service
 

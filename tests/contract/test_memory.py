@@ -18,7 +18,7 @@ import zstandard
 
 from benchmarks.load import watched
 from benchmarks.measure import memory_of
-from service.schemas.scenes import SCENE_ID
+from service.schemas.bodies import SCENE_ID
 from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, across, comb, features, stripes
 from tests.unit.service.asking import SPHERE, examples
 from tests.unit.service.test_live import Service, running

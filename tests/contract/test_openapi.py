@@ -21,7 +21,7 @@ import pytest
 import engine
 from service.app import create_app
 from service.openapi import ANSWERS as EXAMPLES
-from service.schemas.scenes import SCENE_ID
+from service.schemas.bodies import SCENE_ID
 from service.settings import Settings
 from tests.unit.service.asking import client_of, examples
 

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -103,3 +104,20 @@ def test_two_processes_unpack_one_archive(tmp_path: Path, seed: Path) -> None:
     together = [ask(tmp_path, ENGINE_CACHE_SEED=archive) for _ in range(2)]
     assert [told(process) for process in together] == [(f"{ANSWERS} 0", "")] * 2
     assert len(list(tmp_path.rglob("seed-*"))) == 1
+
+
+def test_a_pipe_in_the_cache_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To open it waited for ever for somebody to write."""
+    monkeypatch.setattr(kernel_cache, "_candidates", lambda: iter([tmp_path]))
+    kernel_cache.cache_folder.cache_clear()
+    try:
+        os.mkfifo(tmp_path / "a kernel", 0o600)
+        thread = threading.Thread(target=lambda: found.append(kernel_cache.kept("a kernel")), daemon=True)
+        found: list[bytes | None] = []
+        thread.start()
+        thread.join(20)
+        assert found == [None]
+        kernel_cache.keep("a kernel", b"compiled")
+        assert kernel_cache.kept("a kernel") == b"compiled"
+    finally:
+        kernel_cache.cache_folder.cache_clear()

@@ -138,8 +138,8 @@ def collide_bodies(
         check_has_detail(((("solids", i), solid) for i, solid in enumerate(bodies.solids)), boolean)
     gap = None if gap is None else checked_distance(gap, "gap")
     budget.check()
-    skipped = None if skip is None else pair_keys(skip, len(bodies.solids), "skip")
-    wanted = None if only is None else pair_keys(only, len(bodies.solids), "only")
+    skipped = None if skip is None else pair_keys(skip, len(bodies.solids), "skip", budget)
+    wanted = None if only is None else pair_keys(only, len(bodies.solids), "only", budget)
     parts: list[ScenePairs] = []
     works: list[Work] = []
     n_candidates = n_open = 0
@@ -248,7 +248,7 @@ def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntA
         yield np.stack([first[meet], second[meet]], axis=1)
 
 
-def pair_keys(named: Any, n_bodies: int, name: str) -> IntArray:
+def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
     try:
         array = np.asarray(named)
     except ValueError:
@@ -259,6 +259,7 @@ def pair_keys(named: Any, n_bodies: int, name: str) -> IntArray:
         return np.empty(0, np.int64)
     if array.ndim != 2 or array.shape[1] != 2 or array.dtype.kind not in "iu":
         raise InvalidArrayError(f"{name} must be pairs of indices (n, 2), got shape {array.shape}", (name,))
+    budget.take(_BYTES * len(array))
     wrong = np.flatnonzero(((array < 0) | (array >= n_bodies)).any(axis=1))
     if len(wrong):
         row = int(wrong[0])

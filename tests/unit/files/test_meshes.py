@@ -123,3 +123,76 @@ def test_the_command_line_says_how_many_are_left_out(tmp_path: Any, capsys: pyte
     assert f"ball.stl: {has_equal(corners).sum()} triangles have two equal corners and are left out" in found.err
     assert main([*arguments, "--quiet"]) == 0
     assert not capsys.readouterr().err
+
+
+CONCAVE = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [2, 1, 0], [0, 4, 0]]
+QUAD = [[3, 0, 0], [0, 0, 0], [0, 3, 0], [1, 1, 0]]
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex {}\n{}element face {}\nproperty list uchar int vertex_indices\nend_header\n"
+)
+
+
+def polygons(kind: str, vertices: Any, faces: Any) -> bytes:
+    if kind == "obj":
+        lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {' '.join(str(i + 1) for i in f)}" for f in faces]
+        return "\r\n".join(["\ufeff# made by hand", *lines]).encode()
+    rows = [*(f"{x} {y} {z}" for x, y, z in vertices), *(f"{len(f)} {' '.join(map(str, f))}" for f in faces)]
+    if kind == "off":
+        return "\n".join([f"OFF # by hand\n{len(vertices)} {len(faces)} 0", *rows, ""]).encode()
+    axes = "".join(f"property double {axis}\n" for axis in "xyz")
+    if kind == "ply":
+        return (PLY.format(len(vertices), axes, len(faces)) + "\n".join(rows) + "\n").encode()
+    head = PLY.format(len(vertices), axes, len(faces)).replace("ascii", "binary_little_endian").encode()
+    corners = [np.uint8(len(f)).tobytes() + np.array(f, "<i4").tobytes() for f in faces]
+    return head + np.array(vertices, "<f8").tobytes() + b"".join(corners)
+
+
+@pytest.mark.parametrize("vertices", [CONCAVE, QUAD], ids=["pentagon", "quad"])
+@pytest.mark.parametrize("kind", ["obj", "off", "ply", "ply binary"])
+def test_polygons_are_cut_as_the_constructors_cut_them(kind: str, vertices: Any) -> None:
+    """trimesh makes fans: a ball in the notch of a concave face met the surface."""
+    n = len(vertices)
+    mesh = engine.read_mesh(polygons(kind, vertices, [list(range(n))]), kind.partition(" ")[0])
+    own = engine.Surface(vertices, [list(range(n))])
+    assert mesh.faces.tolist() == own.triangles.tolist()
+    assert mesh.faces_in_file.tolist() == [0] * (n - 2)
+    notch = engine.Sphere([2.5, 2.2, 0] if n == 5 else [1.2, 1.2, 0], 0.05)
+    assert engine.collide(mesh.solid(engine.Surface), notch).relation == engine.Relation.DISJOINT
+
+
+@pytest.mark.parametrize("kind", ["obj", "off", "ply"])
+def test_triangles_and_polygons_stand_in_the_order_of_the_file(kind: str) -> None:
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1]]
+    faces = [[0, 1, 4], [3, 2, 1, 0], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    mesh = engine.read_mesh(polygons(kind, vertices, faces), kind)
+    assert mesh.faces_in_file.tolist() == [0, 1, 1, 2, 3, 4]
+    assert engine.locate([[0.3, 0.3, 0.2], [0.9, 0.9, 0.9]], mesh.solid()).tolist() == [1, -1]
+    faces[3].reverse()
+    with pytest.raises(engine.InconsistentOrientationError, match="of face"):
+        engine.read_mesh(polygons(kind, vertices, faces), kind).solid()
+    with pytest.raises(engine.FaceNotSimpleError, match=r"faces\[1\] = \[0, 2, 1, 3\]"):
+        engine.read_mesh(polygons(kind, vertices, [faces[0], [0, 2, 1, 3]]), kind)
+    with pytest.raises(engine.IndexOutOfRangeError, match="face 1 names vertex 7, the file holds 5"):
+        engine.read_mesh(polygons(kind, vertices, [faces[0], [0, 1, 2, 7]]), kind)
+    vertices[2][2] = float("nan")  # type: ignore[call-overload]
+    with pytest.raises(engine.NotFiniteError, match=r"vertices\[2"):
+        engine.read_mesh(polygons(kind, vertices, faces), kind).solid()
+
+
+def test_sides_of_polygons_that_rounding_makes_points_are_left_out() -> None:
+    """Two of a prism's vertices are one in single precision: a side of it is a triangle then, and it stays closed."""
+    low = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [2, 2, 0], [0, 2, 0]]
+    vertices = low + [[x, y, 1] for x, y, _ in low]
+    vertices[7], vertices[8] = [2, 2, 1], [1, 2, 1]
+    sides = [[i, (i + 1) % 5, (i + 1) % 5 + 5, i + 5] for i in range(5)]
+    mesh = engine.read_mesh(polygons("obj", vertices, [[4, 3, 2, 1, 0], [5, 6, 7, 8, 9], *sides]), "obj")
+    assert engine.locate([[1, 1, 0.5], [3, 1, 0.5]], mesh.solid()).tolist() == [1, -1]
+
+
+SHORT = ("3 1 0\n{}2 0 1\n", "3 1 0\n{}3 0 1\n", "3 2 0\n{}3 0 1 2\n", "3 1 0\n0 0 0\n1 0 0\n", "")
+
+
+@pytest.mark.parametrize("text", SHORT)
+def test_off_files_that_say_too_little_are_refused(text: str) -> None:
+    with pytest.raises(engine.InvalidInputError, match="cannot be read as off"):
+        engine.read_mesh(b"OFF " + text.format("0 0 0\n1 0 0\n0 1 0\n").encode(), "off")

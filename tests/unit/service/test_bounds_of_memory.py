@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import gzip
 import json
-from collections.abc import AsyncIterator
+import tracemalloc
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import httpx
@@ -16,7 +17,7 @@ from fastapi import FastAPI
 
 import engine
 from service import wire
-from service.schemas.containment import ContainsSceneResponse
+from service.schemas.points import ContainsSceneResponse
 from service.work import SMALL
 from tests.unit.service.asking import SPHERE, check_problem, client_of
 
@@ -70,6 +71,42 @@ async def test_large_answers_are_refused_before_they_are_there(
         assert any(word in detail for word in ("fewer", "split", "window"))
         with app.state.memory.lock:
             assert app.state.memory.taken == app.state.memory.leaving
+
+
+class Ledger(engine.Cancel):
+    """Hears what a call is about to hold."""
+
+    taken = 0
+
+    def take(self, n_bytes: int) -> None:
+        self.taken += n_bytes
+
+
+def peak_of(ask: Callable[[Ledger], object]) -> tuple[int, int]:
+    """Return how many bytes a call held at most, and how many it counted."""
+    ask(Ledger())  # compiled, prepared
+    ledger = Ledger()
+    tracemalloc.start()
+    try:
+        ask(ledger)
+        return tracemalloc.get_traced_memory()[1], ledger.taken
+    finally:
+        tracemalloc.stop()
+
+
+def test_what_the_engine_holds_for_a_question_is_counted() -> None:
+    """Pairs that are named, vertices in a smallest sphere and points in many bodies are copied several times."""
+    ball, turns = engine.Sphere([0, 0, 0], 1), np.linspace(0, 6, 50_000)
+    pairs = np.array([[0, 1]] * 200_000)
+    rings = iter([engine.Polygon([np.stack([np.cos(turns), np.sin(turns)], axis=1)]) for _ in range(2)])
+    for ask in (
+        lambda ledger: engine.collide_scene([ball] * 3, only=pairs, workers=1, cancel=ledger),
+        lambda ledger: engine.collide_scene([ball] * 3, skip=pairs, workers=1, cancel=ledger),
+        lambda ledger: engine.bounds(next(rings), cancel=ledger),
+        lambda ledger: engine.locate_scene(np.zeros((2_000, 3)), [ball] * 100, workers=1, cancel=ledger),
+    ):
+        held, counted = peak_of(ask)
+        assert 10**6 < held < 1.1 * counted, (held, counted)
 
 
 async def test_what_others_hold_is_not_given_twice(app: FastAPI, anyio_backend: str) -> None:
@@ -132,19 +169,20 @@ async def test_bodies_may_be_compressed(client: httpx.AsyncClient, pack: Any) ->
     assert answer.content == b"\1" * 5
 
 
-async def test_a_gzip_body_may_have_several_members(client: httpx.AsyncClient) -> None:
-    """RFC 1952, 2.2: as `cat a.gz b.gz` makes them, and tools that compress in blocks."""
-    headers = {**JSON, "Content-Encoding": "gzip"}
+@pytest.mark.parametrize("pack", [gzip.compress, zstandard.compress], ids=["gzip", "zstd"])
+async def test_a_body_may_have_several_members_or_frames(client: httpx.AsyncClient, pack: Any) -> None:
+    """RFC 1952, 2.2, RFC 8878, 3.1: as `cat a.gz b.gz` makes them, and tools that compress in blocks."""
+    headers = {**JSON, "Content-Encoding": "gzip" if pack is gzip.compress else "zstd"}
     body = json.dumps({"solid": SPHERE, "points": [[0, 0, 0]] * 20_000}).encode()
-    members = [gzip.compress(body[start : start + 50_000]) for start in range(0, len(body), 50_000)]
-    members[1:1] = [gzip.compress(b"")] * 5_000
-    members += [gzip.compress(bytes([byte])) for byte in b" " * 5_000]
+    members = [pack(body[start : start + 50_000]) for start in range(0, len(body), 50_000)]
+    members[1:1] = [pack(b"")] * 5_000
+    members += [pack(bytes([byte])) for byte in b" " * 5_000]
     whole = b"".join(members)
     answer = await client.post("/v1/contains", content=whole, headers=headers)
     assert answer.json()["contained"] == [True] * 20_000
-    for wrong in (whole[:-5], whole + b"junk", whole + b"\x1f", whole + gzip.compress(b"")[:12]):
+    for wrong in (whole[:-5], whole + b"junk", whole + b"\x1f", whole + pack(b"some text")[:12]):
         check_problem(await client.post("/v1/contains", content=wrong, headers=headers), 400, "bad_request")
-    bomb = gzip.compress(b" " * 2**18) * 2**6
+    bomb = pack(b" " * 2**18) * 2**6
     check_problem(await client.post("/v1/contains", content=bomb, headers=headers), 413, "body_too_large")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas.collision import CollideResponse, CollideSceneResponse
+from service.schemas.bodies import CollideResponse, CollideSceneResponse
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio

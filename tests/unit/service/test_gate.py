@@ -12,9 +12,9 @@ import pytest
 from fastapi import FastAPI
 
 import engine
+from service.__main__ import JsonFormatter
 from service.app import create_app
 from service.gate import Gate
-from service.logs import JsonFormatter
 from service.settings import Settings
 from tests.unit.service.asking import SPHERE, check_problem, client_of
 

@@ -13,8 +13,8 @@ from fastapi import FastAPI
 
 import engine
 from service.app import create_app
-from service.routes.base import router_of
-from service.schemas.problem import Schema
+from service.openapi import router_of
+from service.schemas.base import Schema
 from service.settings import Settings
 from service.work import CallOf
 from tests.unit.service.asking import SPHERE, check_problem, client_of
@@ -34,7 +34,7 @@ async def late(monkeypatch: pytest.MonkeyPatch, anyio_backend: str) -> AsyncIter
     """An app of two threads with a route that never looks at its deadline, until `app.state.awake` is set."""
     monkeypatch.setattr(engine, "warm", lambda **_: None)
     app = create_app(Settings(concurrency=2, queue_length=4, deadline_seconds=DEADLINE))
-    router, app.state.awake, app.state.begun = router_of("test"), threading.Event(), []
+    router, app.state.awake, app.state.begun = router_of(tags=["test"]), threading.Event(), []
 
     @router.post("/stuck")
     def stuck(question: Stuck, call: CallOf) -> Stuck:

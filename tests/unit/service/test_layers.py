@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 
-from service.convert import answers
-from service.schemas.layers import LayersResponse
+from service.convert import areas
+from service.schemas.clipping import LayersResponse
 from tests.unit.layers.cells import collection, layer, rows
 from tests.unit.layers.test_features import cells_of
 from tests.unit.service.asking import check_problem, client_of
@@ -149,7 +149,7 @@ async def test_what_rows_copy_is_counted_before_it_is_copied(
         if name == "names":
             most = len(whole.content) // 2
         app.state.settings = app.state.settings.model_copy(update={"max_answer_bytes": most})
-        monkeypatch.setattr(answers, "_geometry", None)  # no row may be made
+        monkeypatch.setattr(areas, "_geometry", None)  # no row may be made
         detail = check_problem(await client.post(f"/v1/layers/{path}", json=question), 422, "answer_too_large")[
             "detail"
         ]
@@ -162,6 +162,7 @@ async def test_what_rows_copy_is_counted_before_it_is_copied(
     ("path", "place", "member"),
     [
         ("overlay", "/left/features/0/id", "NaN"),
+        ("union", "/layer/features/0/id", "NaN"),
         ("overlay", "/left/crs/a", "-Infinity"),
         ("union", "/layer/features/0/properties/a/0", "1e400"),
         ("contains", "/points/features/0/id", "Infinity"),

@@ -182,6 +182,12 @@ def test_a_client_that_asks_for_h2c_gets_its_answer(service: Service) -> None:
     assert b"\nconnection: close" in refused
 
 
+def test_an_offer_by_http_1_0_needs_no_host(service: Service) -> None:
+    """Its headers were parsed again as HTTP/1.1, which asks for one."""
+    answer = service.send(b"GET /healthz HTTP/1.0\r\nUpgrade: h2c\r\nConnection: Upgrade\r\n\r\n", half_close=True)
+    assert answer.startswith(b"HTTP/1.1 200 "), answer
+
+
 def test_broken_http_is_answered_or_closed(service: Service) -> None:
     for data in (
         b"\x00\x01\x02\r\n\r\n",

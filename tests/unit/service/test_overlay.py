@@ -7,7 +7,7 @@ from typing import Any
 import httpx
 import pytest
 
-from service.schemas.overlay import OverlayBatchResponse, OverlayResponse
+from service.schemas.clipping import OverlayBatchResponse, OverlayResponse
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio

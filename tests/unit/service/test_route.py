@@ -17,8 +17,8 @@ import pytest
 from fastapi import FastAPI
 
 import engine
-from service.routes.base import router_of
-from service.schemas.problem import Schema
+from service.openapi import router_of
+from service.schemas.base import Schema
 from service.work import CallOf
 from tests.unit.service.asking import SPHERE, check_problem, client_of, resolve
 
@@ -39,7 +39,7 @@ class Broken(Schema):
 def add_slow_routes(app: FastAPI) -> list[str]:
     """Add a route that works until it is cancelled, its time is over or `app.state.awake` set, and one that fails;
     return what happened."""
-    router, log = router_of("test"), []
+    router, log = router_of(tags=["test"]), []
     app.state.awake, app.state.begun = threading.Event(), threading.Event()
 
     def work(seconds: float, *, deadline: float, cancel: engine.Cancel, report: bool) -> tuple[None, None]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-import service.disk
+import service.store
 from service.errors import ServiceError
 from service.store import Store
 from tests.unit.service.test_store import sphere
@@ -40,7 +40,7 @@ def test_a_full_disk_is_no_failure_of_the_service(
         raise OSError(number, os.strerror(number))
 
     store = Store(10**6, tmp_path)
-    monkeypatch.setattr(service.disk.os, "fsync", refuse)
+    monkeypatch.setattr(service.store.os, "fsync", refuse)
     assert code_of(lambda: store.put(sphere(1))) == code
     assert not [*tmp_path.iterdir()]
     monkeypatch.undo()
@@ -76,5 +76,5 @@ def test_another_users_file_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         raise PermissionError(errno.EACCES, "Permission denied")
 
     store = Store(10**6, tmp_path)
-    monkeypatch.setattr(service.disk.os, "open", refuse)
+    monkeypatch.setattr(service.store.os, "open", refuse)
     assert code_of(lambda: store.get(name)) == "store_unavailable"

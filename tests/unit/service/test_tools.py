@@ -17,8 +17,8 @@ from service import tools, wire
 from service.app import create_app
 from service.convert.summaries import summary
 from service.errors import ServiceError
-from service.schemas.layers import LayersResponse
-from service.schemas.problem import Schema
+from service.schemas.base import Schema
+from service.schemas.clipping import LayersResponse
 from service.settings import Settings
 from service.wire import Raw, Series
 from tests.unit.service.asking import SPHERE, check_problem, client_of, examples

@@ -6,14 +6,13 @@ import http.server
 import json
 import logging
 import os
-import re
 import threading
 import time
 
 import httpx
 import pytest
 
-from service.logs import JsonFormatter
+from service.__main__ import JsonFormatter
 from service.traces import trace_of
 from tests.unit.service.asking import SPHERE
 from tests.unit.service.test_live import Service
@@ -26,13 +25,10 @@ TRACE = PARENT.split("-")[1]
 async def test_a_trace_names_the_request(client: httpx.AsyncClient, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, "service.access"):
         answer = await client.post("/v1/solids", json=SPHERE, headers={"traceparent": PARENT})
-    version, trace_id, span_id, flags = answer.headers["traceresponse"].split("-")
-    assert (version, trace_id, flags) == ("00", TRACE, "01")
-    assert re.fullmatch("[0-9a-f]{16}", span_id)
-    assert span_id not in PARENT
+    assert "traceresponse" not in answer.headers  # there is no span that it could name
     line = json.loads(JsonFormatter().format(caplog.records[-1]))
-    assert (line["trace_id"], line["span_id"]) == (trace_id, span_id)
-    assert "traceresponse" not in (await client.get("/healthz")).headers
+    assert line["trace_id"] == TRACE
+    assert "span_id" not in line
 
 
 @pytest.mark.parametrize(
@@ -43,11 +39,11 @@ async def test_a_trace_names_the_request(client: httpx.AsyncClient, caplog: pyte
     ],
 )  # fmt: skip
 def test_what_is_no_trace_is_left_alone(given: str) -> None:
-    assert trace_of({b"traceparent": given.encode()}) is None
+    assert trace_of({b"traceparent": given.encode()}) == ({}, b"")
 
 
 def test_a_later_version_is_read_as_this_one() -> None:
-    assert trace_of({b"traceparent": b"cc" + PARENT[2:].encode() + b"-what-else"}).trace_id == TRACE  # type: ignore[union-attr]
+    assert trace_of({b"traceparent": b"cc" + PARENT[2:].encode() + b"-what-else"}) == ({"trace_id": TRACE}, b"")
 
 
 def test_spans_are_sent_to_a_collector() -> None:

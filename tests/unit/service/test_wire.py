@@ -11,8 +11,8 @@ import pytest
 
 from service import wire
 from service.errors import ServiceError
-from service.schemas.containment import ContainsResponse
-from service.schemas.problem import Accuracy
+from service.schemas.base import Accuracy
+from service.schemas.points import ContainsResponse
 
 HARD = [
     "2.2250738585072011e-308",  # hung PHP

@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from service.errors import faults_of_validation
-from service.schemas.limits import AtMost
+from service.schemas.base import AtMost
 
 ITEMS = TypeAdapter(Annotated[list[int], AtMost("max_poses", low=0)])
 

@@ -1,4 +1,4 @@
-"""POST /v1/contains and /v1/contains/scene."""
+"""Which points lie in a solid, what bounds it, and the textbook's methods beside ours."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas.containment import ContainsResponse, ContainsSceneResponse
+from service.schemas.points import BoundsResponse, CompareResponse, ContainsResponse, ContainsSceneResponse
 from tests.unit.service.asking import SPHERE, check_problem
 
 pytestmark = pytest.mark.anyio
@@ -104,3 +104,75 @@ async def test_what_is_wrong_in_a_scene_is_named(
 ) -> None:
     problem = check_problem(await client.post("/v1/contains/scene", json={"bodies": bodies, "points": []}), 422, code)
     assert problem["errors"][0]["pointer"] == pointer
+
+
+async def test_box_and_sphere(client: httpx.AsyncClient) -> None:
+    triangle = {"type": "triangle", "vertices": [[0, 0], [4, 0], [4, 3]]}
+    answer = await client.post("/v1/bounds", json={"solid": triangle})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["aabb"] == {"min": [0.0, 0.0], "max": [4.0, 3.0]}
+    assert answer.json()["sphere"] == {"center": [2.0, 1.5], "radius": 2.5}
+    BoundsResponse.model_validate_json(answer.content)
+
+
+@pytest.mark.parametrize(
+    ("solid", "code", "pointer"),
+    [
+        ({"type": "half_space", "normal": [1, 0], "offset": 0}, "unsupported_solid", "/solid"),
+        ({"type": "convex", "planes": [[1, 0, 0]]}, "unsupported_solid", "/solid/planes"),
+        (
+            {"type": "convex", "planes": [[1, 0, -1], [-1, 0, 0], [0, 1, 0], [0, -1, 1]]},
+            "empty_geometry",
+            "/solid/planes",
+        ),
+        ({"type": "aabb", "min": [-1.7e308, -1.7e308], "max": [1.7e308, 1.7e308]}, "not_representable", ""),
+    ],
+)
+async def test_what_has_no_bounds_is_refused(
+    client: httpx.AsyncClient, solid: dict[str, object], code: str, pointer: str
+) -> None:
+    problem = check_problem(await client.post("/v1/bounds", json={"solid": solid}), 422, code)
+    assert problem["errors"][0]["pointer"] == pointer
+    name = (await client.post("/v1/solids", json=solid)).json()["id"]
+    problem = check_problem(await client.post("/v1/bounds", json={"solid": {"type": "stored", "id": name}}), 422, code)
+    assert problem["errors"][0]["pointer"] in ("/solid", "")
+
+
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+BODY = {"type": "polyhedron", "vertices": CORNERS, "faces": FACES}
+UNIT_BOX = {"type": "aabb", "min": [0, 0], "max": [1, 3]}
+BALL = {"type": "sphere", "center": [0, 0], "radius": 1}
+
+
+@pytest.mark.parametrize(
+    ("question", "method"),
+    [
+        ({"operation": "contains", "solid": BODY, "points": [[0.1, 0.1, 0.1], [1, 1, 1]]}, "half-line"),
+        ({"operation": "collide", "first": BODY, "second": BODY, "method": "volumes first"}, "volumes first"),
+        ({"operation": "clip_segments", "region": UNIT_BOX, "segments": [[[-1, 1], [3, 1]]]}, "Cohen-Sutherland"),
+        (
+            {"operation": "clip_polygons", "region": UNIT_BOX, "polygons": [[[0, 0], [4, 0], [0, 4]]]},
+            "Sutherland-Hodgman",
+        ),
+    ],
+)
+async def test_both_answer(client: httpx.AsyncClient, question: dict[str, Any], method: str) -> None:
+    answer = await client.post("/v1/compare", json=question)
+    assert answer.status_code == 200, answer.text
+    found = CompareResponse.model_validate_json(answer.content)
+    assert found.method == method
+    assert method in found.methods
+    assert (found.differing.tolist(), found.accuracy.decisions) == ([], "exact")
+
+
+@pytest.mark.parametrize(
+    ("question", "code"),
+    [
+        ({"operation": "contains", "solid": BODY}, "invalid_request"),
+        ({"operation": "contains", "solid": BALL, "points": [[0, 0]]}, "unsupported_solid"),
+        ({"operation": "clip_segments", "region": UNIT_BOX, "segments": [], "method": "x"}, "invalid_operation"),
+    ],
+)
+async def test_what_is_not_compared_is_refused(client: httpx.AsyncClient, question: dict[str, Any], code: str) -> None:
+    check_problem(await client.post("/v1/compare", json=question), 422, code)

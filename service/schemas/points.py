@@ -1,4 +1,4 @@
-"""Question and answer of the comparison with the textbook's methods."""
+"""Questions and answers about points and one solid: containment, bounds, and the textbook's methods beside ours."""
 
 from __future__ import annotations
 
@@ -7,11 +7,91 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
-from service.schemas.containment import Indices, Points
-from service.schemas.limits import left_out
-from service.schemas.problem import Accuracy, Schema, with_example
-from service.schemas.segments import PAIR
-from service.schemas.solids import Number, Solid
+from service.schemas.base import Accuracy, AtMost, Schema, left_out, with_example
+from service.schemas.solids import Body, Booleans, IndexLists, Indices, Number, Points, Position, Segments, Solid
+
+
+class ContainsRequest(Schema):
+    """Which of these points lie in this solid?"""
+
+    model_config = with_example(
+        {
+            "solid": {"type": "sphere", "center": [0, 0, 0], "radius": 5},
+            "points": [[3, 4, 0], [3, 4, 1e-300], [0, 0, 0]],
+        }
+    )
+
+    solid: Solid = Field(description="Any but a surface.")
+    points: Points = Field(description="Positions of the solid's dimension.")
+
+
+class ContainsResponse(Schema):
+    """One answer for each point."""
+
+    contained: Booleans = Field(description="For each point whether the solid holds it; its boundary counts.")
+    boundary: Indices = Field(description="Indices of the points exactly on the boundary, ascending.")
+    accuracy: Accuracy
+
+
+class ContainsSceneRequest(Schema):
+    """Which of these bodies hold each of these points?"""
+
+    model_config = with_example(
+        {
+            "bodies": [
+                {"solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]}},
+                {
+                    "solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]},
+                    "pose": {"rotation": [[0, -1], [1, 0]], "translation": [2, 0]},
+                },
+            ],
+            "points": [[0.5, 0.5], [1, 0.5], [9, 9]],
+        }
+    )
+
+    bodies: Annotated[list[Body], AtMost("max_bodies", low=1)] = Field(
+        description="Solids of one dimension in their places."
+    )
+    points: Points = Field(description="Positions of the bodies' dimension.")
+
+
+class ContainsSceneResponse(Schema):
+    """For each point the bodies that hold it."""
+
+    bodies: IndexLists = Field(description="For each point the indices of the bodies that hold it, ascending.")
+    boundary: IndexLists = Field(description="For each point those of them on whose boundary it lies.")
+    accuracy: Accuracy
+
+
+class BoundsRequest(Schema):
+    """What is the smallest box, and the smallest sphere, that holds this solid?"""
+
+    model_config = with_example({"solid": {"type": "triangle", "vertices": [[0, 0], [4, 0], [4, 3]]}})
+
+    solid: Solid = Field(description="Bounded, not empty, neither implicit nor csg.")
+
+
+class AabbBounds(Schema):
+    """The smallest axis-aligned box."""
+
+    min: Position = Field(description="Its least coordinates.")
+    max: Position = Field(description="Its greatest coordinates.")
+
+
+class SphereBounds(Schema):
+    """The smallest sphere (circle in 2D)."""
+
+    center: Position = Field(description="Each coordinate is the float64 nearest to the exact one.")
+    radius: Number = Field(description="The least float64 with which the sphere about that centre holds the solid.")
+
+
+class BoundsResponse(Schema):
+    """Both bounding volumes."""
+
+    aabb: AabbBounds
+    sphere: SphereBounds
+    accuracy: Accuracy
+
 
 NEEDED = {
     "contains": ("points", "solid"),
@@ -65,7 +145,7 @@ class CompareRequest(Schema):
     first: Solid = left_out("collide: a polyhedron.")
     second: Solid = left_out("collide: a polyhedron.")
     region: Solid = left_out("clip_segments: half_space, aabb, convex, sphere; clip_polygons: not the sphere.")
-    segments: Annotated[Array, Numbers(POINTS, PAIR, DIMENSION)] = left_out("clip_segments: two end points each.")
+    segments: Segments = left_out("clip_segments: two end points each.")
     polygons: Annotated[Array, Numbers(POINTS, Axis(1, "max_points"), DIMENSION)] = left_out(
         "clip_polygons: one ring each, all of as many vertices."
     )

@@ -1,4 +1,4 @@
-"""/docs and /redoc need nothing from outside, and every example in the document is answered."""
+"""What the service shows of itself: pages, documents, counts."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import re
 import httpx
 import pytest
 
-from service.schemas.scenes import SCENE_ID
-from tests.unit.service.asking import examples
+from service.schemas.bodies import SCENE_ID
+from tests.unit.service.asking import SPHERE, examples
 
 pytestmark = pytest.mark.anyio
 
@@ -33,3 +33,15 @@ async def test_every_request_has_an_example_and_each_is_answered(client: httpx.A
     for path, example in examples(document):
         answer = await client.post(path.replace("{scene_id}", SCENE_ID), json=example)
         assert answer.status_code in (200, 201), (path, answer.text)
+
+
+async def test_answers_are_counted_by_operation_and_status(client: httpx.AsyncClient) -> None:
+    body = {"solid": SPHERE, "points": [[0, 0, 0]]}
+    assert (await client.post("/v1/contains", json=body)).status_code == 200
+    assert (await client.post("/v1/contains", json={**body, "points": "none"})).status_code == 422
+    answer = await client.get("/metrics")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "text/plain; version=0.0.4; charset=utf-8")
+    lines = answer.text.splitlines()
+    assert 'geometry_requests_total{operation="contains",status="200"} 1.0' in lines
+    assert 'geometry_requests_total{operation="contains",status="422"} 1.0' in lines
+    assert 'geometry_phase_seconds_count{operation="contains",phase="compute"} 2.0' in lines

@@ -1,0 +1,225 @@
+"""Questions: which points lie in a solid, how do bodies lie to each other, what remains of segments and polygons?"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from starlette.responses import JSONResponse
+
+import engine
+from service.convert import answers, areas, questions
+from service.openapi import router_of
+from service.schemas.bodies import (
+    ClearanceRequest,
+    ClearanceResponse,
+    CollideRequest,
+    CollideResponse,
+    CollideSceneRequest,
+    CollideSceneResponse,
+)
+from service.schemas.clipping import (
+    ClipLinesRequest,
+    ClipLinesResponse,
+    ClipPolygonsRequest,
+    ClipPolygonsResponse,
+    ClipSegmentsRequest,
+    ClipSegmentsResponse,
+    LayersContainsRequest,
+    LayersOverlayRequest,
+    LayersResponse,
+    LayersUnionRequest,
+    OverlayBatchRequest,
+    OverlayBatchResponse,
+    OverlayRequest,
+    OverlayResponse,
+)
+from service.schemas.points import (
+    NEEDED,
+    BoundsRequest,
+    BoundsResponse,
+    CompareRequest,
+    CompareResponse,
+    ContainsRequest,
+    ContainsResponse,
+    ContainsSceneRequest,
+    ContainsSceneResponse,
+)
+from service.work import CallOf
+
+router = router_of()
+
+
+@router.post("/v1/contains", operation_id="contains", tags=["containment"])
+def contains(question: ContainsRequest, call: CallOf) -> ContainsResponse:
+    """Tell for each point whether it lies in the solid, boundary included, and which lie exactly on the boundary."""
+    solid = questions.to_solid(question.solid, call, ("solid",))
+    points = questions.to_items(question.points, solid.dimension)
+    return answers.from_locations(*call.compute(engine.locate, points, solid))
+
+
+@router.post("/v1/contains/scene", operation_id="contains_scene", tags=["containment"])
+def contains_scene(question: ContainsSceneRequest, call: CallOf) -> ContainsSceneResponse:
+    """List for each point the bodies that hold it, boundary included."""
+    solids, poses = questions.to_bodies(question.bodies, call)
+    points = questions.to_items(question.points, solids[0].dimension)
+    found = call.compute(engine.locate_scene, points, solids, poses, retold=questions.tell_of_scene)
+    return answers.from_scene_locations(*found)
+
+
+@router.post("/v1/collide", operation_id="collide", tags=["collision"])
+def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
+    """Tell how the first body lies to the second, for each pose of the second, with one reason."""
+    first = questions.to_solid(question.first, call, ("first",))
+    second = questions.to_solid(question.second, call, ("second",))
+    options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
+    witness = not question.boolean if question.witness is None else question.witness
+    if question.poses is None:
+        return answers.from_collision(*call.compute(engine.collide, first, second, witness=witness, **options))
+    rotations, translations = questions.to_poses(question.poses, second.dimension)
+    found = call.compute(
+        engine.collide_poses,
+        first,
+        second,
+        rotations,
+        translations,
+        witnesses=witness,
+        **options,
+        retold=questions.tell_of_poses,
+    )
+    return answers.from_pose_collisions(*found, witness)
+
+
+@router.post("/v1/collide/scene", operation_id="collide_scene", tags=["collision"])
+def collide_scene(question: CollideSceneRequest, call: CallOf) -> CollideSceneResponse:
+    """List every pair of bodies with a common point, or nearer than a gap, and how each lies to the other."""
+    solids, poses = questions.to_bodies(question.bodies, call)
+    options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
+    named = {"skip": question.skip, "only": question.only, "gap": question.gap}
+    found = call.compute(engine.collide_scene, solids, poses, **named, **options, retold=questions.tell_of_scene)
+    return answers.from_scene_pairs(*found)
+
+
+@router.post("/v1/clearance", operation_id="clearance", tags=["clearance"])
+def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
+    """Tell how far apart two bodies are, exactly, for each pose of the second; or whether at least so far."""
+    first = questions.to_solid(question.first, call, ("first",))
+    second = questions.to_solid(question.second, call, ("second",))
+    found: Any
+    if question.poses is None:
+        found, accuracy = call.compute(engine.clearance, first, second, at_least=question.at_least)
+        found = [found]
+    else:
+        rotations, translations = questions.to_poses(question.poses, second.dimension)
+        found, accuracy = call.compute(
+            engine.clearance_poses,
+            first,
+            second,
+            rotations,
+            translations,
+            at_least=question.at_least,
+            retold=questions.tell_of_poses,
+        )
+        if len(translations) == 1 and question.at_least is None:  # of one pose the points are told, too
+            pose = engine.Pose(rotations[0], translations[0])
+            found, accuracy = call.compute(engine.clearance, first, second, second_pose=pose)
+            found = [found]
+    return answers.from_clearances(found, accuracy, question.at_least is not None)
+
+
+@router.post("/v1/clip/segments", operation_id="clip_segments", tags=["clipping"])
+def clip_segments(question: ClipSegmentsRequest, call: CallOf) -> ClipSegmentsResponse:
+    """Return the parts of each segment that lie in the region, boundary included: none, one or several."""
+    region = questions.to_solid(question.region, call, ("region",))
+    segments = questions.to_items(question.segments, region.dimension)
+    return answers.from_pieces(*call.compute(engine.clip_segments, segments, region))
+
+
+@router.post("/v1/clip/lines", operation_id="clip_lines", tags=["clipping"])
+def clip_lines(question: ClipLinesRequest, call: CallOf) -> ClipLinesResponse:
+    """Return the parts of each polyline that lie in the region; what is connected there stays in one piece."""
+    region = questions.to_solid(question.region, call, ("region",))
+    lines = question.lines
+    return answers.from_line_pieces(*call.compute(engine.clip_lines, lines if len(lines) else [], region))
+
+
+@router.post("/v1/clip/polygons", operation_id="clip_polygons", tags=["clipping"])
+def clip_polygons(question: ClipPolygonsRequest, call: CallOf) -> ClipPolygonsResponse:
+    """Clip polygons on a convex region, contour by contour; what is left of a polygon stays connected."""
+    region = questions.to_solid(question.region, call, ("region",))
+    return areas.from_clipped(*call.compute(engine.clip_polygons, question.polygons, region))
+
+
+@router.post("/v1/overlay", operation_id="overlay", tags=["clipping"])
+def overlay(question: OverlayRequest, call: CallOf) -> OverlayResponse:
+    """Combine two polygons into separate pieces with holes, concave on concave."""
+    subject = questions.to_solid(question.subject, call, ("subject",))
+    clip = questions.to_solid(question.clip, call, ("clip",))
+    found = call.compute(engine.overlay, subject, clip, question.operation, grid=question.grid)
+    return areas.from_overlay(*found, question.area)
+
+
+@router.post("/v1/overlay/batch", operation_id="overlay_batch", tags=["clipping"])
+def overlay_batch(question: OverlayBatchRequest, call: CallOf) -> OverlayBatchResponse:
+    """Combine pairs of polygons, each subject with the clip in its place."""
+    subjects, clips = (
+        [questions.to_solid(model, call, (name, k)) for k, model in enumerate(models)]
+        for name, models in (("subjects", question.subjects), ("clips", question.clips))
+    )
+    found = call.compute(engine.overlay_batch, subjects, clips, question.operation)
+    return areas.from_overlays(*found)
+
+
+class GeoJson(JSONResponse):
+    """What the document calls these answers."""
+
+    media_type = "application/geo+json"
+
+
+_AS: Final[dict[str, Any]] = {"response_class": GeoJson, "response_model": LayersResponse}
+
+
+@router.post("/v1/layers/overlay", operation_id="overlay_layers", tags=["layers"], **_AS)
+def overlay_layers(question: LayersOverlayRequest, call: CallOf) -> LayersResponse:
+    """Overlay two layers, every feature with every one that it meets; attributes of both are kept."""
+    found = call.compute(engine.layers.overlay_features, question.left, question.right, question.operation)
+    return areas.from_features(*found, call)
+
+
+@router.post("/v1/layers/union", operation_id="unite_layer", tags=["layers"], **_AS)
+def unite_layer(question: LayersUnionRequest, call: CallOf) -> LayersResponse:
+    """Unite the features of a layer, all or those that agree in some properties."""
+    return areas.from_features(*call.compute(engine.layers.dissolve_features, question.layer, question.by), call)
+
+
+@router.post("/v1/layers/contains", operation_id="locate_in_layer", tags=["layers"], **_AS)
+def locate_in_layer(question: LayersContainsRequest, call: CallOf) -> LayersResponse:
+    """Join points to the features that hold them, boundary included: a row for each such pair."""
+    outside = bool(question.outside)
+    found = call.compute(engine.layers.locate_features, question.points, question.polygons, outside=outside)
+    return areas.from_features(*found, call)
+
+
+@router.post("/v1/bounds", operation_id="bounds", tags=["bounds"])
+def bounds(question: BoundsRequest, call: CallOf) -> BoundsResponse:
+    """Return the smallest axis-aligned box and the smallest sphere that hold the solid."""
+    solid = questions.to_solid(question.solid, call, ("solid",))
+    return answers.from_bounds(*call.compute(engine.bounds, solid))
+
+
+@router.post("/v1/compare", operation_id="compare", tags=["compare"])
+def compare(question: CompareRequest, call: CallOf) -> CompareResponse:
+    """Answer exactly and by the textbook's method; say where they differ and how long both took."""
+    names = NEEDED[question.operation]
+    values = [getattr(question, name) for name in names]
+    solid = questions.to_solid(values[1], call, names[1:])
+    if question.operation == "collide":
+        items: Any = questions.to_solid(values[0], call, names[:1])
+    else:
+        items = questions.to_items(values[0], solid.dimension)
+    found, accuracy = call.compute(_compared, question.operation, items, solid, method=question.method)
+    return answers.from_comparison(found, accuracy)
+
+
+def _compared(*arguments: Any, report: bool, **options: Any) -> tuple[engine.Comparison, engine.Accuracy]:
+    found = engine.compare(*arguments, **options)
+    return found, found.accuracy
