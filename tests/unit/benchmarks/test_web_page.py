@@ -160,6 +160,7 @@ def test_every_command_shown_asks_what_the_page_holds(browser: Any, name: str) -
         assert json.loads(words[-1]) == body
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", ["speed_and_error", "museum"])
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
 def test_the_pages_as_committed(browser: Any, name: str, width: int, scheme: str) -> None:

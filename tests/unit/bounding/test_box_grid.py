@@ -23,6 +23,7 @@ def brute_force(low: np.ndarray, high: np.ndarray) -> list[list[int]]:
     return np.argwhere(np.triu(meet, 1)).tolist()
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", ["alike", "lattice", "mixed", "infinite", "flat", "far", "one_place", "tiny"])
 def test_the_pairs_are_those_that_meet(kind: str, dimension: int) -> None:

@@ -97,6 +97,7 @@ def test_an_area_that_rounding_takes_is_a_row_as_one_that_touches(how: str) -> N
         assert len(rows) == of_left + of_right
 
 
+@pytest.mark.full
 def test_whoever_meets_makes_a_row() -> None:
     """Triangles of tenths: corners that are not quite on edges, by less than a coordinate can say."""
     source = np.random.default_rng(11)

@@ -142,6 +142,7 @@ def test_pieces_and_gaps_part_the_segment() -> None:
         assert (pieces.t[:, 0] <= pieces.t[:, 1]).all()
 
 
+@pytest.mark.full
 @pytest.mark.data
 def test_menger_sponge(data: Path, pytestconfig: pytest.Config) -> None:
     mesh = np.load(data / "meshes" / "syn_menger2.npz")

@@ -40,6 +40,7 @@ def test_kernel_and_exact_integers_agree(monkeypatch: pytest.MonkeyPatch) -> Non
                 np.testing.assert_array_equal(getattr(both[0], name), getattr(both[1], name))
 
 
+@pytest.mark.full
 def test_more_crossings_than_there_is_room_for_at_first() -> None:
     """A comb of 50 teeth and 40 boxes in a row, cut lengthwise, again and again."""
     teeth = np.arange(100.0)
