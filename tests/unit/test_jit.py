@@ -200,7 +200,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.some(3)
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("what", "mode", "owner"), OTHERS)
 def test_what_others_can_write_is_not_loaded(project: Path, what: str, mode: int, owner: int | None) -> None:
     if owner is not None and os.getuid():
@@ -329,7 +329,7 @@ def test_an_archive_is_unpacked_where_new_files_are_the_group_s_to_write(project
     assert run(project, use, **cache)[:2] == ["2.0", "1"]
 
 
-@pytest.mark.some(1)
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["folder", "archive"])
 def test_a_seed_of_the_family_is_used_by_each_of_its_cpus(project: Path, seed: Path, kind: str) -> None:
     for path in [seed, *seed.rglob("*")]:

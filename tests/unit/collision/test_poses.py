@@ -194,6 +194,7 @@ def one_ulp_off(rng: random.Random, move: list[float]) -> list[float]:
     return move
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("first", [polyhedron, block, aabb, surface])
 @pytest.mark.parametrize("second", [polyhedron, block, surface])
 @pytest.mark.parametrize("n", [2, pytest.param(150, marks=pytest.mark.full)])

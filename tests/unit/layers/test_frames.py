@@ -45,6 +45,7 @@ def frame(seed: int, names: str, apart: bool = False, crs: Any = 3857) -> Any:
     return geopandas.GeoDataFrame(columns, geometry=[*map(shape, features)], index=np.arange(14) * 7 + 3, crs=crs)
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("how", HOWS)
 @pytest.mark.parametrize("apart", [False, True])
 def test_rows_are_those_of_geopandas(how: str, apart: bool, pytestconfig: pytest.Config) -> None:

@@ -71,6 +71,7 @@ def sides(solid: Solid) -> set[int]:
         return {inner_side(mesh, face, np.zeros((1, 12))) for face in range(len(mesh.triangles))}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("solid", [CUBE, tetrahedron((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))])
 def test_is_against_outward_normals(solid: Solid) -> None:
     (side,) = sides(solid)

@@ -40,7 +40,7 @@ def test_lattice_points_on_many_rows(dimension: int, scales: tuple[float, float]
     assert np.array_equal(alone, found[290:310])
 
 
-@pytest.mark.some(2)
+@pytest.mark.some(1)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("n_rows", [1, 5, 31, 41, 90])
 def test_points_that_leave_their_block_early(dimension: int, n_rows: int) -> None:

@@ -75,6 +75,7 @@ def vertices_of(region: Solid) -> Any:
     return np.concatenate([corners, (corners + np.roll(corners, 1, axis=0)) / 2])
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_equals_the_reference(family: str, dimension: int, pytestconfig: pytest.Config) -> None:

@@ -117,6 +117,7 @@ SCENES = {
 }
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_scenes_of_many_rings(name: str, turn: float) -> None:
