@@ -10,14 +10,12 @@ from pathlib import Path
 from benchmarks import table
 from benchmarks.fields import FIELDS
 
-TABLES = tuple(name for name in FIELDS if name != "primitives")
-NAMES = (*TABLES, "advice", "answers", "checkouts", "cold_start", "collision_cost", "compare", "filed", "hard_cases",
-         "publish", "report", "soak", "wire")  # fmt: skip
+NAMES = (*FIELDS, "answers", "checkouts", "cold_start", "filed", "report", "soak", "wire")
 
 
 def about(name: str) -> str:
     """Return the first line of what a benchmark's file says of itself."""
-    folder = Path(__file__).with_name("fields") if name in TABLES else Path(__file__).parent
+    folder = Path(__file__).with_name("fields") if name in FIELDS else Path(__file__).parent
     path = next(path for path in (folder / f"{name}.py", folder / name / "__init__.py") if path.exists())
     return (ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").partition("\n")[0]
 
@@ -30,7 +28,7 @@ def main(words: list[str]) -> int:
         return int(bool(words) and words[0] not in ("-h", "--help"))
     name, *rest = words
     sys.argv[0] = f"benchmarks {name}"
-    if name in TABLES:
+    if name in FIELDS:
         return table.main(rest, name)
     return int(importlib.import_module(f"benchmarks.{name}").main(rest))
 

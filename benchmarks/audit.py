@@ -49,11 +49,8 @@ MOST_NAMED = 1_000
 """Wrong items that are listed."""
 LIMIT = 120.0
 """Seconds that a package may work without an answer."""
-MESHES, POLYGONS = ("open3d", "trimesh", "igl", "vtk", "cgal"), ("shapely", "matplotlib")
-BODIES, LAYERS = (
-    ("coal", "fcl", "open3d", "vtk", "igl", "manifold3d"),
-    ("textbook", "shapely", "pyclipper", "manifold3d"),
-)
+MESHES, POLYGONS = ("open3d", "trimesh", "igl", "cgal"), ("shapely",)
+BODIES, LAYERS = ("coal", "fcl", "open3d", "igl", "manifold3d"), ("textbook", "shapely", "manifold3d")
 
 
 ABOUT = "your bodies; most peers see surfaces only, and miss a body inside another"

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 import engine
-from benchmarks.workloads import Mesh, bumpy_sphere, generator, stored_mesh, stored_or_bumpy
+from benchmarks.workloads import Mesh, generator, stored_mesh, stored_or_bumpy
 
 JITTER = 2e-3
 """Largest distance along the direction of the bisection from the contact, as part of the size."""
@@ -98,12 +98,6 @@ def pair_of_size(size: str, n_poses: int, seed: int) -> Pair:
     else:
         first, second = (unit_sized(stored_or_bumpy(name, times, seed)) for name in names)
     return near_contact(f"{first.name} / {second.name}", first, second, size != "soup", n_poses, seed)
-
-
-def bumpy_pair(name: str, times: int, n_poses: int) -> Pair:
-    """Return two bumpy spheres near contact."""
-    first, second = (bumpy_sphere(f"{name} {seed}", seed, times) for seed in (1, 2))
-    return near_contact(f"{name} {times}", first, second, True, n_poses, 1)
 
 
 def belted_ball(n_vertices: int, seed: int, is_round: bool = False) -> Mesh:

@@ -4,7 +4,7 @@
     python -m benchmarks cold_start --quick     # one operation
 
 Seconds of wall and CPU, and compilations, until the first answer of each operation; seconds until all is warm, bytes of
-machine code that are kept, and all again from a seed of the CPU family. Stored, it is a table of the report.
+machine code that are kept, and all again from a seed of the CPU family.
 """
 
 from __future__ import annotations

@@ -13,7 +13,6 @@ from benchmarks.web_page import error_share, faults, key_of, percent, questions,
 TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
 """Contests won by another that the head of the page names; the tables have all."""
-QUICK = "**Quick sizes on a busy machine: the figures show that all runs, and who is wrong, not how fast it is.**\n\n"
 HEAD = ("contender", "items/s", "quartiles", "ours is faster by", "net of calls", "one item: median, p99, longest",
         "first", "build", "wrong", "95%", "refused", "not taken", "coordinates off", "ulps, largest (median)",
         "beyond filter")  # fmt: skip
@@ -28,12 +27,8 @@ def text_of(found: dict[str, Any]) -> str:
         f"Commit {found['commit']}, seed {found['seed']}, {found['processor']}, {found['cores']} cores, "
         f"load {found['load_before']} before and {found['load_after']} after, {found['seconds']:.0f} s. {versions}."
     )
-    parts = {"quick": QUICK if found.get("quick") else "", "weaknesses": _weaknesses(contests), "facts": facts,
-             "summary": _summary(found["rows"]), "tables": _tables(contests)}  # fmt: skip
-    if "filed" in found:
-        parts["tables"] += "\n" + filed.section(found["filed"])
-    if "cold_start" in found:
-        parts["tables"] += _cold_start(found["cold_start"])
+    tables = _tables(contests) + ("\n" + filed.section(found["filed"]) if "filed" in found else "")
+    parts = {"weaknesses": _weaknesses(contests), "facts": facts, "summary": _summary(found["rows"]), "tables": tables}
     text = TEMPLATE.read_text("utf-8")
     for name, part in parts.items():
         text = text.replace(f"<<{name}>>", part)
@@ -52,19 +47,6 @@ def table(head: tuple[str, ...], rows: list[list[str]]) -> str:
     """Return a table in Markdown."""
     lines = [f"| {' | '.join(cells)} |" for cells in (head, *rows)]
     return "\n".join([lines[0], "|---" * len(head) + "|", *lines[1:]]) + "\n"
-
-
-def _cold_start(found: dict[str, Any]) -> str:
-    """Seconds from an empty cache, and from a seed, of a machine of the same name."""
-    rows = []
-    for row in found["figures"]:
-        cpu, count, size = (row["raw"][key] for key in ("cpu", "compilations", "bytes"))
-        rows.append([row["name"], f"{row['values'][0]:.1f}", f"{cpu:.1f}", str(count), f"{size / 2**20:.1f} MB"])
-    return (
-        "\n## Cold start\n\nEach row a fresh process with an empty kernel cache, import included; "
-        f"commit {found['commit']}, load {found['load_before']} before.\n\n"
-        + table(("until", "seconds", "CPU seconds", "compilations", "machine code"), rows)
-    )
 
 
 def _weaknesses(contests: dict[str, list[Row]]) -> str:

@@ -28,6 +28,8 @@ import orjson
 from benchmarks.load import Connection, in_process, request, watched
 from benchmarks.measure import memory_of, percentile
 from benchmarks.wire import SPHERE, serving
+from tests.contract.attacks import all_attacks
+from tests.contract.test_memory import bodies
 
 SQUARE, OTHER = ({"type": "polygon", "rings": [[[k, k], [k + 2, k], [k + 2, k + 2], [k, k + 2]]]} for k in (0, 1))
 SMALL: dict[str, dict[str, Any]] = {
@@ -63,8 +65,6 @@ def ask_small(port: int, seconds: float, rate: float) -> tuple[Counter[int], lis
 
 def hostile_sends() -> list[tuple[Send, frozenset[int]]]:
     """Return everything hostile that the tests send, each with the statuses that may come back."""
-    from tests.contract.attacks import all_attacks  # what they are is the tests' matter
-    from tests.contract.test_memory import bodies
 
     def sending(message: bytes) -> Send:
         return lambda port: [Connection(port).ask(message)[0]]
@@ -106,8 +106,6 @@ def send_hostile(port: int, seconds: float, rate: float) -> tuple[Counter[int], 
 
 def _many(name: str, port: int, n: int) -> tuple[list[int], float]:
     """Send an attack n times at once; return the statuses, and the seconds that the slowest took."""
-    from tests.contract.attacks import all_attacks
-
     send = next(attack.send for attack in all_attacks() if attack.name == name)
     with suppress(OSError):
         send(0)  # makes the body: nobody listens there
@@ -123,23 +121,17 @@ def _many(name: str, port: int, n: int) -> tuple[list[int], float]:
 
 def each_alone() -> bool:
     """Print what each attack does, once and eight times at once; return whether only statuses came that may."""
-    from tests.contract.attacks import all_attacks
-
     is_well = True
-    with serving("service", ready="/readyz", **SETTINGS) as (port, process):
+    with serving(**SETTINGS) as (port, process):
         in_process(ask_small, port, 4.0, 10.0)()
-        print(
-            f"at rest {memory_of(process.pid):.0f} MB; seconds until answered, longest /healthz, most memory",
-            flush=True,
-        )
+        print(f"at rest {memory_of(process.pid):.0f} MB; seconds until answered, longest /healthz, most memory")
         for attack in all_attacks():
             cells = []
             for n in (1, 8):
                 with watched(port, process.pid, 60.0) as seen:
                     statuses, seconds = in_process(_many, attack.name, port, n)()
-                cells.append(
-                    f"{dict(Counter(statuses))!s:24} {seconds:6.2f} s {seen.wait:6.3f} s {seen.memory:5.0f} MB"
-                )
+                figures = f"{seconds:6.2f} s {seen.wait:6.3f} s {seen.memory:5.0f} MB"
+                cells.append(f"{dict(Counter(statuses))!s:24} {figures}")
                 is_well = is_well and {*statuses} <= attack.allowed | {503}
             print(f"{attack.name:44} {' | '.join(cells)}", flush=True)
     return is_well
@@ -148,13 +140,11 @@ def each_alone() -> bool:
 def stops(n: int) -> bool:
     """Print how long SIGTERM takes, n times under each attack, eight of it at once; return whether all ended in time,
     with 0."""
-    from tests.contract.attacks import all_attacks
-
     is_well, most = True, SETTINGS["drain_seconds"] + 2
     for attack in all_attacks():
         took, codes = [], Counter[int]()
         for _ in range(n):
-            with serving("service", ready="/readyz", **SETTINGS) as (port, process):
+            with serving(**SETTINGS) as (port, process):
                 sender = in_process(_many, attack.name, port, 8)
                 time.sleep(2.5)
                 before = time.perf_counter()
@@ -163,10 +153,7 @@ def stops(n: int) -> bool:
                 took.append(time.perf_counter() - before)
                 with suppress(OSError):
                     sender()
-        print(
-            f"{attack.name:44} {max(took):5.1f} s at most of {most}; ended with {dict(codes)}",
-            flush=True,
-        )
+        print(f"{attack.name:44} {max(took):5.1f} s at most of {most}; ended with {dict(codes)}", flush=True)
         is_well = is_well and max(took) <= most and {*codes} == {0}
     return is_well
 
@@ -183,7 +170,7 @@ def main(words: list[str]) -> int:
         is_well = each_alone() if asked.each else True
         return int(not ((stops(asked.stops) if asked.stops else True) and is_well))
     worst, wrong = Counter[int](), 0
-    with serving("service", ready="/readyz", **SETTINGS) as (port, process):
+    with serving(**SETTINGS) as (port, process):
         ask_small(port, 4.0, 10.0)
         print(f"at rest: {memory_of(process.pid):.0f} MB, {_quantiles(ask_small(port, 10.0, asked.rate)[1])}")
         seconds = 60.0 * asked.minutes

@@ -40,14 +40,14 @@ SPHERE = {"type": "sphere", "center": [0.5, 0.5, 0.5], "radius": 0.5}
 
 
 @contextlib.contextmanager
-def serving(*words: str, ready: str, **settings: object) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
-    """Run a server in a process of its own until its path `ready` answers 200; yield port and process."""
+def serving(**settings: object) -> Iterator[tuple[int, subprocess.Popen[bytes]]]:
+    """Run the service in a process of its own; once it is ready yield port and process."""
     port = free_port()
     own = {f"GEOMETRY_{name.upper()}": str(value) for name, value in {"port": port, **settings}.items()}
-    command = [sys.executable, "-m", *words, *([] if words == ("service",) else [str(port)])]
+    command = [sys.executable, "-m", "service"]
     process = subprocess.Popen(command, cwd=ROOT, env={**os.environ, **own}, stderr=subprocess.DEVNULL)
     try:
-        wait_until(port, ready)
+        wait_until(port, "/readyz")
         yield port, process
     finally:
         process.send_signal(signal.SIGTERM)
@@ -61,26 +61,12 @@ def rate(port: int, message: bytes, seconds: float, n_connections: int) -> float
     return seen.statuses[200] / seen.span
 
 
-def rates(row: Figure, sides: list[tuple[int, bytes]], seconds: float, rounds: int, n_connections: int) -> Figure:
-    """Fill a row with how many times as many requests the first side answers, side by side in turns."""
-    found: list[list[float]] = [[], []]
-    for port, message in sides:
-        rate(port, message, min(seconds, 0.5), n_connections)
-    for round_ in range(rounds):
-        for i_side in (0, 1) if round_ % 2 == 0 else (1, 0):
-            found[i_side].append(in_process(rate, *sides[i_side], seconds, n_connections)())
-    row.values = [ours / peer for ours, peer in zip(*found)]
-    row.ours, row.peer = (f"{statistics.median(one):.4g}/s" for one in found)
-    row.raw["rates"] = found
-    return row
-
-
 class Wire:
-    """The rows, on one service and one contender that run throughout."""
+    """The rows, on one service that runs throughout."""
 
-    def __init__(self, given: argparse.Namespace, ours: int, plain: int, process: subprocess.Popen[bytes]) -> None:
-        self.quick, self.rounds, self.random = given.quick, given.rounds, np.random.default_rng(given.seed)
-        self.ours, self.plain, self.process = ours, plain, process
+    def __init__(self, given: argparse.Namespace, ours: int, process: subprocess.Popen[bytes]) -> None:
+        self.quick, self.random = given.quick, np.random.default_rng(given.seed)
+        self.ours, self.process = ours, process
 
     def binary(self, name: str, solid: engine.Solid, document: dict[str, Any]) -> Figure:
         """1e6 points as octets against kernel and bare loopback."""
@@ -110,23 +96,6 @@ class Wire:
         row.error, row.note = f"wrong: {wrong}", f"kernel {medians[1]:.3g} ms, loopback {medians[2]:.3g} ms"
         row.raw["seconds"] = took
         return row
-
-    def ten_thousand(self, name: str) -> Figure:
-        """1e4 points as JSON against the model of tuples."""
-        points = self.random.random((10_000, 3)).tolist()
-        ours = request("/v1/contains", json.dumps({"solid": SPHERE, "points": points}).encode())
-        plain = {"center": SPHERE["center"], "radius": SPHERE["radius"], "points": points}
-        sides = [(self.ours, ours), (self.plain, request("/plain", json.dumps(plain).encode()))]
-        answers = [json.loads(Connection(port).ask(message)[1])["contained"] for port, message in sides]
-        row = rates(Figure(name, "x", [], 8, 12), sides, 1.0 if self.quick else 3.0, self.rounds, 2)
-        row.error = f"wrong: {int(answers[0] != answers[1])}"
-        return row
-
-    def one(self, name: str) -> Figure:
-        """One point as JSON against an async endpoint with the same model."""
-        body = json.dumps({"solid": SPHERE, "points": [[0.1, 0.2, 0.3]]}).encode()
-        sides = [(self.ours, request("/v1/contains", body)), (self.plain, request("/same-model", body))]
-        return rates(Figure(name, "x", [], 0.8, 1.2), sides, 1.0 if self.quick else 3.0, self.rounds, 4)
 
     def beside_batches(self, name: str) -> Figure:
         """One-point requests while two clients loop the largest JSON that is taken."""
@@ -199,29 +168,6 @@ def _echo(server: socket.socket) -> None:
             connection.sendall(answer)
 
 
-def start(is_quick: bool, name: str) -> Figure:
-    """From the start of the process to /readyz, with the compile cache filled."""
-    seconds = []
-    for _ in range(3 if is_quick else 9):
-        before = time.perf_counter()
-        with serving("service", ready="/readyz"):
-            seconds.append(time.perf_counter() - before)
-    return Figure(name, "s", seconds, 2.5, 1.5)
-
-
-def imports(is_quick: bool, name: str) -> Figure:
-    """`import engine` over `import numba` alone, in processes of their own, in turns."""
-    took: dict[str, list[float]] = {"engine": [], "numba": []}
-    for _ in range(5 if is_quick else 15):
-        for module, seconds in took.items():
-            code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
-            done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-            seconds.append(float(done.stdout))
-    row = Figure(name, "s", [ours - peer for ours, peer in zip(took["engine"], took["numba"])], 0.2, 0.1)
-    row.ours, row.peer = (f"{statistics.median(took[module]):.3g} s" for module in ("engine", "numba"))
-    return row
-
-
 def main(words: list[str] | None = None) -> int:
     """Print the table."""
     given = table.options(words, __doc__ or "")
@@ -230,19 +176,12 @@ def main(words: list[str] | None = None) -> int:
     planes[:, 3] = 1 + np.abs(planes[:, 3])
     ball = engine.Sphere([0, 0, 0], 0.5), {"type": "sphere", "center": [0, 0, 0], "radius": 0.5}
     convex = engine.Convex(planes), {"type": "convex", "planes": planes.tolist()}
-    with (
-        serving("service", ready="/readyz", access_log="true") as (ours, process),
-        serving("benchmarks.contenders.plain_fastapi", ready="/openapi.json") as (plain, _),
-    ):
-        wire = Wire(given, ours, plain, process)
+    with serving(access_log="true") as (ours, process):
+        wire = Wire(given, ours, process)
         rows: dict[str, Callable[[str], Figure]] = {
             "1e6 points, octets, over kernel + loopback, sphere": lambda name: wire.binary(name, *ball),
             "1e6 points, octets, over kernel + loopback, 32 planes": lambda name: wire.binary(name, *convex),
-            "1e4 points, JSON, against tuples": wire.ten_thousand,
-            "one point, JSON, against the same model": wire.one,
             "p99 of one point beside two batches": wire.beside_batches,
             "overload": wire.overload,
-            "start to ready, warm cache": partial(start, given.quick),
-            "import engine over numba": partial(imports, given.quick),
         }
         return table.run("wire", [Task(name, partial(make, name)) for name, make in rows.items()], given)

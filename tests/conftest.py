@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import zlib
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -22,11 +24,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out `full` without --full; skip `data` where the shared data folder is absent."""
-    large = [] if config.getoption("--full") else [item for item in items if item.get_closest_marker("full")]
-    if large:
-        config.hook.pytest_deselected(items=large)
-        items[:] = [item for item in items if not item.get_closest_marker("full")]
+    """Without --full leave out `full`, and all but some of `some`; skip `data` where the shared folder is absent."""
+    if not config.getoption("--full"):
+        left_out = {item for item in items if item.get_closest_marker("full")}
+        groups: dict[str, list[pytest.Item]] = defaultdict(list)
+        for item in items:
+            if item.get_closest_marker("some") and item not in left_out:
+                groups[item.nodeid.partition("[")[0]].append(item)
+        for group in groups.values():  # by a hash: parameters that vary together are not left out together
+            group.sort(key=lambda item: zlib.crc32(item.nodeid.encode()))
+            left_out |= {*group[group[0].get_closest_marker("some").args[0] :]}  # type: ignore[union-attr]
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
     for item in items:
         if item.get_closest_marker("data") and not DATA.is_dir():
             item.add_marker(pytest.mark.skip(reason=f"no shared data at {DATA}"))

@@ -11,7 +11,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from benchmarks.contenders import Couple, Library, Placed, Prepared, box_of, makers_of
+from benchmarks.contenders import Library, Placed, box_of, makers_of
 from benchmarks.workloads import Mesh
 
 PACKAGE = "coal"
@@ -40,9 +40,9 @@ def _convex(mesh: Mesh) -> coal.Convex:
     return coal.Convex(points, triangles)
 
 
-def _meet(first: Body, second: Body, request: coal.CollisionRequest = _MEET) -> bool:
+def _meet(first: Body, second: Body) -> bool:
     _FOUND.clear()
-    return coal.collide(*first, *second, request, _FOUND) > 0
+    return coal.collide(*first, *second, _MEET, _FOUND) > 0
 
 
 def _apart(first: Body, second: Body) -> float:
@@ -60,15 +60,8 @@ def _shape(body: Placed) -> Body:
     return coal.Sphere(body.shape.radius), place
 
 
-def _pair(pair: Couple, threads: int, margin: float = 0.0) -> Prepared:
-    first, second = map(_shape, pair)
-    request = coal.CollisionRequest()
-    request.num_max_contacts, request.security_margin = 1, margin
-    return Prepared(lambda _: _meet(first, second, request))
-
-
 LIBRARY = Library(
     model=_model, convex=_convex, place=coal.Transform3s, body=lambda model: (model, coal.Transform3s()), shape=_shape,
     at=lambda body, place: (body[0], place), meet=_meet, apart=_apart,
 )  # fmt: skip
-MAKERS = makers_of(LIBRARY) | {"pair": _pair}
+MAKERS = makers_of(LIBRARY)

@@ -11,7 +11,6 @@ import engine
 from benchmarks.contenders import Prepared, in_threads
 
 PACKAGE = "numpy"
-NAMES = {"determinant": "numpy determinant", "linalg": "numpy.linalg.det"}
 
 BLOCK = 1 << 15
 """Signed distances held at once: 256 KB, and products too small for the BLAS to start threads of its own."""
@@ -35,17 +34,4 @@ def _points(solid: engine.Convex, threads: int) -> Prepared:
     return Prepared(ask)
 
 
-def _determinant(dimension: int, threads: int) -> Prepared:
-    def ask(items: np.ndarray) -> np.ndarray:
-        u, v = items[:, 1] - items[:, 0], items[:, 2] - items[:, 0]
-        if dimension == 2:
-            return np.sign(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        return np.sign((np.cross(u, v) * (items[:, 3] - items[:, 0])).sum(axis=1))
-
-    return Prepared(ask)
-
-
-MAKERS = {
-    "points": _points, "determinant": _determinant,
-    "linalg": lambda *_: Prepared(lambda items: np.sign(np.linalg.det(items[:, 1:] - items[:, :1]))),
-}  # fmt: skip
+MAKERS = {"points": _points}

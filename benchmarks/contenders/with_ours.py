@@ -248,9 +248,15 @@ def _lines(subject: Any, threads: int) -> Prepared:
 
 
 def _layers(how: str, threads: int) -> Prepared:
-    from benchmarks.contenders.with_geopandas import areas_of, frames_of
+    """From two layers of polygons of (n, size, 2) corners, as frames with a column each."""
+    import geopandas
+    import shapely
 
-    return Prepared(lambda frames: engine.layers.overlay(*frames, how, True, workers=threads), frames_of, areas_of)
+    def frames(layers: Any) -> list[Any]:
+        return [geopandas.GeoDataFrame({side: np.arange(len(layer))}, geometry=shapely.polygons(layer))
+                for side, layer in zip("ab", layers)]  # fmt: skip
+
+    return Prepared(lambda both: engine.layers.overlay(*both, how, True, workers=threads), frames)
 
 
 MAKERS = {

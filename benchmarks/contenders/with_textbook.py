@@ -9,17 +9,7 @@ from typing import Any
 import numpy as np
 
 import engine
-from benchmarks.contenders import (
-    Couple,
-    NotApplicable,
-    Prepared,
-    each_or_nan,
-    in_threads,
-    meshes_of,
-    naive_clipping,
-    pieces_of,
-    rows_of,
-)  # fmt: skip
+from benchmarks.contenders import Couple, NotApplicable, Prepared, each_or_nan, meshes_of, pieces_of
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
@@ -28,8 +18,8 @@ from engine.textbook import clip_polygons, greiner_hormann, methods, polyhedra
 
 NAMES = {
     "by planes": "textbook: Cohen-Sutherland by planes", "cross and dot": "textbook: cross and dot",
-    "kept polygons": "naive", "naive segments": "naive", "overlay": "textbook: Greiner-Hormann",
-    "pair by edges": "textbook: edges through faces", "pair by vertices": "textbook: vertices in the other",
+    "overlay": "textbook: Greiner-Hormann", "pair by edges": "textbook: edges through faces",
+    "pair by vertices": "textbook: vertices in the other",
     "pair by volumes": "textbook: volumes first", "planes": "textbook: half-spaces", "points": "textbook: half-line",
     "polygon areas": "textbook: Sutherland-Hodgman", "projection": "textbook: projection",
     "quadratic": "textbook: quadratic", "recast": "textbook: another half-line", "same side": "textbook: same side",
@@ -80,36 +70,6 @@ def _recast(mesh: Mesh, threads: int) -> Prepared:
     return Prepared(ask)
 
 
-def _naive_segments(region: Any, threads: int) -> Prepared:
-    """All segments in one compiled pass over the rows (Cyrus and Beck), on threads."""
-    match region:
-        case engine.Aabb():
-            kernel = naive_clipping.clip_on_box_2d if region.dimension == 2 else naive_clipping.clip_on_box_3d
-            rest: tuple[Any, ...] = (region.min, region.max)
-        case engine.Convex():
-            kernel, rest = naive_clipping.clip_on_planes_3d, (region.planes,)
-        case _:
-            kernel, rest = naive_clipping.clip_on_sphere_3d, (region.center, region.radius)
-
-    def ask(segments: np.ndarray) -> list[Any]:
-        return in_threads(lambda part: kernel(segments[part], *rest), len(segments), threads)
-
-    return Prepared(ask, answer=lambda found: np.concatenate([rows_of(part, kept == 1) for part, kept in found]))
-
-
-def _naive_polygons(region: engine.Aabb, threads: int) -> Prepared:
-    rows = planes_of(region)
-
-    def native(polygons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        n, size, dimension = polygons.shape
-        return polygons.reshape(-1, dimension), size * np.arange(n + 1)
-
-    def ask(rings: tuple[np.ndarray, np.ndarray]) -> Any:
-        return naive_clipping.clip_rings_on_planes(*rings, rows)
-
-    return Prepared(ask, native, lambda found: np.diff(found[1]) > 0)
-
-
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     rows = planes_of(region)
 
@@ -153,8 +113,6 @@ MAKERS: dict[str, Maker] = {
     "recast": _recast,
     "polygon areas": _polygon_areas,
     "overlay": _overlay,
-    "naive segments": _naive_segments,
-    "kept polygons": _naive_polygons,
     "pair by vertices": _pair("vertices in the other"),
     "pair by edges": _pair("edges through faces"),
     "pair by volumes": _pair("volumes first"),

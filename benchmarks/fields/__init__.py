@@ -13,8 +13,7 @@ from typing import Any
 
 from benchmarks.contest import Size, Task
 
-FIELDS = ("containment", "collision", "clearance", "segments", "scenes", "polygons", "overlay", "primitives", "calls",
-          "ends")  # fmt: skip
+FIELDS = ("containment", "collision", "clearance", "segments", "scenes", "polygons", "overlay", "calls")
 
 
 @dataclass(slots=True)

@@ -21,8 +21,7 @@ from benchmarks.measure import clocked
 from benchmarks.workloads import Mesh, bumpy_sphere, document, generator, hard_pairs
 
 BOOKS = ("textbook:pair by vertices", "textbook:pair by edges", "textbook:pair by volumes")
-PEERS = (*BOOKS, "coal", "coal@1e-12", "coal@1e-6", "fcl", "open3d", "vtk", "igl", "manifold3d")
-"""coal also with a margin that counts bodies so near as meeting."""
+PEERS = (*BOOKS, "coal", "fcl", "open3d", "igl", "manifold3d")
 CALLED = ("coal", "fcl")
 """Peers whose bare calls cost a part of what is measured."""
 NEAR: dict[str, Goals] = {"coal": (5.0, 8.0), "fcl": (3.3, 5.0)}
@@ -66,14 +65,11 @@ def _contact(size: Size, peers: tuple[str, ...]) -> Contest:
     cases = hard_pairs()
     chosen = np.random.default_rng(0).permutation(len(cases))[: size.n(1_600, 200)]
     about = "inside one another, touching, edges only, ulps apart, far from the origin, linked, in cavities"
-    return stored("contact" if peers else "contact, which relation", [cases[i] for i in chosen], about, peers)
-
-
-def stored(name: str, cases: list[dict], about: str = "", peers: tuple[str, ...] = PEERS) -> Contest:
-    """Return the contest of some pairs of the hard set; without peers: which of five relations."""
-    couples = [tuple(Placed(_mesh(case[key])) for key in ("first", "second")) for case in cases]
-    relations = np.array([RELATIONS[case["relation"]] for case in cases])
-    return on_couples(name, True, couples, relations != engine.Relation.DISJOINT if peers else relations, about, peers)
+    couples = [tuple(Placed(_mesh(cases[i][key])) for key in ("first", "second")) for i in chosen]
+    exact = np.array([RELATIONS[cases[i]["relation"]] for i in chosen])
+    if not peers:
+        return on_couples("contact, which relation", True, couples, exact, about, peers)
+    return on_couples("contact", True, couples, exact != engine.Relation.DISJOINT, about, peers)
 
 
 def _mesh(body: dict) -> Mesh:

@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 
 import engine
-from benchmarks import memory, workloads
+from benchmarks import workloads
 from benchmarks.contenders import NotApplicable, Prepared, make
 from benchmarks.contest import Contender, Contest, Goals, Size, Task, field_of
 from benchmarks.errors import OUTSIDE, REFUSED, locations, same
-from benchmarks.fields import Figure
 from benchmarks.workloads import Bodies, Mesh, Rings, document, extent_of, generator
 
 N_EXACT = 2000
-MESH_PEERS = ("plain_signs", "textbook", "textbook:recast", "open3d", "trimesh", "igl", "vtk", "cgal")
-PAGE_PEERS = (*MESH_PEERS[:4], "open3d@3", "open3d@7", *MESH_PEERS[4:])
+MESH_PEERS = ("textbook", "textbook:recast", "open3d", "trimesh", "igl", "cgal")
+PAGE_PEERS = (*MESH_PEERS[:3], "open3d@3", "open3d@7", *MESH_PEERS[3:])
 """Open3D also with the majority of 3 and 7 rays a point."""
-POLYGON_PEERS = ("textbook", "shapely", "matplotlib")
+POLYGON_PEERS = ("textbook", "shapely")
 BOOKS = ("textbook:signed angles", "textbook:unsigned angles", "textbook:same side")
 MESHES = {  # against Open3D: uniform points, points near the surface
     "1k": ((10.0, 20.0), (6.0, 12.0)),
@@ -43,7 +42,7 @@ def tasks(size: Size) -> Iterator[Task]:
     for faces, goals in list(MESHES.items())[: size.of(3, 1)]:
         for place, goal in zip(("uniform", "near"), goals, strict=True):
             name, mesh = f"{faces} faces, {place}", partial(workloads.mesh_of_size, faces, size.seed)
-            yield Task(name, partial(_row, size, name, mesh, place, {"open3d": goal, "plain_signs": (None, None)}))
+            yield Task(name, partial(_row, size, name, mesh, place, {"open3d": goal}))
     faces = size.of("86k", "1k")
     yield Task(f"build, {faces} faces", partial(_from_arrays, size, faces, 0))
     for n_points in (1, 1_000):
@@ -62,8 +61,6 @@ def tasks(size: Size) -> Iterator[Task]:
     for name in workloads.SIMPLE:
         for place in ("uniform", "boundary"):
             yield Task(f"{name}, {place}", partial(_simple, size, name, place))
-    for faces in size.of(("86k", "1.38M"), ("1k",)):
-        yield Task(f"memory of the build, {faces} faces", partial(_memory, size, faces), is_figure=True)
 
 
 def contest(
@@ -214,7 +211,7 @@ def _row(size: Size, name: str, make: Callable[[], Any], place: str, peers: Mapp
 def _from_arrays(size: Size, faces: str, n_points: int) -> Contest:
     """Everything from arrays; the build: asked so much that every structure is built."""
     mesh = workloads.mesh_of_size(faces, size.seed)
-    points = workloads.points_in_box(mesh, n_points or memory.points_that_pay(len(mesh.faces)), size.seed)
+    points = workloads.points_in_box(mesh, n_points or 8 * len(mesh.faces) + (1 << 17), size.seed)
     name = f"first {n_points}, {faces} faces" if n_points else f"build, {faces} faces"
     return replace(contest(name, mesh, points, ["open3d"], is_new=True), exact=None, count=len(points))
 
@@ -273,10 +270,3 @@ def _simple(size: Size, name: str, place: str) -> Contest:
         points = np.round(points * 4) / 4
         points += draw.integers(-2, 3, points.shape) * np.spacing(np.maximum(np.abs(points), 0.25))
     return contest(f"{name}, {place}", solid, points, ())
-
-
-def _memory(size: Size, faces: str) -> Figure:
-    found, peer = (memory.of_build(module, faces, size.seed) for module in ("ours", "open3d"))
-    note = ", ".join(f"{key} {value}" for key, value in found.items() if key != "peak") + f"; Open3D: {peer}"
-    must, aim = (640.0, 250.0) if faces == "1.38M" else (None, None)
-    return Figure(f"memory of the build, {faces} faces", "MB", [found.get("peak", np.nan) / 1e6], must, aim, note)

@@ -13,8 +13,7 @@ from benchmarks.contest import Contest, Goals, Size, Task, field_of
 from benchmarks.workloads import SIMPLE, document, generator
 
 RINGS = (3, 4, 10, 30, 100)
-NAIVE: dict[str, Goals] = {"textbook": (0.5, 0.65)}
-SLOW: dict[str, Goals] = {"trimesh": (15.0, 25.0), "vtk": (15.0, 25.0)}
+SLOW: dict[str, Goals] = {"trimesh": (15.0, 25.0)}
 ALONE = ("half-space 2D", "half-space 3D", "convex 2D", "20 planes", "aabb 2D, on the planes", "aabb 3D, on the planes")
 
 
@@ -24,7 +23,7 @@ def tasks(size: Size) -> Iterator[Task]:
         yield Task(name, partial(_stars, size, name, is_hard), True)
     for n_vertices in RINGS:
         for dimension in (2, 3):
-            peers = NAIVE | ({"shapely": (4.0, 8.0)} if dimension == 2 else SLOW if n_vertices == 3 else {})
+            peers = {"shapely": (4.0, 8.0)} if dimension == 2 else SLOW if n_vertices == 3 else {}
             name = f"{n_vertices} vertices, aabb {dimension}D"
             yield Task(name, partial(_row, size, name, n_vertices, peers))
     for region in ALONE:
@@ -44,7 +43,7 @@ def _stars(size: Size, name: str, is_hard: bool) -> Contest:
         about += ", on a lattice of halves, some an ulp off"
     box = SIMPLE["aabb 2D"]()
     exact = errors.areas_in_region(rings[: size.n(400, 100)], box)
-    found = field_of("polygon areas", box, ["textbook", "shapely", "pyclipper"])
+    found = field_of("polygon areas", box, ["textbook", "shapely", "manifold3d"])
 
     def request(item: int) -> tuple[str, dict[str, Any]]:
         return "/v1/clip/polygons", {"region": document(box), "polygons": [[rings[item].tolist()]]}

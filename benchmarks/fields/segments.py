@@ -18,22 +18,20 @@ HARD = {
     "edge": "through edges of the box, as near as doubles come", "ulp": "ends on the planes and up to 4 ulps off",
     "tangent": "tangents, as near as doubles come", "planes": "through the common line of two of 20 planes",
 }  # fmt: skip
-NAIVE = "textbook:naive segments"
 Peers = Mapping[str, Goals | None]
 PAGE: dict[str, tuple[str, str, Peers]] = {
     "box 2D, random": ("aabb 2D", "random", {"textbook": None, "shapely": (10.0, 20.0), "celltree": (0.7, 1.0)}),
     "box 2D, corners": ("aabb 2D", "corner", {"textbook": None, "shapely": None, "celltree": None}),
-    "box 3D, random": ("aabb 3D", "random", {"textbook": None, NAIVE: (0.65, 1.0)}),
-    "box 3D, corners": ("aabb 3D", "corner", {"textbook": None, NAIVE: (0.3, 0.6)}),
-    "20 planes, edges": ("20 planes", "planes", {"textbook:by planes": None, NAIVE: None}),
-    "sphere, tangents": ("sphere 3D", "tangent", {"textbook:quadratic": None, NAIVE: None}),
+    "box 3D, random": ("aabb 3D", "random", {"textbook": None}),
+    "box 3D, corners": ("aabb 3D", "corner", {"textbook": None}),
+    "20 planes, edges": ("20 planes", "planes", {"textbook:by planes": None}),
+    "sphere, tangents": ("sphere 3D", "tangent", {"textbook:quadratic": None}),
 }
 """On the page: the region, the kind of segments, the textbook's method and others."""
 TABLE: dict[str, tuple[str, str, Peers]] = {
-    **{f"box 3D, {kind}": ("aabb 3D", kind, {NAIVE: (0.3, 0.6)}) for kind in ("edge", "ulp")},
-    **{f"box 2D, {kind}": ("aabb 2D", kind, {}) for kind in ("edge", "ulp")},
-    "20 planes": ("20 planes", "random", {NAIVE: (0.37, 0.7)}),
-    "sphere 3D": ("sphere 3D", "random", {NAIVE: (0.1, 0.3)}),
+    **{f"box {side}D, {kind}": (f"aabb {side}D", kind, {}) for side in (3, 2) for kind in ("edge", "ulp")},
+    "20 planes": ("20 planes", "random", {"textbook:by planes": None}),
+    "sphere 3D": ("sphere 3D", "random", {"textbook:quadratic": None}),
     **{name: (name, "random", {}) for name in ("sphere 2D", "half-space 2D", "half-space 3D", "convex 2D")},
     **{f"{name}, {kind}": (name, kind, {}) for name in ("polygon of 10", "polygon of 1,000")
        for kind in ("random", "ulp")},

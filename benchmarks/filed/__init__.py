@@ -2,7 +2,7 @@
 
     python -m benchmarks filed                 # the tables; --cases: also one line for each case
     python -m benchmarks filed --answers       # compute the exact answers anew and write them into cases.json
-    python -m benchmarks filed --keep          # put the answers into the stored results, and write the pages again
+    python -m benchmarks report --filed        # put the answers into the stored results, and write the pages again
 
 Each contender runs in a process of its own, so that one that crashes or never returns costs its own case only. Points
 on a boundary count as contained, bodies that touch as meeting. An area is wrong when it is off by more than a millionth
@@ -51,25 +51,17 @@ class Peer(NamedTuple):
 POINTS, PIECES, PAIR = {"locate 3D": "points"}, {"clip_segments 3D": "pieces"}, {"collide 3D": "pair"}
 OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "polygon areas"}
 PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
-BY_VOLUMES = "pair by volumes"
+BOOK = PLANE | {"overlay 2D": "overlay", "collide 3D": "pair by volumes"}
 PEERS = (
     Peer("ours", "", {}),
-    Peer(
-        "textbook",
-        "textbook",
-        POINTS
-        | {"locate 2D": "points", "overlay 2D": "overlay", "collide 3D": BY_VOLUMES, "clip_segments 2D": "pieces"},
-    ),
+    Peer("textbook", "textbook", POINTS | BOOK),
     Peer("shapely", "shapely", PLANE | {"collide 2D": "pair"}),
     Peer("shapely clip_by_rect", "shapely", {"clip_segments 2D": "pieces by rectangle", **CLIPPING}),
-    Peer("matplotlib", "matplotlib", {"locate 2D": "points"}),
-    Peer("pyclipper", "pyclipper", PLANE | CLIPPING),
     Peer("Clipper2 by manifold3d", "manifold3d", CLIPPING | OVERLAY),
     Peer("numba_celltree", "celltree", {"clip_segments 2D": "pieces"}),
     Peer("Open3D", "open3d", POINTS | PAIR),
     Peer("trimesh + embreex", "trimesh", POINTS | PIECES),
     Peer("libigl", "igl", POINTS | PAIR),
-    Peer("VTK", "vtk", POINTS | PAIR),
     Peer("CGAL", "cgal", POINTS),
     Peer("coal", "coal", PAIR),
     Peer("fcl", "fcl", PAIR),
@@ -298,7 +290,6 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("--answers", action="store_true", help="write the exact answers into cases.json")
     parser.add_argument("--only", nargs="*", default=(), metavar="NAME", help="only these contenders")
     parser.add_argument("--cases", action="store_true", help="print every answer that is not right, with its note")
-    parser.add_argument("--keep", action="store_true", help="into the stored results, and the pages")
     parser.add_argument("--quick", action="store_true", help="the first twenty cases")
     options = parser.parse_args(words)
     if options.answers:
@@ -309,8 +300,4 @@ def main(words: list[str] | None = None) -> int:
         if options.cases and row["outcome"] != "right":
             print(f"{row['contender']:<24} {row['outcome']:<18} {row['case']:<50} {row['note']}")
     print(section(rows))
-    if options.keep and not (options.quick or options.only):
-        from benchmarks import report
-
-        report.keep("filed", rows)
     return int(any(row["contender"] == "ours" and row["outcome"] != "right" for row in rows))

@@ -48,6 +48,7 @@ async def post(client: httpx.AsyncClient, path: str, body: Json) -> Json:
     return found
 
 
+@pytest.mark.some(1)
 @pytest.mark.data
 @pytest.mark.parametrize("name", MESHES)
 @pytest.mark.parametrize("n_checked", [16, pytest.param(1000, marks=pytest.mark.full)])
@@ -86,6 +87,7 @@ async def test_two_posed_bunnies(client: httpx.AsyncClient, data: Path) -> None:
     assert witness["kind"] == "vertex_vertex"
 
 
+@pytest.mark.full
 @pytest.mark.data
 @pytest.mark.parametrize("n_checked", [6, pytest.param(200, marks=pytest.mark.full)])
 async def test_segments_on_the_menger_sponge(client: httpx.AsyncClient, data: Path, n_checked: int) -> None:

@@ -34,6 +34,7 @@ def service() -> Iterator[Service]:
         yield service
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.name)
 def test_an_attack_is_refused_in_time_and_within_memory(service: Service, attack: Attack) -> None:
     attack.send(service.port)  # the body is made, and what the question needs is loaded
@@ -47,6 +48,7 @@ def test_an_attack_is_refused_in_time_and_within_memory(service: Service, attack
     assert seen.wait < 1.0  # 0.1 on a quiet machine: `benchmarks soak` says it
 
 
+@pytest.mark.full
 def test_all_attacks_at_once_leave_it_standing(service: Service) -> None:
     with watched(service.port, service.process.pid, SECONDS) as seen, ThreadPoolExecutor(8) as clients:
         answers = list(clients.map(lambda attack: attack.send(service.port), ATTACKS * 2))

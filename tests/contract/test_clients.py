@@ -80,6 +80,7 @@ def run(*command: object, folder: Path, **environment: str) -> str:
     return done.stdout
 
 
+@pytest.mark.full
 @needs_java
 def test_java_http_client_with_its_defaults(service: Service, tmp_path: Path) -> None:
     """It offers h2c with every request, body included."""
@@ -87,6 +88,7 @@ def test_java_http_client_with_its_defaults(service: Service, tmp_path: Path) ->
     assert printed.split() == ["201", "200", "[false,true,true]"]
 
 
+@pytest.mark.full
 @pytest.mark.skipif(
     importlib.util.find_spec("openapi_python_client") is None, reason="openapi-python-client is missing"
 )

@@ -249,6 +249,7 @@ def test_building_for_a_first_question_ends(name: str) -> None:
     check_ends(lambda: cpu_after(partial(FIRST[name], new(solid("fine"))), SOON, False))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("seconds", [0.05, 0.4, 1.5, 3.0])
 def test_nine_million_crossings_end_in_every_stage(seconds: float) -> None:
     bars = [engine.Polygon([ring]) for ring in [*stripes(1_500), *across(1_500), TINY]]

@@ -124,6 +124,7 @@ def hold_within(service: Service, n_clients: int, turns: int) -> float:
     return seen.wait
 
 
+@pytest.mark.full
 def test_memory_stays_within_what_requests_are_given(service: Service) -> None:
     hold_within(service, 4, 1)
 

@@ -237,6 +237,7 @@ def test_keys_are_described(made: dict[str, Any]) -> None:
     assert asking["paths"]["/healthz"]["get"]["security"] == []
 
 
+@pytest.mark.full
 @pytest.mark.skipif(shutil.which("npm") is None, reason="no npm is installed")
 def test_linters_find_nothing(tmp_path: Path) -> None:
     """Redocly's recommended rules and spectral's own: no error and no warning."""

@@ -64,6 +64,7 @@ def browser() -> Iterator[Any]:
         browser.close()
 
 
+@pytest.mark.full
 def test_the_calls_are_tried_on_their_page_with_a_key(browser: Any) -> None:
     """Nothing of /docs and /redoc comes from outside; with keys the pages open, and Swagger UI asks for one."""
     service = Service(api_keys="secret")
@@ -165,6 +166,7 @@ def request_of(page: Any) -> dict[str, Any]:
     return dict(json.loads(page.evaluate("navigator.clipboard.readText()")))
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize(
     ("question", "dimension", "words"),
     [
@@ -336,6 +338,7 @@ def test_a_link_holds_the_whole_state(page: Any) -> None:
     assert "points wrong" in verdict(page)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(
     ("path", "body", "words"),
     [
@@ -407,6 +410,7 @@ def test_what_is_drawn_stands_out(page: Any, scheme: str) -> None:
     page.emulate_media(color_scheme="light")
 
 
+@pytest.mark.full
 def test_a_key_is_asked_for_on_the_page(browser: Any) -> None:
     service = Service(api_keys="secret")
     service.wait_until_ready()

@@ -128,6 +128,7 @@ def test_the_metrics_listed_are_those_counted() -> None:
     assert {name.removesuffix("_total") for name in named} == counted
 
 
+@pytest.mark.full
 def test_the_files_of_the_command_line_are_asked(tmp_path: Path) -> None:
     """Small files under the names shown, in their formats."""
     trimesh = pytest.importorskip("trimesh", reason="the extra `formats` is not installed")

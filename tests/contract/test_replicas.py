@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 import orjson
+import pytest
 
 import engine
 from benchmarks.load import Connection, free_port, request, wait_until
@@ -53,6 +54,7 @@ def wait_for(statuses: list[int], count: int) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.full
 def test_a_replica_killed_under_load_loses_nothing(tmp_path: Path) -> None:
     command = program("nginx", package="nginx")
     is_over = threading.Event()

@@ -35,6 +35,11 @@ def ask(folder: Path, *options: str, seconds: float) -> int:
     return int(found[1].replace(",", ""))
 
 
+def test_a_hundred_cases(tmp_path: Path) -> None:
+    assert ask(tmp_path, "--phases", "examples,fuzzing,stateful", "--max-examples", "4", seconds=200) >= 100
+
+
+@pytest.mark.full
 def test_five_hundred_cases(tmp_path: Path) -> None:
     assert ask(tmp_path, "--phases", "examples,fuzzing,stateful", "--max-examples", "30", seconds=200) >= 500
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from hypothesis import settings
 
-FACTOR = 1
+FACTOR = 1.0
 
 
 def examples(n: int) -> Callable[[Any], Any]:
-    """Return the decorator that asks for n examples, many more with --full."""
-    return settings(max_examples=n * FACTOR)
+    """Return the decorator that asks for n examples: fewer in the short tier, many more with --full."""
+    return settings(max_examples=int(n * FACTOR))

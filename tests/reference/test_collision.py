@@ -36,6 +36,7 @@ SURFACE = {"type": "surface", "vertices": [[0.25, 0.25, -1], [0.75, 0.25, -1], [
 SMALL_SURFACE = {**SURFACE, "vertices": [[0.25, 0.25, 0.5], [0.75, 0.25, 0.5], [0.5, 0.5, 0.75]]}
 
 
+@pytest.mark.some(24)
 @pytest.mark.parametrize(
     ("first", "second", "expected"),
     [

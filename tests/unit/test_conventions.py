@@ -1,7 +1,9 @@
-"""docs/conventions.md: every row of its table has its numeric example run here."""
+"""Signs and windings, written as examples, and the examples of docstrings."""
 
 from __future__ import annotations
 
+import doctest
+import importlib
 from pathlib import Path
 
 import numpy as np
@@ -117,3 +119,19 @@ def test_the_example_of_a_convention(example: object) -> None:
 def test_every_convention_has_an_example() -> None:
     rows = [line for line in PAGE.read_text("utf-8").splitlines() if line.startswith("|")]
     assert len(rows) - 2 == len(EXAMPLES)
+
+
+# --- The example in each docstring of the engine runs and prints what it says ---
+
+
+ROOT = Path(__file__).resolve().parents[2]
+MODULES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    for path in sorted((ROOT / "engine").rglob("*.py"))
+    if ">>>" in path.read_text("utf-8")
+]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples(name: str) -> None:
+    assert doctest.testmod(importlib.import_module(name)).failed == 0

@@ -71,6 +71,7 @@ print(exact_geometry.locate([[3.0, 4.0], [3.1, 4.0]], ball).tolist())
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["engine.py", "engine/__init__.py"])
 def test_ours_stands_beside_another_engine(tmp_path: Path, name: str) -> None:
     """Twice: the second time from the bytecode of the first, which the plain import does not meet."""

@@ -116,6 +116,7 @@ def edit_in_place(file: Path, text: str) -> None:
     os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))
 
 
+@pytest.mark.full
 def test_bytecode_of_another_source_leaves_no_kernel(project: Path) -> None:
     cache, helper = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine" / "deep" / "helper.py"
     for path in project.rglob("*.py"):
@@ -130,6 +131,7 @@ def test_bytecode_of_another_source_leaves_no_kernel(project: Path) -> None:
     assert run(project, **cache)[:2] == ["3.0", "1"]
 
 
+@pytest.mark.full
 def test_a_source_that_is_edited_while_it_runs_leaves_no_kernel(project: Path) -> None:
     cache, helper = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine" / "deep" / "helper.py"
     edit = f"import engine.work; open({str(helper)!r}, 'w').write({HELPER.format(step=5.0)!r}); {USE}"
@@ -149,6 +151,7 @@ def zipped(project: Path) -> Path:
     return project / "lib.zip"
 
 
+@pytest.mark.full
 def test_an_engine_in_a_zip_file_is_kept_by_its_sources(project: Path) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache"), "PYTHONPATH": str(zipped(project)), "PYTHONSAFEPATH": "1"}
     assert run(project, **cache)[:2] == ["2.0", "0"]
@@ -159,6 +162,7 @@ def test_an_engine_in_a_zip_file_is_kept_by_its_sources(project: Path) -> None:
     assert run(project, **cache)[:2] == ["11.0", "1"]
 
 
+@pytest.mark.full
 def test_an_engine_without_sources_is_never_kept(project: Path) -> None:
     cache, bare = {"ENGINE_CACHE_DIR": str(project / "cache"), "PYTHONSAFEPATH": "1"}, project / "bare"
     for step, expected in ((1.0, "2.0"), (10.0, "11.0")):
@@ -174,6 +178,7 @@ def test_an_engine_without_sources_is_never_kept(project: Path) -> None:
     assert not list((project / "cache").rglob("*.nbc"))
 
 
+@pytest.mark.full
 def test_files_that_were_swapped_are_noticed(project: Path) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
     both = "from engine.work import run; print(run(1.0), run(1j), sum(run.dispatcher.stats.cache_hits.values()))"
@@ -195,6 +200,7 @@ OTHERS = [
 ]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(("what", "mode", "owner"), OTHERS)
 def test_what_others_can_write_is_not_loaded(project: Path, what: str, mode: int, owner: int | None) -> None:
     if owner is not None and os.getuid():
@@ -323,6 +329,7 @@ def test_an_archive_is_unpacked_where_new_files_are_the_group_s_to_write(project
     assert run(project, use, **cache)[:2] == ["2.0", "1"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["folder", "archive"])
 def test_a_seed_of_the_family_is_used_by_each_of_its_cpus(project: Path, seed: Path, kind: str) -> None:
     for path in [seed, *seed.rglob("*")]:
@@ -338,6 +345,7 @@ def test_a_seed_of_the_family_is_used_by_each_of_its_cpus(project: Path, seed: P
     assert started(project, named)[0][:2] == ["4.0", "0"]
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("kind", ["code", "owner", "others", "tools", "archive", "intruder", "absent"])
 def test_a_seed_that_is_not_as_it_was_made_is_not_run(project: Path, seed: Path, kind: str) -> None:
     written = seed / "MADE_BY"
@@ -368,6 +376,7 @@ def test_a_seed_that_is_not_as_it_was_made_is_not_run(project: Path, seed: Path,
     assert "not used" in logged
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("option", ["NUMBA_OPT=1", "NUMBA_SLP_VECTORIZE=1", "NUMBA_LOOP_VECTORIZE=0"])
 def test_code_of_another_option_is_not_taken(project: Path, option: str) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
@@ -402,6 +411,7 @@ def test_inner_functions_are_compiled_once_for_all_literals(project: Path) -> No
     assert run(project, code, ENGINE_CACHE_DIR=str(project / "cache")) == ["1"]
 
 
+@pytest.mark.full
 def test_processes_that_fill_one_cache_together(project: Path) -> None:
     cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
     expected = {"1.0": "2.0", "1j": "(1+1j)"}
@@ -423,6 +433,7 @@ def test_a_damaged_file_is_compiled_anew(project: Path) -> None:
     assert run(project, **cache)[:2] == ["2.0", "1"]
 
 
+@pytest.mark.full
 def test_a_kernel_is_compiled_anew_where_the_class_of_an_argument_has_moved(project: Path) -> None:
     """The source of the kernel does not name the module of that class, and so its key is the same."""
     cache, package = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine"
@@ -495,6 +506,7 @@ def makes(values, out):
 """
 
 
+@pytest.mark.full
 def test_who_makes_arrays_counts_them_and_nobody_else(project: Path) -> None:
     """Counted by one side alone they were freed while in use: `Scene.clip_segments` as the first question crashed."""
     (project / "engine" / "counts.py").write_text(COUNTING)
@@ -532,6 +544,7 @@ def theirs(x):
 """
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("order", ["ours, theirs", "theirs, ours"])
 def test_kernels_stand_beside_what_others_compile_of_the_same_functions(project: Path, order: str) -> None:
     """Ours, and numba's own: the linker once took a function within our kernel for theirs, and found no address."""

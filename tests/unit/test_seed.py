@@ -84,6 +84,7 @@ def told(process: subprocess.Popen[str]) -> tuple[str, str]:
     return output.strip(), errors
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("kind", ["folder", "archive"])
 def test_an_empty_home_and_a_seed_compile_nothing(tmp_path: Path, seed: Path, kind: str) -> None:
     named = seed if kind == "folder" else seed.with_name("seed.tar.xz")
@@ -99,6 +100,7 @@ def test_a_seed_is_enough_where_nothing_can_be_written(tmp_path: Path, seed: Pat
     assert told(ask(home, nowhere, ENGINE_CACHE_SEED=str(seed))) == (f"{ANSWERS} 0", "")
 
 
+@pytest.mark.full
 def test_two_processes_unpack_one_archive(tmp_path: Path, seed: Path) -> None:
     archive = str(seed.with_name("seed.tar.xz"))
     together = [ask(tmp_path, ENGINE_CACHE_SEED=archive) for _ in range(2)]

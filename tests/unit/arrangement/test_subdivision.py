@@ -1,14 +1,15 @@
-"""Faces and labels: Euler's formula, nesting, and every label against a slow even-odd test of a point in the face."""
+"""Subdivisions: cells of edges, the edge below a point, components."""
 
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import permutations
 
 import numpy as np
 import pytest
 
 from engine.arrangement.arrange import Arrangement, arrange_rings
-from engine.arrangement.subdivision import label_faces, subdivide
+from engine.arrangement.subdivision import EdgesBelow, label_faces, subdivide
 from engine.arrangement.union_find import UnionFind
 from tests.unit.arrangement.segments import arrange_segments, face_points
 
@@ -87,3 +88,40 @@ def test_dangling_segments_part_nothing() -> None:
     assert label_faces(subdivision) == [0, 1]
     (x, y) = face_points(subdivision)[1]
     assert x != 3 or y < 2
+
+
+# --- The stab straight down, against all edges in rational arithmetic ---
+
+
+def slow_edge_below(arrangement: Arrangement, node: int) -> int:
+    """All edges that span x + 0, by height at x, then by slope."""
+    x, y = arrangement.nodes.exact(node)
+    found: list[tuple[Fraction, Fraction, int]] = []
+    for edge, (tail, head) in enumerate(zip(arrangement.tails, arrangement.heads, strict=True)):
+        (px, py), (qx, qy) = arrangement.nodes.exact(tail), arrangement.nodes.exact(head)
+        if px <= x < qx:
+            slope = (qy - py) / (qx - px)
+            if (height := py + slope * (x - px)) < y:
+                found.append((height, slope, edge))
+    return max(found)[2] if found else -1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_equals_the_slow_answer(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    segments = [tuple(map(tuple, segment)) for segment in random.integers(0, 9, (14, 2, 2)).astype(float).tolist()]
+    arrangement = arrange_segments(segments)
+    below = EdgesBelow(arrangement)
+    for node in {*arrangement.tails, *arrangement.heads}:
+        assert below.find(node) == slow_edge_below(arrangement, node)
+
+
+# --- Sets grow together; the root is the smallest member whatever the order of uniting ---
+
+
+def test_root_is_the_smallest_member() -> None:
+    for order in permutations([(4, 2), (2, 5), (1, 5), (3, 0)]):
+        sets = UnionFind(6)
+        for first, second in order:
+            sets.unite(first, second)
+        assert [sets.find(member) for member in range(6)] == [0, 1, 1, 0, 1, 1]

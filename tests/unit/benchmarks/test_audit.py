@@ -33,6 +33,7 @@ def audited(folder: Path, first: object, second: object, *options: str) -> dict:
     return {row["contender"]: row["errors"] for row in rows if not row["absent"]}
 
 
+@pytest.mark.full
 def test_points_and_who_is_wrong_about_which(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A half-line to the right from the square's right edge meets nothing; float32 moves a point beside it onto it."""
     points = np.array([[0.5, 0.5], [1.0, 0.5], [1.0 + 2**-40, 0.5], [2.0, 0.5]])
@@ -44,6 +45,7 @@ def test_points_and_who_is_wrong_about_which(tmp_path: Path, capsys: pytest.Capt
     assert {"textbook: signed angles", "textbook: same side, float32"} <= set(found)
 
 
+@pytest.mark.full
 def test_segments_bodies_and_layers(tmp_path: Path) -> None:
     box = {"type": "aabb", "min": [0, 0], "max": [1, 1]}
     found = audited(tmp_path, box, np.array([[-1.0, 0.5, 2.0, 0.5], [0.0, 3.0, 1.0, 3.0]]))
@@ -55,6 +57,7 @@ def test_segments_bodies_and_layers(tmp_path: Path) -> None:
     assert audited(tmp_path, SQUARE, SQUARE)["ours"]["wrong"] == 0
 
 
+@pytest.mark.full
 def test_a_page_is_written_that_needs_no_other_file(tmp_path: Path) -> None:
     (tmp_path / "square.geojson").write_text(json.dumps(SQUARE))
     (tmp_path / "points.csv").write_text("x,y\n0.5,0.5\n1,0.5\n")
@@ -67,6 +70,7 @@ def test_a_page_is_written_that_needs_no_other_file(tmp_path: Path) -> None:
     assert "http" not in text.replace("http://127.0.0.1:8000", "").replace("http://www.w3.org", "")
 
 
+@pytest.mark.full
 def test_a_mesh_alone_is_asked_about_the_middles_of_its_faces(tmp_path: Path) -> None:
     (tmp_path / "body.json").write_text(json.dumps(TETRAHEDRON))
     assert audit.main([str(tmp_path / "body.json"), "--seconds", "0.01", "-o", str(tmp_path / "found.json")]) == 0

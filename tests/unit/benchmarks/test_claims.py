@@ -6,6 +6,7 @@ import copy
 import json
 import re
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -156,3 +157,24 @@ def test_the_committed_files_are_what_the_results_give() -> None:
 
 def test_every_question_of_the_page_is_there() -> None:
     assert [each["title"] for each in DATA["questions"]] == [title for title, *_ in web_page.QUESTIONS]
+
+
+# --- The catalogue of hard cases shows pictures that are drawn and figures of every set that it names ---
+
+
+HARD_CASES = Path(__file__).resolve().parents[3] / "docs" / "hard_cases.md"
+TEXT = HARD_CASES.read_text("utf-8")
+MARK = re.compile(r"<!-- measured: (.*?) -->\n(?:.+\n)*")
+
+
+def test_every_picture_is_stored_and_shown() -> None:
+    shown = re.findall(r"\(pictures/hard_(\w+)\.svg\)", TEXT)
+    stored = (HARD_CASES.parent / "pictures").glob("hard_*.svg")
+    assert sorted(shown) == sorted(path.stem.removeprefix("hard_") for path in stored)
+
+
+def test_every_set_has_its_figures_and_none_of_ours_is_wrong() -> None:
+    for mark in MARK.finditer(TEXT):
+        wanted, lines = mark[1].split("; "), mark[0].splitlines()[1:]
+        assert [line.split("*")[1] for line in lines] == wanted
+        assert all("**ours 0**" in line for line in lines)

@@ -18,16 +18,13 @@ BOX = {"type": "aabb", "min": [0, 0], "max": [1, 1]}
 BALL = {"type": "sphere", "center": [0, 0], "radius": 1}
 SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]]}
 TWO = {"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {}, "geometry": SQUARE}] * 2}
-ROW = {"operation": "o", "contest": "c", "contender": "ours", "rate": 1.0, "errors": {"wrong": 0}}
-RESULTS = {"commit": "x", "processor": "p", "cores": 2, "seed": 0, "rows": [ROW]}
 
 
 @pytest.fixture
 def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Write some files and go there."""
     for name, value in (
-        ("box.json", BOX), ("ball.json", BALL), ("two.geojson", TWO), ("results.json", RESULTS),
-        ("others.json", RESULTS | {"rows": [ROW | {"contest": "d"}]}),
+        ("box.json", BOX), ("ball.json", BALL), ("two.geojson", TWO),
     ):  # fmt: skip
         (tmp_path / name).write_text(json.dumps(value))
     (tmp_path / "broken.json").write_text('{"type": "aabb", "min": [0')
@@ -77,19 +74,13 @@ def test_the_audit_says_what_is_wrong_with_its_files(
             "no row has 'no such row' in its name; there are segments: ",
         ),
         (["segments", "--quick", "--contest", "sphere, tangents", "--contender", "nobody"], "no contender 'nobody'"),
-        (["compare", "results.json", "no.json"], "No such file"),
-        (["compare", "results.json", "broken.json"], "Expecting"),
-        (["compare", "results.json", "box.json"], "no results of a report"),
-        (["compare", "results.json", "others.json"], "no row in common"),
-        (["publish", "folder", "--only", "no such contest"], "no contest has 'no such contest' in its name"),
-        (["publish", "box.json", "--only", "along the box"], "File exists"),
     ],
 )
 def test_a_command_says_what_is_wrong(
     files: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as refused:
-        main([*words, *(["--rounds", "1", "--seconds", "0.01"] if words[0] == "segments" else [])])
+        main([*words, "--rounds", "1", "--seconds", "0.01"])
     assert refused.value.code == 2
     assert said in capsys.readouterr().err
 

@@ -1,14 +1,13 @@
-"""The report runs without any peer, counts right and wrong answers, writes its page, and compares two results."""
+"""The report runs without any peer, counts right and wrong answers, and writes its page."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import compare, errors, page, workloads
+from benchmarks import errors, page, workloads
 from benchmarks.contenders import Prepared
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.contest import Contender, Contest, Row, Size, hold, sketch
@@ -62,7 +61,8 @@ def test_every_judge_of_numbers_tells_what_the_page_shows() -> None:
     assert all({"ulp_largest", "ulp_median"} <= set(each) for each in (found, pieces, area))
 
 
-@pytest.mark.parametrize("field", ["primitives", "polygons", "segments"])
+@pytest.mark.full
+@pytest.mark.parametrize("field", ["clearance", "polygons", "segments"])
 def test_ours_has_no_wrong_answer(field: str) -> None:
     for task in tasks(Size(0, 0.01), (field,), is_page=True):
         each = task.make()
@@ -89,22 +89,6 @@ def test_a_body_too_large_to_be_shown_is_drawn_by_some_of_its_faces() -> None:
 def test_ring_areas() -> None:
     square, triangle = [[1, 1], [3, 1], [3, 3], [1, 3]], [[0, 0], [0, 2], [2, 0]]
     assert ring_areas(np.array(square + triangle, float), np.array([0, 4, 7])).tolist() == [4.0, -2.0]
-
-
-def stored(path: Path, rate: float, wrong: int) -> str:
-    row = {"operation": "o", "contest": "c", "contender": "ours", "rate": rate, "errors": {"wrong": wrong}}
-    rows = [row, row | {"setting": 3.0, "rate": 7.0}]
-    path.write_text(json.dumps({"commit": "x", "processor": "p", "cores": 2, "seed": 0, "rows": rows}))
-    return str(path)
-
-
-def test_two_results_are_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    old, new = stored(tmp_path / "a.json", 100.0, 0), stored(tmp_path / "b.json", 250.0, 1)
-    assert compare.main([old, new]) == 1
-    shown = capsys.readouterr().out
-    assert "2.50x" in shown
-    assert "ours @3" in shown
-    assert compare.main([new, old]) == 0
 
 
 def test_the_page_lists_wrong_answers_of_ours_first() -> None:

@@ -37,6 +37,7 @@ def test_answers_that_differ_are_settled() -> None:
     assert (ours.errors["differ"], ours.errors["wrong"], peer.errors["wrong"]) == (2, 0, 2)
 
 
+@pytest.mark.full
 def test_a_contender_is_one_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,4 +1,4 @@
-"""Pairs of boxes that meet: the brute-force answer, for boxes of any mix of sizes, whatever the blocks."""
+"""Grids of boxes and of points."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
+from engine.bounding.grid import cell_of, make_axis
 from engine.budget import Budget, Cancel
 from engine.errors import CancelledError
 
@@ -23,6 +24,7 @@ def brute_force(low: np.ndarray, high: np.ndarray) -> list[list[int]]:
     return np.argwhere(np.triu(meet, 1)).tolist()
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", ["alike", "lattice", "mixed", "infinite", "flat", "far", "one_place", "tiny"])
 def test_the_pairs_are_those_that_meet(kind: str, dimension: int) -> None:
@@ -85,3 +87,24 @@ def test_all_pairs_end_when_cancelled() -> None:
     cancel.set()
     with Budget(cancel=cancel) as budget, pytest.raises(CancelledError):
         all_pairs_of_boxes(np.zeros((200, 2)), np.ones((200, 2)), budget)
+
+
+# --- Cells of an axis: none decreases along it, ties, roundings and subnormal numbers included ---
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**1020, 2.0**-1060, 1e-300])
+def test_cells_ascend(scale: float) -> None:
+    random = np.random.default_rng(4)
+    values = np.sort(np.round(random.uniform(0, 8, 200), 1)) * scale
+    values = np.sort(np.concatenate([values, np.nextafter(values, -np.inf)[1:], np.nextafter(values, np.inf)[:-1]]))
+    axis = make_axis(float(values[0]), float(values[-1]), 7)
+    cells = [cell_of(value, axis.low, axis.cells_per_unit, axis.n_cells) for value in values.tolist()]
+    assert cells == sorted(cells)
+    assert cells[0] == 0
+    assert cells[-1] == 6 or scale < 1e-290  # there are fewer cells than asked for
+
+
+def test_no_extent_is_one_cell() -> None:
+    axis = make_axis(3.0, 3.0, 16)
+    assert axis.n_cells == 1
+    assert cell_of(3.0, axis.low, axis.cells_per_unit, axis.n_cells) == 0

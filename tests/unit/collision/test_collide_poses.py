@@ -124,6 +124,7 @@ def _moves(n: int, scale: float) -> tuple[np.ndarray, np.ndarray]:
     return turns, draw.integers(-12, 13, (n, 3)) * scale
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("scale", [1.0, 2.0**-500, 2.0**400, 2.0**1010])
 @pytest.mark.parametrize("solid", [Polyhedron, Surface])
 def test_agrees_with_rationals(solid: type[Solid], scale: float) -> None:

@@ -49,6 +49,7 @@ def ask(change: str, folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, env=environment)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("name", CHANGES)
 def test_without_one_part_the_answers_stay_and_a_warning_says_so(name: str, tmp_path: Path) -> None:
     change, warning = CHANGES[name]

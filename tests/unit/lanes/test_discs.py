@@ -18,7 +18,7 @@ from engine.lanes.discs import (
     discs_meeting,
     place_discs,
 )
-from tests.unit.bounding.test_disc_tree import faces_below, surfaces
+from tests.unit.bounding.test_trees import faces_below, surfaces
 
 TURNED = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 

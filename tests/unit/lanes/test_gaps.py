@@ -47,6 +47,7 @@ def _placed(points: np.ndarray, place: Placement) -> np.ndarray:
     return points @ rotation.T + (np.array(place.shift) if place.is_posed else 0.0)
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize(
     ("ratio", "away"), [(1.0, 1.0), (1e-3, 0.7), (1e4, 1e4), (1.0, 1e7), (2.0**-90, 1.0), (2.0**-58, 2.0**8)]
 )

@@ -1,8 +1,4 @@
-"""Eight numbers as one value: every operation is what exact arithmetic rounded to float32 says, compiled and in Python.
-
-A float64 holds sums and products of two float32 closely enough that rounding it again gives the float32 nearest to the
-exact result; roots too.
-"""
+"""Lanes: their arithmetic, how they are traced, addresses and memory."""
 
 from __future__ import annotations
 
@@ -12,8 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba import config as numba_config
+from numba.core.errors import TypingError
 
 from engine.jit import kernel
+from engine.lanes.addresses import array_at, plain_array_at
 from engine.lanes.lanes import (
     any_above,
     any_of,
@@ -27,13 +26,15 @@ from engine.lanes.lanes import (
     load,
     load_lane,
     lowest_bit,
+    move,
+    prefetch,
     root,
     select,
     sift,
     spread,
     store,
 )
-from engine.lanes.tracing import LANES, Rows, traced
+from engine.lanes.tracing import LANES, Number, Rows, Triple, traced
 
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 1e-45, -1e-45, 1.1754942e-38, -1.1754944e-38, 3.4e38, -3.4e38]
 SPECIAL += [1.0, -1.0, 1.0000001, 0.1, -7.5]
@@ -142,3 +143,70 @@ def test_tables_of_bits() -> None:
             number = sum(1 << place for place in np.flatnonzero(bits).tolist())
             assert words[first : first + 2].tolist() == [number & 0xFFFFFFFF, number >> 32]
         assert words[4] == bit
+
+
+# --- Functions on lanes, written once: what they are handed, in Python and by compiled code ---
+
+
+@traced
+def turned(rows: Rows, item: int, angle: Number, middle: Triple) -> None:
+    """Set row `item` to itself times a number plus the sum of three."""
+    store(rows, item, load(rows, item) * angle + (middle[0] + middle[1] + middle[2]))
+
+
+@kernel
+def turn(rows: Any, item: Any, angle: Any, middle: Any) -> None:
+    turned(rows, item, angle, (middle[0], middle[1], middle[2]))
+
+
+def test_numbers_are_rounded_to_float32_on_the_way_in() -> None:
+    start = np.arange(24, dtype=np.float32).reshape(3, 8)
+    compiled, plain = start.copy(), start.copy()
+    turn(compiled, 1, 0.1, np.array([0.1, 0.2, 0.3]))
+    turned(plain, 1, 0.1, (0.1, 0.2, 0.3))
+    total = np.float32(0.1) + np.float32(0.2) + np.float32(0.3)
+    assert plain[1].tolist() == (start[1] * np.float32(0.1) + total).tolist()
+    assert compiled.tolist() == plain.tolist()
+    assert (plain[::2] == start[::2]).all()
+
+
+@pytest.mark.skipif(numba_config.DISABLE_JIT, reason="types are looked at by the compiler")
+@pytest.mark.parametrize("rows", [np.zeros((3, 8)), np.zeros((3, 16), np.float32)[:, ::2], 1.0])
+def test_rows_are_contiguous_float32(rows: Any) -> None:
+    with pytest.raises(TypingError):
+        turn(rows, 0, 1.0, np.zeros(3))
+
+
+# --- Arrays by their address: the numbers that are there, compiled and in Python ---
+
+
+@kernel
+def last_of(address: int) -> float:
+    return float(array_at(address, (2, 3), np.float64)[1, 2])
+
+
+def test_an_array_by_its_address() -> None:
+    values = np.array([-0.0, 5e-324, np.inf, 1.0, 2.0, 3.0])
+    assert plain_array_at(values.ctypes.data, (2, 3), np.float64).tobytes() == values.tobytes()
+    assert plain_array_at(values.ctypes.data, (0,), np.float64).tolist() == []
+    assert last_of(values.ctypes.data) == 3.0
+
+
+# --- Runs of numbers are copied to their place and nowhere else; asking for a line changes nothing ---
+
+
+@kernel
+def copy(target: Any, at: int, source: Any, first: int, n: int) -> None:
+    prefetch(source, first)
+    prefetch(source, 10**6)
+    move(target, at, source, first, n)
+
+
+def test_runs_are_copied() -> None:
+    source = np.array([np.nan, -0.0, 5e-324, np.inf, 1.0, 2.0])
+    for at, first, n in ((0, 0, 6), (2, 1, 3), (5, 5, 0), (4, 4, 2)):
+        target = np.full(6, 7.0)
+        copy(target, at, source, first, n)
+        expected = np.full(6, 7.0)
+        expected[at : at + n] = source[first : first + n]
+        assert target.tobytes() == expected.tobytes()

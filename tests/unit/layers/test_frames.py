@@ -45,6 +45,7 @@ def frame(seed: int, names: str, apart: bool = False, crs: Any = 3857) -> Any:
     return geopandas.GeoDataFrame(columns, geometry=[*map(shape, features)], index=np.arange(14) * 7 + 3, crs=crs)
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("how", HOWS)
 @pytest.mark.parametrize("apart", [False, True])
 def test_rows_are_those_of_geopandas(how: str, apart: bool, pytestconfig: pytest.Config) -> None:
@@ -97,6 +98,7 @@ def test_an_area_that_rounding_takes_is_a_row_as_one_that_touches(how: str) -> N
         assert len(rows) == of_left + of_right
 
 
+@pytest.mark.full
 def test_whoever_meets_makes_a_row() -> None:
     """Triangles of tenths: corners that are not quite on edges, by less than a coordinate can say."""
     source = np.random.default_rng(11)

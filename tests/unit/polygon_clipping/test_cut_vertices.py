@@ -1,13 +1,21 @@
-"""Coordinates of cuts: each within its bound of the exact value."""
+"""Vertices of cut rings in doubles, integers and digits."""
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
+import pytest
 
+from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.cut_vertices import Share, between, is_at, on_edge, share_of_edge
+from engine.polygon_clipping.in_integers import MOST_BITS, clip_polygon, integer_row, plane_through
 from engine.predicates.double_double import dd_add, dd_div
+from engine.solids.aabb import Aabb
+from engine.solids.convex import Convex
+from tests.unit.polygon_clipping.test_clip_polygons import check
 
 
 def test_cuts_are_within_their_bounds() -> None:
@@ -46,3 +54,93 @@ def test_a_cut_between_cut_vertices_is_within_its_bound() -> None:
 def test_a_cut_at_a_double_is_known_to_be_there() -> None:
     assert is_at(0.0, 1.0, 0.0, 4.0, 1.0, 0.25)
     assert not is_at(0.0, 1.0, 0.0, 3.0, 1.0, 1 / 3)
+
+
+# --- What doubles and double-doubles prove: long rings in runs, lattices through corners ---
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_long_rings_are_taken_in_runs(dimension: int) -> None:
+    """Many vertices on one side of all planes, and single ones on the planes between them; the ends of a ring equal."""
+    rng = np.random.default_rng(6)
+    walks = np.cumsum(rng.integers(-1, 2, (12, 40, dimension)) / 4, axis=1)
+    walks[6:] += rng.uniform(-0.1, 0.1, (6, 40, dimension))
+    walks[:3, -1] = walks[:3, 0]
+    for region in (
+        Aabb([-0.5] * dimension, [0.5] * dimension),
+        Convex(np.c_[np.eye(dimension) + 1, np.ones(dimension)]),
+    ):
+        check(walks, region)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_contours_through_corners_stay_in_the_kernel(dimension: int) -> None:
+    """Exact zeros that geometry explains need no integers: corners of a box, corners and edges of an octahedron."""
+    rng = np.random.default_rng(dimension)
+    contours = rng.integers(-20, 21, (60, 5, dimension)) / 8
+    contours[:20] = rng.uniform(-2, 2, (20, 5, dimension))
+    offset = rng.integers(-8, 9, (20, dimension)) / 8
+    contours[:20, 0], contours[:20, 1] = 1 + offset, 1 - offset  # an edge through the corner of the box
+    contours[20:30, 1:3, 0] = 1.0  # an edge on a plane
+    signs = np.array(list(itertools.product([-1.0, 1.0], repeat=dimension)))
+    for region in (Aabb([-1] * dimension, [1] * dimension), Convex(np.c_[signs, np.full(len(signs), 1.5)])):
+        clipped, accuracy = clip_polygons(contours, region, report=True)
+        assert accuracy.n_rational < 6
+        check(contours, region, clipped)
+
+
+# --- Sutherland-Hodgman in Python's integers ---
+
+
+def test_too_complex_is_marked_and_spoils_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    monkeypatch.setattr("engine.polygon_clipping.in_integers.MOST_BITS", 400)
+    assert MOST_BITS == 1 << 17
+    box = Aabb([-0.5] * 3, [0.5] * 3)
+    easy = [[0.0, 0.0, 0.0], [0.25, 0.0, 0.0], [0.0, 0.25, 0.0]]
+    hard = rng.uniform(-1, 1, (6, 3)).tolist()
+    clipped = clip_polygons([[easy], [hard, easy], [easy]], box)
+    assert clipped.status.tolist() in ([0, 1, 0], [0, 0, 0])  # a kernel may settle what exact arithmetic would not
+    assert clipped.rings(0)[0].tolist() == clipped.rings(2)[0].tolist() == easy
+
+
+def test_areas_on_both_sides_of_a_line_add_up() -> None:
+    """What is left of a ring on either side of a line, bridges or not, has its area, but for rounding."""
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        ring, line = rng.integers(-9, 10, (7, 2)) * 1.0, rng.integers(-5, 6, 3) * 1.0
+        line[0] += not line[:2].any()
+        areas = [area(ring.tolist())]
+        for row in (line, -line):
+            (left,), _ = clip_polygon([ring.tolist()], [integer_row(row.tolist())], lambda: None)
+            assert all(abs(x) <= 9 for vertex in left for x in vertex)
+            areas.append(area(left))
+        assert abs(areas[1] + areas[2] - areas[0]) < Fraction(1, 10**10)
+
+
+def area(ring: Any) -> Fraction:
+    points = [tuple(map(Fraction, vertex)) for vertex in ring]
+    return sum((p[0] * q[1] - p[1] * q[0] for p, q in zip(points, points[1:] + points[:1])), Fraction(0)) / 2
+
+
+def test_a_plane_through_three_points_is_zero_at_them_and_positive_behind() -> None:
+    row = plane_through([0.5, 0.0, 0.25], [1.5, 0.0, 0.25], [0.5, 2.0, 0.25])
+    values = [sum(a * x for a, x in zip(row, (*point, 1.0))) for point in ([9.0, 9.0, 0.25], [0, 0, 0], [0, 0, 1])]
+    assert [(value > 0) - (value < 0) for value in values] == [0, 1, -1]
+
+
+# --- What doubles leave open and whole numbers settle in the kernel ---
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_planes_through_vertices_need_no_rational_arithmetic(dimension: int) -> None:
+    """Every plane passes through a vertex of every ring, so doubles decide none; edges along planes are cut anew."""
+    rng = np.random.default_rng(dimension)
+    rows = np.c_[rng.integers(-2, 3, (6, dimension)) + 0.25, np.zeros(6)]
+    contours = rng.integers(-8, 9, (40, 6, dimension)) / 4
+    contours[:, 0] = 0.0
+    contours[::2, 3] = 0.0
+    clipped, accuracy = clip_polygons(contours, Convex(rows), report=True)
+    assert accuracy.n_beyond_filter == 40
+    assert accuracy.n_rational < 10
+    check(contours, Convex(rows), clipped)

@@ -118,6 +118,7 @@ def check_one(result: Overlay | None, area: Any, largest: float) -> None:
     assert error <= 4 * 2.0**-52 * length * largest, f"the area is off by {error}"
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_sample(family: Callable[[Random], Pair]) -> None:
     check(np.random.default_rng(9), [drawn(family, seed) for seed in range(3)])

@@ -52,6 +52,7 @@ def distance_to(rings: list[np.ndarray], x: float, y: float) -> float:
     return least
 
 
+@pytest.mark.some(24)
 @pytest.mark.parametrize("size", GRIDS)
 @pytest.mark.parametrize("seed", range(8))
 def test_valid_near_and_on_multiples(seed: int, size: float) -> None:

@@ -89,6 +89,7 @@ def check(pair: Pair, against_reference: bool) -> None:
     assert either + both == union
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("place", range(24))
 def test_sample(data: Path, place: int) -> None:
     """Every fifteenth pair of up to 150 vertices; those of up to 40 against the reference."""

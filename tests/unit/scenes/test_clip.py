@@ -287,6 +287,7 @@ def test_mesh_pieces_are_the_same_one_by_one_and_many_at_a_time() -> None:
     assert_first_and_any(moved, segments, moved.clip_segments(segments))
 
 
+@pytest.mark.full
 def test_a_mesh_of_many_faces_posed_and_not() -> None:
     turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 5, endpoint=False), np.linspace(-1, 1, 4), indexing="ij")
     radius = np.sqrt(1.25 - rise**2)

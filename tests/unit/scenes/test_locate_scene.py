@@ -1,4 +1,4 @@
-"""locate_scene: against locate body by body, poses against the reference, ragged results, errors."""
+"""Points in scenes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 import engine
-from engine import Aabb, HalfSpace, Implicit, Pose, Sphere, locate, locate_scene
+from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Pose, Sphere, Triangle, locate, locate_scene
+from engine.arrays import read_only
+from engine.budget import Budget
+from engine.containment.prepared import tree_of
+from engine.containment.rational_locate import rational_location
+from engine.scenes import locate as locate_module
+from engine.scenes.bodies import Bodies
+from engine.scenes.locate import locate_all
+from engine.scenes.located import BALL, BOX, BY_ITSELF, MESH, RINGS, ROWS
+from engine.scenes.standing import Standing
 from tests.reference.containment import locate as reference
 from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, merged, spelled
 
@@ -209,3 +218,65 @@ def test_a_point_in_all_of_many_bodies_takes_room() -> None:
     held = locate_scene(np.zeros((2000, 2)), boxes)
     assert (np.diff(held.offsets) == 300).all()
     assert not held.on_boundary.any()
+
+
+# --- What tables leave is settled body by body, by trees or as `locate` does; some bodies moved ---
+
+
+TURN = Pose([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]], [0.5, 0.25, 1])
+
+
+@pytest.mark.parametrize("fewest", [1, 1 << 30])
+def test_points_get_their_locations(fewest: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(locate_module, "_FEWEST_FOR_TREES", fewest)
+    solid = made(merged(box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2])))
+    solids, poses = [solid, Sphere([1, 1, 1], 2), solid], [None, TURN, TURN]
+    random = np.random.default_rng(2)
+    points = read_only(random.integers(-1, 10, (200, 3)) / 2.0)
+    with Budget() as budget:
+        standing = Standing(Bodies((*solids, solid), (*poses, None)), {3: TURN})
+        found, accuracy = locate_all(points, standing, budget, None, None)
+        few, _ = locate_all(points[:9], standing, budget, None, None)
+    expected = [
+        (item, body, location == 0)
+        for item, point in enumerate(points.tolist())
+        for body, (each, pose) in enumerate(zip([*solids, solid], [*poses, TURN]))
+        if (location := rational_location(point, each, pose)) >= 0
+    ]
+    owners = np.repeat(np.arange(200), np.diff(found.offsets)).tolist()
+    assert list(zip(owners, found.indices.tolist(), found.on_boundary.tolist())) == expected
+    assert few.indices.tolist() == [body for item, body, _ in expected if item < 9]
+    assert solid.kept("tree") is not None
+    assert accuracy.n_rational > 0
+
+
+# --- Tables of bodies: each body finds its own solid again, in the slot of its kind ---
+
+
+def test_kinds_and_slots_of_the_plane() -> None:
+    ring = Polygon([[[0, 0], [4, 0], [0, 4]], [[1, 1], [2, 1], [1, 2]]])
+    triangle, ball, box = Triangle([[5, 5], [6, 5], [5, 7]]), Sphere([1, 2], 3), Aabb([0, 0], [1, 2])
+    half, wedge = HalfSpace([1, 0], 2), Convex([[1, 0, 0], [0, 1, 0]])
+    many = Polygon([np.column_stack([np.cos(np.arange(200)), np.sin(np.arange(200))])])
+    other = Implicit([{"powers": [1, 0], "coefficient": 1.0}])
+    solids = [ball, ring, box, half, triangle, wedge, many, other, ring, ball]
+    with Budget() as budget:
+        tables = Bodies(tuple(solids), (*[None] * 9, Pose.identity(2))).tables(budget)
+    assert tables.kinds.tolist() == [BALL, RINGS, BOX, ROWS, RINGS, ROWS, BY_ITSELF, BY_ITSELF, RINGS, BALL]
+    first = tables.rings[tables.polygon_offsets[tables.slots[8]] + 1, 0]
+    assert (tables.xs[first : first + 4].tolist(), tables.ys[first : first + 4].tolist()) == (
+        [1, 2, 1, 1],
+        [1, 1, 2, 1],
+    )
+    assert tables.rows[tables.row_offsets[tables.slots[5]] :][:2].tolist() == [[1, 0, 0, 0], [0, 1, 0, 0]]
+    assert tables.balls[tables.slots[0]].tolist() == [3.0, 0.0]
+
+
+def test_polyhedra_have_the_trees_that_are_there() -> None:
+    solid = made(box_mesh([0, 0, 0], [1, 2, 3]))
+    with Budget() as budget:
+        for has_tree in (False, True):
+            tables = Bodies((solid,), (None,)).tables(budget)
+            assert tables.kinds.tolist() == [MESH]
+            assert bool(tables.addresses.any()) == has_tree
+            tree_of(solid)

@@ -37,6 +37,8 @@ def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]
     n, order, parts, is_settled = np.zeros(7, np.int64), np.arange(m), [], np.ones(m, np.bool_)
     out, names = room_for(MOST_MET + 2 * m, solid.dimension), np.empty((2, MOST_MET + 2 * m), np.int64)
     left = np.empty((m, 2), np.int64)
+    for each in (segments, order):  # as the engine hands them over: writable ones would be compiled anew
+        each.setflags(write=False)
     with Budget() as budget:
         while n[0] < m:
             words = standing.words(budget)

@@ -76,6 +76,7 @@ def spheres(rng: np.random.Generator, dimension: int) -> list[Solid]:
 REGIONS = {"aabb": boxes, "convex": convexes, "sphere": spheres}
 
 
+@pytest.mark.some(24)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", REGIONS)
 @pytest.mark.parametrize("family", FAMILIES)

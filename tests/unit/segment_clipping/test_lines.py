@@ -73,6 +73,7 @@ def lines_of(rng: np.random.Generator, targets: Any, family: str) -> list[Any]:
     return lines
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("kind", [*REGIONS, "boundary"])
 @pytest.mark.parametrize("family", ["random", "lattice", "targets", "mixed"])

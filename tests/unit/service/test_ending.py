@@ -70,6 +70,7 @@ def ask(service: Service, path: str, body: bytes, length: int | None = None) -> 
     return connection
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("deadline", [0.5, 100])
 def test_threads_that_cannot_be_stopped_are_left_behind(tmp_path: Path, workers: int, deadline: float) -> None:
@@ -86,6 +87,7 @@ def test_threads_that_cannot_be_stopped_are_left_behind(tmp_path: Path, workers:
         assert partial.recv(2**16)[9:12] == b"503"
 
 
+@pytest.mark.full
 def test_workers_may_start_slowly_and_end_while_one_says_nothing(tmp_path: Path) -> None:
     """Stopped for seven seconds while they start, as on a busy machine; and stopped for ever when the end comes."""
     with started(tmp_path, workers=2) as service:

@@ -194,6 +194,7 @@ async def test_what_is_no_json_does_not_leave(
     assert check_problem(answer, 422, "not_finite")["errors"][0]["pointer"] == place
 
 
+@pytest.mark.full
 async def test_one_feature_of_many_parts_and_rings(client: httpx.AsyncClient) -> None:
     """It is written in parts, and reads as one."""
     apart = collection([frozenset((3 * x, 3 * y) for x in range(90) for y in range(90))])

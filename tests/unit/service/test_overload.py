@@ -43,6 +43,7 @@ def overload(service: Service, seconds: float) -> None:
     assert not after > 1.25 * before + 50, (before, after)
 
 
+@pytest.mark.full
 def test_five_seconds_of_overload(service: Service) -> None:
     overload(service, 5.0)
 

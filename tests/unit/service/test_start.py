@@ -203,6 +203,7 @@ async def test_the_warm_up_ends_with_the_service(monkeypatch: pytest.MonkeyPatch
     assert not is_warming()
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("seconds", [0.0, 1.0])
 def test_a_stop_while_kernels_compile_is_a_stop(tmp_path: Path, seconds: float) -> None:
     around = {**os.environ, "ENGINE_CACHE_DIR": str(tmp_path), "ENGINE_CACHE_SEED": ""}

@@ -1,4 +1,4 @@
-"""The search over two trees: the pair of triangles that is the nearest is among those that it leaves."""
+"""The way down two trees, triangles that are near, the exact distance of two."""
 
 from __future__ import annotations
 
@@ -11,7 +11,15 @@ import pytest
 import engine.collision.clearance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
 from engine.budget import Budget
+from engine.collision.clearance.exact import nearest_of_triangles
+from engine.collision.clearance.near_triangles import FACE, nearest_points, rounding_of, seen_from
 from engine.collision.clearance.spreads import SpreadPair, _ExactPair, spread_pair
+from engine.collision.meshes.triangle_triangle import Facet
+from engine.jit import kernel
+from engine.types import Point3
+from tests.reference.distance import squared_distance
+from tests.reference.exact import Q, q, square, sub, vector
+from tests.unit.collision.clearance.makers import turn
 
 
 def ball(n: int, seed: int) -> Polyhedron:
@@ -91,3 +99,65 @@ def test_the_deadline_holds_where_every_pair_of_triangles_is_a_candidate() -> No
     huge = [Polyhedron(1e304 * (first.vertices + np.array([away, 0, 0])), first.triangles) for away in (0, 3)]
     with pytest.raises(DeadlineExceededError):
         clearance(huge[0], huge[1], at_least=1e304, deadline=0.05)
+
+
+# --- Float bounds on the distance of two triangles: both sides of the exact one, and close to it ---
+
+
+@kernel
+def bounds(s: Facet, t: Facet) -> tuple[float, float]:
+    origin = s.p
+    s, t = seen_from(origin, s), seen_from(origin, t)
+    _, across = nearest_points(s, t, np.inf)
+    slack = rounding_of(s, t)
+    return across.low - slack, across.size + slack
+
+
+def test_bounds_enclose_the_exact_distance_closely() -> None:
+    rng = random.Random(7)
+    for _ in range(200):
+        offset = rng.choice([2.5, 2.0 + 2.0**-40, 9.0])
+        whole = rng.random() < 0.5
+        s, t = (
+            [[float(rng.randint(0, 2)) if whole else rng.uniform(0, 2) for _ in range(3)] for _ in range(3)]
+            for _ in range(2)
+        )
+        t = [[x + offset, y, z] for x, y, z in t]
+        low, high = bounds(*(Facet(*(Point3(*p) for p in hull)) for hull in (s, t)))
+        exact = squared_distance(*[tuple(dict.fromkeys(map(vector, hull))) for hull in (s, t)])
+        assert q(max(low, 0.0)) ** 2 <= exact <= q(high) ** 2, (s, t)
+        assert high - low <= 1e-12 * (1.0 + high) or np.sqrt(float(exact)) < 1e-6, (s, t)
+
+
+def test_the_foot_on_a_needle_is_a_point_of_it_though_its_normal_is_rounded_away() -> None:
+    """A foot along such a normal lay off the needle, and nearer than any point of it."""
+    rng = random.Random(1)
+    for _ in range(400):
+        rotation, thin, near = turn(rng, 3), 10.0 ** rng.uniform(-17, -1), 10.0 ** rng.uniform(-8, 0)
+        slant = 10.0 ** rng.uniform(-8, 0)
+        first = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [rng.uniform(-1, 1), thin, -thin * rng.uniform(-1, 1)]]
+        second = [
+            [-1.0, -slant, near],
+            [1.0, slant, near],
+            [rng.uniform(-1, 1), 0.0, near + slant * rng.uniform(-1, 1)],
+        ]
+        hulls = [[[sum(r * x for r, x in zip(row, p)) for row in rotation] for p in hull] for hull in (first, second)]
+        low, high = bounds(*(Facet(*(Point3(*p) for p in hull)) for hull in hulls))
+        exact = squared_distance(*[tuple(dict.fromkeys(map(vector, hull))) for hull in hulls])
+        assert q(max(low, 0.0)) ** 2 <= exact <= q(high) ** 2, hulls
+
+
+# --- The squared distance of two triangles in integers, against every choice of corners ---
+
+
+def test_is_the_least_of_all_choices_of_corners_from_any_suggestion() -> None:
+    rng = random.Random(5)
+    for _ in range(60):
+        s, t = ([tuple(rng.randint(0, 3) for _ in range(3)) for _ in range(3)] for _ in range(2))
+        t = [(x + 4, y, z) for x, y, z in t]  # apart, often parallel, often without area
+        expected = squared_distance(*[tuple(dict.fromkeys(map(vector, hull))) for hull in (s, t)])
+        for first, second in [(0, 0), (rng.randrange(7), rng.randrange(7)), (FACE, 1)]:
+            gap = nearest_of_triangles((s[0], s[1], s[2]), (t[0], t[1], t[2]), first, second)
+            assert Q(gap.top, gap.bottom) == expected, (s, t, first, second)
+            p, q = ([Q(x, end.denominator) for x in end.numerators] for end in (gap.p, gap.q))
+            assert square(sub(tuple(p), tuple(q))) == expected

@@ -136,6 +136,7 @@ POSES = [
 ]
 
 
+@pytest.mark.some(12)
 @pytest.mark.parametrize("case", CASES, ids=[case[0] for case in CASES])
 @pytest.mark.parametrize("scale", [1.0, 0.1])
 def test_flush_bodies_are_told_by_compiled_code(case: Any, scale: float) -> None:

@@ -100,6 +100,7 @@ IN_CONTACT = [
 ]
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("unit", [1.0, 0.1, 2.0**300])
 def test_contacts_are_decided_without_an_arrangement(unit: float, monkeypatch: pytest.MonkeyPatch) -> None:
     rng, relations = np.random.default_rng(8), []

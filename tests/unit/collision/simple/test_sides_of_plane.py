@@ -25,6 +25,7 @@ def _mesh(draw: np.random.Generator, n: int, scale: float, solid: type[Solid]) -
     return solid(corners.reshape(-1, 3) * scale, faces)
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("scale", [1.0, 2.0**-500, 2.0**-1060, 2.0**400, 2.0**1020])
 @pytest.mark.parametrize("poses", [(None, None), (None, TURN), (TURN, None), (TURN, TURN)])
 def test_agrees_with_rationals(scale: float, poses: tuple[Pose | None, Pose | None]) -> None:

@@ -59,6 +59,7 @@ def _triangles() -> list[np.ndarray]:
     return made
 
 
+@pytest.mark.some(12)
 @pytest.mark.parametrize("corners", _triangles())
 def test_no_cell_that_meets_the_triangle_is_left_out(corners: np.ndarray) -> None:
     low, high = np.floor(corners.min(axis=0)) - 1, np.floor(corners.max(axis=0))

@@ -1,4 +1,4 @@
-"""Rows in blocks: answers do not depend on what else is in a block, near rows, far points or the ends of the range."""
+"""Rows of half-spaces, and balls."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import Convex, Triangle, locate
+from engine import Convex, Sphere, Triangle, locate
 
 
 def exact(points: Any, rows: Any) -> list[int]:
@@ -40,6 +40,7 @@ def test_lattice_points_on_many_rows(dimension: int, scales: tuple[float, float]
     assert np.array_equal(alone, found[290:310])
 
 
+@pytest.mark.some(1)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("n_rows", [1, 5, 31, 41, 90])
 def test_points_that_leave_their_block_early(dimension: int, n_rows: int) -> None:
@@ -60,3 +61,18 @@ def test_a_wall_that_no_double_holds_leaves_the_point_open_wherever_it_stands_am
     points = np.array([[1e-152, 1e-152, 1.0], [1e-323, 1e-323, -1.0], [2.5e-323, 2.5e-323, 0.0], [-5e-324, 0.0, 0.0]])
     found = locate(points, Triangle(np.roll(corners, turn, axis=0)))
     assert found.tolist() == [-1, 1, 0, -1]
+
+
+# --- Spheres: exact one ulp beside the surface ---
+
+
+def test_sphere_one_ulp_off() -> None:
+    near = [[3.0, 4.0, 0.0], [3.0, np.nextafter(4.0, 9.0), 0.0], [3.0, np.nextafter(4.0, 0.0), 0.0], [0.0, 0.0, -5.0]]
+    found, accuracy = locate(near, Sphere([0, 0, 0], 5), report=True)
+    assert found.tolist() == [0, -1, 1, 0]
+    assert accuracy.n_rational == 0
+    assert accuracy.method == "squared_distance"
+
+
+def test_sphere_of_radius_zero_is_its_centre() -> None:
+    assert locate([[1, 1], [np.nextafter(1.0, 2.0), 1]], Sphere([1, 1], 0)).tolist() == [0, -1]

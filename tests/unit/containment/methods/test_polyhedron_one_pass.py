@@ -1,16 +1,19 @@
-"""Few points in one pass over the triangles: the tree's answers."""
+"""One pass over the faces of a mesh, and parity along a half-line in the plane."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from engine import Cancel, CancelledError, locate
+from engine import Cancel, CancelledError, Polygon, locate
 from engine.arrays import read_only
 from engine.budget import Budget
+from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.prepared import tree_of
+from engine.containment.rational_locate import rational_location
+from engine.containment.rings import rings_of
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
 
@@ -38,3 +41,16 @@ def test_a_pass_ends_when_the_call_must() -> None:
     with Budget(None, cancel) as budget:
         locate_by_pass(read_only(np.zeros((10, 3))), solid.vertices, solid.triangles, locations, budget.flag)
     assert locate(np.zeros((10, 3)), solid).tolist() == [0] * 10
+
+
+# --- Rings by ray and parity: each kernel answer equals rational arithmetic ---
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rings_that_cross_themselves(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    solid = Polygon([random.integers(0, 6, (n, 2)) for n in (9, 4)])
+    points = read_only(random.integers(-1, 13, (300, 2)) / 2.0)
+    found = np.empty(len(points), np.int8)
+    locate_in_rings(points, np.zeros(len(points)), rings_of(solid), found, np.zeros(1, np.uint8))
+    assert found.tolist() == [rational_location(point, solid) for point in points.tolist()]

@@ -64,6 +64,7 @@ def test_every_place_of_a_box() -> None:
     assert_equals_reference(box_mesh([0, 0, 0], [4, 4, 4]), points)
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize(
     "pair",
     [

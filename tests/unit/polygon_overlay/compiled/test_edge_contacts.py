@@ -9,7 +9,7 @@ import pytest
 
 from engine.polygon_overlay.compiled.edge_contacts import segments_are_far
 from tests.unit.polygon_overlay.checks import OPERATIONS
-from tests.unit.polygon_overlay.compiled.test_crossing_signs import Point, cross
+from tests.unit.polygon_overlay.compiled.test_crossings import Point, cross
 from tests.unit.polygon_overlay.compiled.test_kernel import agree
 
 SQUARE = [(0, 0), (4, 0), (4, 4), (0, 4)]

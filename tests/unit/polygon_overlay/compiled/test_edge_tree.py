@@ -1,4 +1,4 @@
-"""Pairs of boxes from the implicit tree: all that brute force finds, each once, and few others."""
+"""Edges that may meet: the tree, events along an edge, what keeps clear."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import pytest
 
 from engine.jit import allocating_kernel
 from engine.polygon_overlay.compiled import edge_tree
+from tests.unit.polygon_overlay.checks import OPERATIONS
+from tests.unit.polygon_overlay.compiled.test_kernel import agree
 
 
 @allocating_kernel
@@ -55,3 +57,58 @@ def test_every_pair_once(n: int, share: float, wanders: bool) -> None:
     assert expected <= set(got)
     assert total <= 1.05 * len(expected) + 5
     assert not meets_none[found[:total]].any()
+
+
+# --- Events along an edge: thousands on one, in the order of their parameters, those at one point united ---
+
+
+@pytest.mark.parametrize("n_teeth", [6, 40])
+@pytest.mark.parametrize("is_even", [True, False])
+def test_many_crossings_on_one_edge(n_teeth: int, is_even: bool) -> None:
+    """A comb across a bar whose edges meet every tooth: runs sorted by insertion, then merged."""
+    random = np.random.default_rng(n_teeth)
+    x = np.arange(2.0 * n_teeth) if is_even else np.sort(random.uniform(0, 2 * n_teeth, 2 * n_teeth))
+    comb = np.concatenate([np.stack([x, np.arange(2 * n_teeth) % 2 * 8.0], axis=1), [[2 * n_teeth, -1], [-1, -1]]])
+    bar = np.array(
+        [(-2.0, 3.0), (2.0 * n_teeth + 1, 3.0 + random.uniform(0, 0.1)), (2.0 * n_teeth + 1, 4.0), (-2.0, 4.0)]
+    )
+    assert agree([comb], [bar], "intersection")
+    assert agree([comb], [bar], "symmetric_difference")
+
+
+def test_many_crossings_in_a_small_part_of_an_edge() -> None:
+    """Where the parameters are no address, since nearly all are one part of the edge: runs, merged."""
+    x = np.concatenate([np.random.default_rng(1).permutation(60) * 2.0**-20, [500.0, 1000.0]])
+    needles = [[(place, 0.0), (place + 2.0**-22, 0.0), (place, 9.0)] for place in x]
+    for operation in ("intersection", "difference"):
+        assert agree(needles, [[(-9.0, 1.0), (2000.0, 2.0), (2000.0, 3.0), (-9.0, 4.0)]], operation)
+
+
+def test_many_lines_through_one_point() -> None:
+    angles = np.arange(10) * np.pi / 10
+    blades = [np.round(64 * np.array([(-np.cos(a), -np.sin(a)), (np.cos(a), np.sin(a)), (np.cos(a), 1 + np.sin(a))]))
+              for a in angles]  # fmt: skip
+    bar = np.array([(-70.0, -70.0), (70.0, 70.0), (70.0, 71.0)])
+    agree(blades, [bar], "union")
+
+
+# --- Edges near each other: the certificate may fail, but what passes it is what exact arithmetic says ---
+
+
+@pytest.mark.parametrize("steps", [0, 3, 60, 300])
+@pytest.mark.parametrize("turns", [0, 1])
+def test_stripes_so_many_units_apart(steps: int, turns: int) -> None:
+    """Gaps between edges, between crossings along an edge, and between a crossing and a vertex."""
+    gap = steps * 2.0**-52
+    rng = np.random.default_rng([steps, turns])
+    slant = rng.uniform(0.1, 0.4)
+    stripe = np.array([(-0.9, 0.1), (0.9, 0.1 + slant), (0.9, 0.3 + slant), (-0.9, 0.3)])
+    comb = np.array(
+        [(-0.5, -0.8), (0.5, -0.8), (0.5, 0.9), (gap, 0.9), (gap, -0.2), (0.0, -0.2), (0.0, 0.9), (-0.5, 0.7)]
+    )
+    corner = np.array([(0.5 - gap, -1.0), (1.0, -1.0), (1.0, 1.0), (0.5 - gap, 1.0)])
+    for clip in (comb, corner, stripe + gap):
+        other = clip[:, ::-1] if turns else clip
+        agree([stripe, comb], [other], "union")
+        for operation in OPERATIONS:
+            agree([stripe], [other], operation)

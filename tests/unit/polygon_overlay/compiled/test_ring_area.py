@@ -30,6 +30,7 @@ def assert_nearest(result: Overlay) -> None:
     assert areas == sorted(float(area) for area, _ in structure(result))
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_areas_are_nearest(family: Any) -> None:
     for seed in range(3):

@@ -75,6 +75,7 @@ def vertices_of(region: Solid) -> Any:
     return np.concatenate([corners, (corners + np.roll(corners, 1, axis=0)) / 2])
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_equals_the_reference(family: str, dimension: int, pytestconfig: pytest.Config) -> None:
@@ -142,6 +143,7 @@ def test_pieces_and_gaps_part_the_segment() -> None:
         assert (pieces.t[:, 0] <= pieces.t[:, 1]).all()
 
 
+@pytest.mark.full
 @pytest.mark.data
 def test_menger_sponge(data: Path, pytestconfig: pytest.Config) -> None:
     mesh = np.load(data / "meshes" / "syn_menger2.npz")

@@ -1,10 +1,15 @@
-"""Which edges a segment meets, and how: those of all edges asked one by one in exact arithmetic."""
+"""Where segments meet triangles."""
 
 from __future__ import annotations
 
+from fractions import Fraction
+from typing import Any
+
 import numpy as np
+import pytest
 
 from engine.predicates.rational import orient2d_rational
+from engine.segment_clipping.exact_pieces import triangle_stretch
 from engine.segment_clipping.on_boundary.contacts import (
     ALONG,
     APART,
@@ -15,7 +20,10 @@ from engine.segment_clipping.on_boundary.contacts import (
     START,
     find_contacts_2d,
 )
+from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
+from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, exact_contact
+from engine.types import UNDECIDED, Point3
 
 
 def contact(edge: list[list[float]], segment: list[list[float]]) -> int:
@@ -48,3 +56,66 @@ def test_contacts_are_those_of_all_edges() -> None:
         }
         assert found.items() <= surely.items()
     assert find_contacts_2d(segments, outline, stop, 3)[0] == NO_ROOM
+
+
+# --- How a segment and a triangle meet: the filter never says what exact signs do not ---
+
+
+def test_contacts_are_those_of_whole_numbers() -> None:
+    """What is apart is not met, what is proper is met within; the filter agrees where it says anything."""
+    rng = np.random.default_rng(1)
+    n_told = 0
+    for _ in range(300):
+        numbers = rng.integers(-4, 5, (5, 3))
+        if (numbers[3] == numbers[4]).all():
+            continue
+        points = [Point3(*row) for row in (numbers * 0.25).tolist()]
+        kind, rough = exact_contact(*points), contact_filter(*points, 0.0)
+        n_told += rough != UNDECIDED
+        a, b, c, p, q = numbers.tolist()
+        stretch = triangle_stretch(p, q, a, b, c)
+        assert rough in (kind, UNDECIDED) or (rough == APART and stretch is None)
+        assert kind in (APART, DEGENERATE) if stretch is None else kind != APART
+        if stretch is not None:
+            assert (kind == DEGENERATE) == stretch[2]
+            assert kind != PROPER or 0 < stretch[0] == stretch[1] < 1
+    assert n_told > 150
+
+
+# --- Signed distances and where they say that elements are crossed ---
+
+
+def exact_value(element: Any, w: Any) -> Fraction:
+    a = [Fraction(x) for x in element[0]]
+    u, v = ([Fraction(x) - y for x, y in zip(corner, a)] for corner in (element[1], element[-1]))
+    if len(a) == 2:
+        return u[0] * w[1] - u[1] * w[0]
+    normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+    return sum((x * y for x, y in zip(normal, w)), Fraction(0))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_values_and_crossings_are_those_of_rationals(dimension: int) -> None:
+    rng = np.random.default_rng(dimension)
+    values = line_values if dimension == 2 else plane_values
+    elements = rng.uniform(-1, 1, (40, dimension, dimension)) * 2.0 ** rng.integers(-30, 30, (40, 1, 1))
+    segments = elements.mean(axis=1)[:, None] + rng.uniform(-1, 1, (40, 2, dimension))
+    points = np.empty((1, dimension))
+    for i, (element, segment) in enumerate(zip(elements.tolist(), segments.tolist())):
+        p, q = ([Fraction(x) for x in end] for end in segment)
+        at_p = exact_value(element, [x - Fraction(y) for x, y in zip(p, element[0])])
+        along = exact_value(element, [x - y for x, y in zip(p, q)])
+        found = values(elements, i, segments, i)
+        for exact, (h, low, bound) in zip((at_p, along), found):
+            assert abs(Fraction(h) + Fraction(low) - exact) <= Fraction(bound)
+        t, is_sure = cut_at(segments, i, elements, i, points, 0)
+        if is_sure and 0 <= at_p / along <= 1:
+            exact_t = at_p / along
+            assert t == float(exact_t)
+            assert points[0].tolist() == [float(x + exact_t * (y - x)) for x, y in zip(p, q)]
+
+
+def test_items_out_of_range_are_not_safe() -> None:
+    items = np.ones((3, 2, 2))
+    items[1, 1, 0], items[2, 0, 1] = 1e-300, 0.0
+    assert [is_item_safe(items, i) for i in range(3)] == [True, False, True]

@@ -1,12 +1,14 @@
-"""Chains and their faces: stretches in common, nodes of many chains, and components in each other."""
+"""Chains of boundary edges, their rings and faces."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from engine.polygon_overlay.overlay import overlay
+from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay.checks import OPERATIONS
-from tests.unit.polygon_overlay.compiled.test_kernel import agree
+from tests.unit.polygon_overlay.compiled.test_kernel import Rings, agree
 
 
 def ring(n: int, radius: float = 1.0, x: float = 0.0) -> np.ndarray:
@@ -41,3 +43,88 @@ def test_components_in_each_other(depth: int) -> None:
     clip = [ring(9, 2.0 * k + 2.0) for k in range(depth)] + [ring(5, 0.25, 0.5), ring(5, 0.25, -0.4)]
     for operation in OPERATIONS:
         assert agree(subject, clip, operation)
+
+
+# --- Boundary rings where walks pass a node twice, and where straight points are left out ---
+
+
+FRAME = [(0, 0), (8, 0), (8, 8), (0, 8)]
+CASES = {
+    "hole touches its shell": [[(4, 0), (6, 3), (2, 3)]],
+    "hole touches its shell twice": [[(4, 0), (6, 4), (4, 8), (2, 4)]],
+    "holes touch each other": [[(2, 2), (4, 4), (2, 6)], [(4, 4), (6, 2), (6, 6)]],
+    "a chain of holes encloses a part": [[(2, 2), (6, 2), (4, 3)], [(6, 2), (6, 6), (5, 4)], [(2, 2), (5, 4), (6, 6)]],
+    "corner to corner": [[(8, 8), (9, 8), (9, 9)], [(-1, -1), (0, 0), (-1, 0)]],
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_walks_are_cut_into_simple_rings(name: str) -> None:
+    for operation in OPERATIONS:
+        assert agree([FRAME], CASES[name], operation)
+        assert agree(
+            [[(x / 3, y / 7) for x, y in FRAME]], [[(x / 3, y / 7) for x, y in r] for r in CASES[name]], operation
+        )
+
+
+def test_straight_points_leave_no_trace() -> None:
+    fine = [(x, 0) for x in range(9)] + [(8, y) for y in range(1, 9)] + [(x, 8) for x in range(7, -1, -1)] + [(0, 3)]
+    union = overlay(Polygon([fine]), Polygon([[(2, 2), (8, 2), (8, 6), (2, 6)]]), "union")
+    assert union.vertices.tolist() == [[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]]
+
+
+# --- Faces of rings that cross, touch, coincide, nest or lie apart ---
+
+
+def box(x: float, y: float, wide: float, high: float) -> list[tuple[float, float]]:
+    return [(x, y), (x + wide, y), (x + wide, y + high), (x, y + high)]
+
+
+def bars(n: int) -> tuple[Rings, Rings]:
+    """Bars across and bars along, whose ends lie on the first bar of the others."""
+    return [box(0, 3 * k, 3 * n, 1) for k in range(n)], [box(3 * k, 0, 1, 3 * n)[::-1] for k in range(n)]
+
+
+def board(n: int, shift: float) -> tuple[Rings, Rings]:
+    """Squares, and others between them that overlap their corners, touch there, or share parts of their sides."""
+    return (
+        [box(30 * i, 30 * j, 20, 20) for i in range(n) for j in range(n)],
+        [box(30 * i + shift, 30 * j + 15, 20, 20) for i in range(n - 1) for j in range(n - 1)],
+    )
+
+
+SCENES = {
+    "bars": bars(9),
+    "checkerboards": board(5, 15.0),
+    "corners on sides": board(4, 20.0),
+    "sides in common": board(4, 0.0),
+    "rings in rings that cross": (
+        [box(4 * k, 4 * k, 100 - 8 * k, 100 - 8 * k) for k in range(8)],
+        [box(4 * k + 2, 4 * k + 1, 100 - 8 * k, 100 - 8 * k) for k in range(8)],
+    ),
+    "rings in rings apart": (
+        [box(2 * k, 2 * k, 40 - 4 * k, 40 - 4 * k) for k in range(0, 8, 2)],
+        [box(2 * k, 2 * k, 40 - 4 * k, 40 - 4 * k) for k in range(1, 8, 2)] + [box(50, 50, 1, 1)],
+    ),
+    "equal rings twice and thrice": (
+        [box(0, 0, 8, 8), box(0, 0, 8, 8)[::-1], box(0, 0, 8, 8), box(2, 2, 9, 2)],
+        [box(0, 0, 8, 8), box(2, 2, 9, 2), box(2, 2, 9, 2), box(9, 3, 1, 9)],
+    ),
+    "a ring between two in a node": (
+        [[(0, 0), (4, 1), (4, 2)], [(0, 0), (-4, 1), (-4, 2)], box(-1, -9, 2, 9)],
+        [[(0, 0), (1, 4), (2, 4)], [(0, 0), (-1, 4), (-2, 4)], box(3, -3, 9, 9)],
+    ),
+}
+
+
+@pytest.mark.some(6)
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_scenes_of_many_rings(name: str, turn: float) -> None:
+    subject, clip = ([np.array(ring, float) for ring in rings] for rings in SCENES[name])
+    if turn:
+        turning = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        subject, clip = [ring @ turning for ring in subject], [ring @ turning for ring in clip]
+    for operation in OPERATIONS:
+        assert agree(subject, clip, operation)
+        assert agree(clip, subject[::-1], operation)

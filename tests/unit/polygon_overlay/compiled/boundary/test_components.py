@@ -48,6 +48,7 @@ def test_components_in_faces(name: str) -> None:
         assert agree(*SCENES[name], operation)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.full) for seed in range(2, 40))])
 def test_scattered_rings_of_any_size(seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -18,6 +18,7 @@ def both_ways(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return ring, ring[::-1].copy()
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("operation", OPERATIONS)
 @pytest.mark.parametrize("n", [3, 5, 10, 24, 60])
 def test_stars_given_either_way_round(n: int, operation: str) -> None:

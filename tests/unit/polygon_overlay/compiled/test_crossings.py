@@ -1,4 +1,4 @@
-"""Signs about crossings against rational arithmetic, in scenes where floating point alone is often wrong."""
+"""Crossings of edges: signs and nearest doubles."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, order_of_crossings, orient
+from engine.polygon_overlay.compiled.rounded_crossings import round_crossing
 
 Point = tuple[Fraction, Fraction]
 
@@ -67,3 +68,20 @@ def test_signs_are_exact(seed: int) -> None:
                 assert crossing_against(edges, 0, f, axis, near, half) == expected
     if len(places) == 2:
         assert order_of_crossings(edges, 0, 2, 4) == sign(places[2] - places[4])
+
+
+# --- Crossings rounded to the nearest doubles, as rational arithmetic has them ---
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_nearest_doubles(seed: int) -> None:
+    edges = star(seed)
+    for f in (2, 4):
+        a, b, c, d = (exact(edges, v) for v in (0, 1, f, f + 1))
+        if sign(cross(a, b, c)) * sign(cross(a, b, d)) < 0 and sign(cross(c, d, a)) * sign(cross(c, d, b)) < 0:
+            place, _ = crossing(edges, 0, f)
+            found = round_crossing(edges, 0, f)
+            for value, near, error in zip(place, found[:2], found[2:], strict=True):
+                assert float(value) == near
+                assert abs(value - Fraction(near)) <= Fraction(error)
+                assert (error == 0.0) == (value == Fraction(near))

@@ -1,11 +1,9 @@
-"""Poses bisected to adjacent doubles: at one the bodies have a common point, at the next they have none.
-
-Both answers, and those a few doubles to either side, are held against exact triangle pairs; the five relations of small
-bodies against the whole reference.
-"""
+"""Poses: generated ones, and those between which bodies part."""
 
 from __future__ import annotations
 
+import math
+import random
 from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from tests.reference.collision import relation
 from tests.reference.contact import triangles_meet
 from tests.reference.shapes import Solid, box
 from tests.reference.solids import image
+from tests.unit.collision.lattices import QUARTERS, TURNS, aabb, points, polyhedron, solid, surface
 from tests.unit.collision.test_collide import made
 from tests.unit.collision.test_collide_poses import rotations
 
@@ -172,3 +171,47 @@ def test_small_bodies_have_the_relations_of_the_reference(n_turns: int) -> None:
                 expected = [relation(first, second, None, pose) for pose in poses]
                 assert collide_poses(made(first), made(second), every, row).tolist() == expected, poses
                 assert expected[2] == Relation.DISJOINT
+
+
+# --- Batches of poses against the rational reference: bodies and moves on a small lattice ---
+
+
+STILL = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+FLIP = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+
+
+def block(rng: random.Random, d: int) -> dict[str, Any]:
+    """Return a box of whole numbers as a polyhedron."""
+    low = points(rng, 1, d, 2)[0]
+    return box(tuple(low), tuple(x + rng.randint(1, 3) for x in low))
+
+
+def one_ulp_off(rng: random.Random, move: list[float]) -> list[float]:
+    """Return a move, one coordinate of it now and then moved to the next double."""
+    if rng.random() < 0.3:
+        axis = rng.randrange(3)
+        move[axis] = math.nextafter(move[axis], rng.choice([-math.inf, math.inf]))
+    return move
+
+
+@pytest.mark.some(6)
+@pytest.mark.parametrize("first", [polyhedron, block, aabb, surface])
+@pytest.mark.parametrize("second", [polyhedron, block, surface])
+@pytest.mark.parametrize("n", [2, pytest.param(150, marks=pytest.mark.full)])
+def test_agrees_with_the_reference(first: Any, second: Any, n: int) -> None:
+    rng = random.Random(f"{first.__name__}{second.__name__}")
+    for _ in range(n):
+        a, b = first(rng, 3), second(rng, 3)
+        turns = [rng.choice([STILL, TURNS[3], QUARTERS[3], FLIP]) for _ in range(12)]
+        moves = [one_ulp_off(rng, move) for move in points(rng, 12, 3)]
+        expected = [
+            relation(a, b, None, {"rotation": turn, "translation": move})
+            for turn, move in zip(turns, moves, strict=True)
+        ]
+        one, other = solid(a), solid(b)
+        found, witnesses = collide_poses(one, other, turns, moves, witnesses=True)
+        assert found.tolist() == expected, (a, b, turns, moves)
+        assert [w is None for w in witnesses] == [r == Relation.DISJOINT for r in expected]
+        assert collide_poses(one, other, turns, moves, workers=1).tolist() == expected
+        is_apart = collide_poses(one, other, turns, moves, boolean=True) == Relation.DISJOINT
+        assert is_apart.tolist() == [r == Relation.DISJOINT for r in expected]
