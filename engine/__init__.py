@@ -1,7 +1,6 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
 from engine import layers
-from engine.budget import Cancel
 from engine.collision.clearance.clearance import clearance, clearance_poses
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
@@ -45,6 +44,7 @@ from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
 from engine.polygon_overlay.union_all import filled, union_all
 from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of solids)
+from engine.running.budget import Cancel
 from engine.scenes.ends import ScenePieces
 from engine.scenes.locate import SceneLocations
 from engine.scenes.locate_scene import locate_scene

@@ -36,8 +36,8 @@ from engine.files.tables import read_rows, write_geojson, write_table
 from engine.kernel_cache import cache_folder, check_owner, seal
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
-from engine.parallel import Progress
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
+from engine.running.parallel import Progress
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation

@@ -10,7 +10,6 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.budget import Budget, Cancel
 from engine.collision.collide import collide
 from engine.containment.locate import locate
 from engine.errors import (
@@ -21,6 +20,7 @@ from engine.errors import (
     WrongDimensionError,
 )
 from engine.polygon_clipping.clip_polygons import clip_polygons
+from engine.running.budget import Budget, Cancel
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, shown

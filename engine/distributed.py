@@ -27,10 +27,10 @@ from engine.collision.clearance import clearance as clearances
 from engine.collision.clearance.clearance import checked_distance
 from engine.containment import locate as containment
 from engine.errors import InvalidArrayError, InvalidInputError
-from engine.parallel import Progress, check_options
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
 from engine.polygon_overlay.run import Operation
+from engine.running.parallel import Progress, check_options
 from engine.scenes.ends import ScenePieces
 from engine.scenes.scene import Keep, Scene
 from engine.segment_clipping import clip_segments as clipping

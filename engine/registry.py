@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from engine.containment import locators, rational_locate
-from engine.containment.posed import locators as posed
+from engine.containment import locators
+from engine.containment import posed_locators as posed
+from engine.containment.methods import rational_locate
 from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import profiles

@@ -26,9 +26,9 @@ import numpy as np
 from engine.arrangement.nodes import Homogeneous, NodeTable, float_nodes, reduced
 from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.bounding.box_grid import all_pairs_of_boxes as pairs_of_boxes
-from engine.budget import Budget
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.rational import cross
+from engine.running.budget import Budget
 from engine.types import UNDECIDED
 
 Line = tuple[int, int, int]

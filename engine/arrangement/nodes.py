@@ -16,8 +16,8 @@ from fractions import Fraction
 from math import gcd, hypot, inf, lcm, nextafter
 
 from engine.arrays import FloatArray
-from engine.budget import Budget
 from engine.errors import NotRepresentableError
+from engine.running.budget import Budget
 
 Homogeneous = tuple[int, int, int]
 """(x, y, w), w > 0, without a common factor."""

@@ -22,7 +22,7 @@ from functools import cmp_to_key
 from engine.arrangement.arrange import Arrangement
 from engine.arrangement.subdivision import Subdivision, next_half_edges, turn_of
 from engine.arrangement.union_find import UnionFind
-from engine.budget import poll, polled
+from engine.running.budget import poll, polled
 
 
 @dataclass(slots=True)

@@ -18,7 +18,7 @@ from math import floor, lcm, ldexp
 
 import numpy as np
 
-from engine.budget import Budget
+from engine.running.budget import Budget
 
 Point = tuple[Fraction, Fraction]
 Pixel = tuple[int, int]

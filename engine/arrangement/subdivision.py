@@ -20,7 +20,7 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, Line, side
 from engine.arrangement.nodes import Homogeneous
 from engine.arrangement.union_find import UnionFind
-from engine.budget import poll, polled
+from engine.running.budget import poll, polled
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,9 +28,9 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.budget import Budget
 from engine.direct import entry_of
 from engine.jit import allocating_kernel, inline, kernel
+from engine.running.budget import Budget
 
 BLOCK: Final = 1 << 18
 """Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from engine.budget import Budget
 from engine.errors import TooComplexError
 from engine.predicates.rational import reduced, scaled_integers
+from engine.running.budget import Budget
 
 Vector = tuple[int, ...]
 MAX_RAYS = 20_000

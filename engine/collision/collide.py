@@ -12,7 +12,6 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import Int8Array, IntArray
-from engine.budget import Budget, Cancel
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.detail import NO_DETAIL, check_has_detail, detail_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh
@@ -38,7 +37,8 @@ from engine.collision.simple.closed_forms import (
     collide_half_spaces,
 )
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
-from engine.parallel import Options, Progress, check_options
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy

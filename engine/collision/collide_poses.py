@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
-from engine.budget import Budget, Cancel
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.collide import Answers, PlacedPair, Witnesses, accuracy_of, collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
@@ -28,7 +27,8 @@ from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.closed_forms import told_by_forms
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.parallel import Progress, check_options, run_chunks
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
 from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of

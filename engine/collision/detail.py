@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
-from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.exact_images import image_half_space, image_point, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
@@ -26,6 +25,7 @@ from engine.collision.simple.against_half_space import half_space_body_parts
 from engine.collision.simple.boundary import live_parts
 from engine.errors import InvalidInputError, UnsupportedSolidError
 from engine.predicates.rational import largest_axis, minus, squared_length
+from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import spell

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 
-from engine.containment.rational_locate import adjugate, to_world_frame
+from engine.containment.methods.rational_locate import adjugate, to_world_frame
 from engine.predicates.rational import dot
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from engine.arrays import FloatArray
-from engine.budget import UNLIMITED, Budget
+from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.registry import row_of

@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
-from engine.budget import Budget, Cancel
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.exact_body import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
@@ -24,10 +23,11 @@ from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.jit import allocating_kernel, inline, kernel, merged
-from engine.parallel import Progress, check_options, run_chunks
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import scaled_integers
 from engine.predicates.vectors import as_point2
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.checks import as_point_groups
 from engine.solids.triangle import Triangle
 from engine.types import UNDECIDED, Accuracy, Point2, Relation

@@ -10,12 +10,12 @@ from typing import Any, Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import BoolArray, Int8Array
-from engine.budget import Budget, Cancel
 from engine.containment.at_once import located_at_once
 from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
-from engine.parallel import Options, Progress, check_options, is_unlimited, run_chunks
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, check_finite
 from engine.types import Accuracy

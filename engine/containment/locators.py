@@ -12,21 +12,21 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
-from engine.budget import Budget
 from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import locate_by_cells
 from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
+from engine.containment.methods.rational_locate import combine, is_located, over_tree, rational_location, unsupported
 from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
-from engine.containment.posed.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
-from engine.containment.prepared import EXACT, prism_rows, tree_of
-from engine.containment.rational_locate import combine, is_located, over_tree, rational_location, unsupported
-from engine.containment.rings import edges_of, ring_cells_of, rings_of
+from engine.containment.prepared.rings import edges_of, ring_cells_of, rings_of
+from engine.containment.prepared.triangle_tree import EXACT, prism_rows, tree_of
 from engine.errors import InvalidArrayError, NotFiniteError
+from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_of

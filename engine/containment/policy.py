@@ -11,9 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from engine.budget import Budget
 from engine.containment.cells.top import can_have_cells, lattice_of
-from engine.containment.rings import edges_met
+from engine.containment.prepared.rings import edges_met
+from engine.containment.prepared.triangle_tree import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, faces_over
+from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 
@@ -35,8 +36,6 @@ _SOON: Final = 1.0 / 16.0
 _CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 3
 """Points from which cells are built on ordinary meshes, where a tree has taken half as long by then."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 1_500.0
-_SAMPLE: Final = 256
-_IN_TREE, _IN_TREE_A_FACE_OVER = 150.0, 2.0
 _ENTRIES_A_FACE, _CELLS_AN_ENTRY = 3.0, 900.0
 """On level 0; and what more of them cost, with all that deeper levels make of them."""
 
@@ -44,26 +43,6 @@ _IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
 _SLABS, _SLABS_AN_EDGE = 40_000.0, 15.0
 _RING_CELLS, _RING_CELLS_AN_EDGE = 100_000.0, 80.0
 _IN_SLABS: Final = 50.0
-
-
-def faces_over(solid: Polyhedron) -> float:
-    """Return in how many boxes of faces, seen from above, a point lies in the mean; thousands on bad shapes."""
-
-    def find() -> float:
-        some = solid.vertices[solid.triangles[:: len(solid.triangles) // _SAMPLE + 1], :2]
-        with np.errstate(all="ignore"):
-            extents = some.max(axis=1) - some.min(axis=1)
-            for axis in (0, 1):
-                extents[:, axis] /= np.ptp(solid.vertices[:, axis])
-            over = float(extents.prod(axis=1).mean()) * len(solid.triangles)
-        return over if over >= 0.0 else float(len(solid.triangles))
-
-    return solid.prepared("faces_over", find)
-
-
-def cost_in_tree(solid: Polyhedron) -> float:
-    """Return what a point costs in the tree."""
-    return _IN_TREE + _IN_TREE_A_FACE_OVER * faces_over(solid)
 
 
 def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
@@ -93,7 +72,7 @@ def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
     calls = solid.prepared("passes", lambda: [0.0])
     earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
     calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
-    if earlier > 0.0 or n_points > _SAMPLE:  # it takes 30 us to find out
+    if earlier > 0.0 or n_points > SAMPLE:  # it takes 30 us to find out
         more = _PASS_A_FACE * faces_over(solid) - cost_in_tree(solid)  # that a point costs in a pass
         earlier += (seen - n_points) * more
         tree -= n_points * more
@@ -104,12 +83,12 @@ def _pay_cells(solid: Polyhedron, seen: int, budget: Budget) -> bool:
     """Tell whether so many points are worth cells: soon on bad shapes, where a point is dear in the tree."""
     n_faces = len(solid.triangles)
     least, are_many = _CELLS + _CELLS_A_FACE * n_faces, seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces
-    if not are_many and seen * (_IN_TREE + _IN_TREE_A_FACE_OVER * n_faces) <= least:
+    if not are_many and seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least:
         return False
     by_tree = seen * cost_in_tree(solid)
     if not (are_many or by_tree > least) or not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
         return False
-    return (are_many and cost_in_tree(solid) < 2.0 * _IN_TREE) or by_tree > cost_of_cells(solid, budget)
+    return (are_many and cost_in_tree(solid) < 2.0 * IN_TREE) or by_tree > cost_of_cells(solid, budget)
 
 
 def choose_for_rings(solid: Polygon, n_points: int) -> int:

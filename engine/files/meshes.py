@@ -11,8 +11,8 @@ from typing import IO, Any, Final, NamedTuple, TypeVar
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.budget import UNLIMITED
 from engine.errors import EmptyGeometryError, FaceNotSimpleError, IndexOutOfRangeError, InvalidInputError
+from engine.running.budget import UNLIMITED
 from engine.solids.checks import as_points, frozen, shown
 from engine.solids.ear_cutting import cut_faces
 from engine.solids.mesh import Mesh, first_equal

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from engine.budget import Cancel
 from engine.errors import EngineError, InvalidInputError, InvalidOperationError, NotFiniteError, UnsupportedSolidError
 from engine.layers.rows import (
     NONE,
@@ -23,6 +22,7 @@ from engine.layers.rows import (
 )
 from engine.polygon_overlay.polygon_arrays import PolygonArrays, arrays_of
 from engine.polygon_overlay.touching import Touching
+from engine.running.budget import Cancel
 from engine.solids.checks import shown
 from engine.solids.ragged import within
 

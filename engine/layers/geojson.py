@@ -10,7 +10,6 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.budget import polled
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -25,6 +24,7 @@ from engine.layers.json_text import Path
 from engine.layers.rows import Layer, Limits, layer_of
 from engine.polygon_overlay.polygon_arrays import arrays_of
 from engine.polygon_overlay.union_all import union_all
+from engine.running.budget import polled
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed

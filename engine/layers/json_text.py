@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.budget import poll
+from engine.running.budget import poll
 
 _FEW: Final = 256
 """Values written at once: some 30 us."""

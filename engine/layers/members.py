@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.budget import polled
 from engine.errors import InvalidInputError, NotFiniteError
 from engine.layers.geojson import Collection, refused
 from engine.layers.json_text import NotJsonError, key_of, text_of
 from engine.layers.rows import NONE, Limits
+from engine.running.budget import polled
 
 _NAME_BYTES: Final = 200
 """Bytes that a name and the sets it is in hold."""

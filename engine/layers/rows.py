@@ -17,7 +17,6 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
-from engine.budget import Budget, Cancel
 from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.found import chained, places_of
@@ -27,6 +26,7 @@ from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, joined_touching, touching
 from engine.polygon_overlay.union_all import less_all, union_all
+from engine.running.budget import Budget, Cancel
 from engine.scenes.locate_scene import locate_scene
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon

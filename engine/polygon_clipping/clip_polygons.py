@@ -13,15 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
-from engine.budget import UNLIMITED, Budget, Cancel
 from engine.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
-from engine.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.polygon_clipping.in_integers import Row, clip_polygon
 from engine.polygon_clipping.planes import KernelScene, kernel_scene, planes_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.scaling import largest_of, scaled_back
+from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.polygon import Polygon
@@ -103,7 +103,7 @@ def clip_polygons(
         polygons: `Polygon` solids, or lists of rings ((k, dim) numbers each, in 2D or 3D, planar or not), or an array
             (n, k, dim) of n polygons of one ring. A ring of one or two vertices is a point or a segment.
         region: half_space, aabb, convex, or a polyhedron that exact orientation certifies as convex.
-        workers, deadline (seconds), cancel, progress: see `engine.parallel`.
+        workers, deadline (seconds), cancel, progress: see `engine.running.parallel`.
         report: return ``(clipped, Accuracy)``.
     Returns
         `ClippedPolygons`; rings keep the direction of their contour, and start at its first vertex that is left.

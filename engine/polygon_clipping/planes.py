@@ -18,7 +18,7 @@ from typing import Final, NamedTuple, cast
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
-from engine.containment.rational_locate import rational_location
+from engine.containment.methods.rational_locate import rational_location
 from engine.errors import UnsupportedSolidError
 from engine.polygon_clipping.in_integers import Row, integer_row, plane_through
 from engine.polygon_clipping.rings import PlaneTables

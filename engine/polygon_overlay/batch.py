@@ -9,9 +9,7 @@ from typing import Any, ClassVar, Final, cast
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
-from engine.budget import Budget, Cancel
 from engine.errors import InvalidArrayError, NotRepresentableError
-from engine.parallel import Progress, check_options, run_chunks
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
@@ -21,6 +19,8 @@ from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathere
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets
 from engine.solids.polygon import Polygon

@@ -18,7 +18,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray, read_only
-from engine.budget import Budget
 from engine.direct import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
@@ -27,6 +26,7 @@ from engine.polygon_overlay.compiled.workspace import keep, scratch_for
 from engine.polygon_overlay.found import Found, one_pair, ring_numbers
 from engine.polygon_overlay.implicit_rings import ImplicitRings, rings_alone
 from engine.polygon_overlay.result import Overlay, made_overlay
+from engine.running.budget import Budget
 from engine.solids.checks import shown
 from engine.solids.ragged import next_in_rings, summed
 

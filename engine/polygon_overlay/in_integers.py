@@ -18,7 +18,6 @@ from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.rings import Piece, trace_pieces
 from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Budget, polled
 from engine.errors import TooComplexError
 from engine.polygon_overlay.compiled.boundary.ring_nesting import (
     FIRST_ALONE,
@@ -35,6 +34,7 @@ from engine.polygon_overlay.grid import snapped_to_units
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run import KEPT, UNNAMED, Operation
+from engine.running.budget import Budget, polled
 
 _Sources = frozenset[int]
 

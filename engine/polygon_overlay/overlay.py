@@ -18,9 +18,7 @@ from typing import Literal, Unpack, overload
 
 import numpy as np
 
-from engine.budget import UNLIMITED, Budget, Cancel
 from engine.errors import InvalidOperationError, UnsupportedSolidError
-from engine.parallel import Progress, check_options, is_unlimited
 from engine.polygon_overlay.compiled.boundary.ring_nesting import Nesting
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.grid import from_units, grid_of
@@ -35,6 +33,8 @@ from engine.polygon_overlay.run import (
     overlay_compiled,
     overlay_few,
 )
+from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.parallel import Progress, check_options, is_unlimited
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon

@@ -15,9 +15,9 @@ import numpy.typing as npt
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Budget
-from engine.parallel import Options
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
+from engine.running.budget import Budget
+from engine.running.parallel import Options
 from engine.solids.checks import as_nested_offsets
 from engine.solids.ragged import as_geojson
 

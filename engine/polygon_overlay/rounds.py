@@ -24,11 +24,11 @@ import numpy as np
 from engine.arrangement.snap_rounding import snap_rings
 from engine.arrangement.union_find import UnionFind
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.budget import Budget
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.found import NO_PAIRS, Found, joined, one_pair, places_of, taken
 from engine.polygon_overlay.implicit_rings import edges_along
 from engine.polygon_overlay.result import Exact, Lost, Overlay, made_overlay
+from engine.running.budget import Budget
 from engine.types import OPEN
 
 MAX_ROUNDS: Final = 12

@@ -14,7 +14,6 @@ from typing import Any, Final, Literal, cast
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray, read_only
-from engine.budget import UNLIMITED, Budget
 from engine.direct import entry_of
 from engine.polygon_overlay.compiled.boundary.ring_nesting import AGAIN, PAIR, Nesting
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
@@ -37,6 +36,7 @@ from engine.polygon_overlay.polygon_arrays import PolygonArrays
 from engine.polygon_overlay.result import Overlay, made_overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.running.budget import UNLIMITED, Budget
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
 from engine.types import OPEN

@@ -13,9 +13,7 @@ from typing import Final, Literal, Unpack, cast, overload
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.budget import Budget, Cancel
 from engine.errors import InvalidArrayError, InvalidOperationError
-from engine.parallel import Progress, check_options
 from engine.polygon_overlay.compiled.boundary.ring_nesting import (
     ANY,
     FIRST_ALONE,
@@ -29,6 +27,8 @@ from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.overlay import accuracy_of, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.polygon_arrays import gathered
 from engine.polygon_overlay.result import Overlay, OverlayOptions
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Progress, check_options
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon

@@ -17,14 +17,14 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
-from engine.budget import Budget
 from engine.collision.scenes.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator, locator_of
-from engine.containment.posed.locators import posed_locator
-from engine.containment.rational_locate import is_located
+from engine.containment.methods.rational_locate import is_located
+from engine.containment.posed_locators import posed_locator
 from engine.direct import entry_of
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
+from engine.running.budget import Budget
 from engine.scenes.body_box import body_box
 from engine.scenes.located import Kinds, LocateTables
 from engine.scenes.near_boxes import BodyTree, Where, list_near, put_keys

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.containment.posed.frames import frames_of
-from engine.containment.rational_locate import Check, over_tree
+from engine.containment.methods.frames import frames_of
+from engine.containment.methods.rational_locate import Check, over_tree
 from engine.scenes.located import moved_boxes
 from engine.solids.base import Solid
 from engine.solids.csg import Csg

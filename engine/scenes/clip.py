@@ -13,10 +13,10 @@ from typing import Any, Final, cast
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray, read_only
-from engine.budget import UNLIMITED, Budget
 from engine.containment.locators import locator_of
 from engine.direct import entry_of
-from engine.parallel import run_chunks
+from engine.running.budget import UNLIMITED, Budget
+from engine.running.parallel import run_chunks
 from engine.scenes.bodies import order_of
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.scratch import MOST_MET, scratch_for

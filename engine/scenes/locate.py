@@ -12,15 +12,15 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
-from engine.budget import Budget
 from engine.containment.at_once import located_at_once
 from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
 from engine.containment.locators import Counts
-from engine.containment.posed.filters import in_space
-from engine.containment.prepared import tree_of
+from engine.containment.methods.filters import in_space
+from engine.containment.prepared.triangle_tree import tree_of
 from engine.direct import entry_of
 from engine.jit import kernel
-from engine.parallel import Progress, run_chunks
+from engine.running.budget import Budget
+from engine.running.parallel import Progress, run_chunks
 from engine.scenes.bodies import candidates
 from engine.scenes.located import MESH, LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, Unpack, overload
 
-from engine.budget import Cancel
-from engine.parallel import Options, Progress
+from engine.running.budget import Cancel
+from engine.running.parallel import Options, Progress
 from engine.scenes.locate import SceneLocations
 from engine.scenes.scene import Scene
 from engine.solids.base import Solid

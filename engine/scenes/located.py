@@ -12,18 +12,18 @@ import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.aabb import place_boxes
-from engine.budget import Budget
 from engine.containment.cells.locate import side_in_cell
 from engine.containment.methods.ball import located
+from engine.containment.methods.filters import in_space, side_of_box, side_of_rows
+from engine.containment.methods.frames import Frames, frames_of, to_frame
 from engine.containment.methods.polygon_ray_parity import locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
-from engine.containment.posed.filters import in_space, side_of_box, side_of_rows
-from engine.containment.posed.frames import Frames, frames_of, to_frame
-from engine.containment.posed.locators import posed_locator
-from engine.containment.prepared import tree_at, tree_line
-from engine.containment.rings import closed_rings
+from engine.containment.posed_locators import posed_locator
+from engine.containment.prepared.rings import closed_rings
+from engine.containment.prepared.triangle_tree import tree_at, tree_line
 from engine.errors import EngineError
 from engine.jit import merged
+from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_in_space, rows_of

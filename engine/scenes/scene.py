@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
-from engine.budget import Budget, Cancel
 from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
@@ -21,7 +20,8 @@ from engine.errors import (
     InvalidOperationError,
     WrongDimensionError,
 )
-from engine.parallel import Options, Progress, check_options, is_unlimited
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
 from engine.scenes.ends import ScenePieces, in_order, joined

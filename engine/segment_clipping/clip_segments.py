@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Budget, Cancel
-from engine.parallel import Options, Progress, check_options, is_unlimited
 from engine.predicates.scaling import balanced_rows
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.ball_cut import decide_on_sphere, fill_on_sphere
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
@@ -84,7 +84,7 @@ def clip_segments(
         segments: (n, 2, dim) numbers, two points each; none at all are welcome.
         region: half_space, aabb, convex (may be empty or unbounded), sphere, polygon or polyhedron of the same
             dimension. On the last two a segment may have several pieces.
-        workers, deadline (seconds), cancel, progress: see `engine.parallel`.
+        workers, deadline (seconds), cancel, progress: see `engine.running.parallel`.
         report: return ``(pieces, Accuracy)``.
     Returns
         `SegmentPieces`; the parts of [0, 1] that no piece covers are outside of the region.

@@ -19,10 +19,10 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
-from engine.budget import UNLIMITED, Budget
 from engine.direct import entry_of
-from engine.parallel import Progress, run_chunks
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.running.budget import UNLIMITED, Budget
+from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.pieces import Pieces, completed, first_of, room_for
 from engine.segment_clipping.profiles import settled
 from engine.solids.base import Solid

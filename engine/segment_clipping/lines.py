@@ -14,10 +14,10 @@ from typing import Any, ClassVar, Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.budget import Budget, Cancel
 from engine.direct import entry_of
 from engine.jit import inline, kernel
-from engine.parallel import Options, Progress, check_options
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.solids.base import Solid
 from engine.solids.ragged import Ragged, as_lines

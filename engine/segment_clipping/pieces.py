@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.budget import concatenated
 from engine.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
+from engine.running.budget import concatenated
 
 Triple = tuple[float, float, float]
 End = tuple[float, float, float, int]

@@ -15,8 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Budget
-from engine.containment.rational_locate import (
+from engine.containment.methods.rational_locate import (
     combine,
     over_tree,
     prism_walls,
@@ -26,6 +25,7 @@ from engine.containment.rational_locate import (
 )
 from engine.errors import UnsupportedSolidError
 from engine.predicates.rational import Number, common_integers, nearest_with_root
+from engine.running.budget import Budget
 from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
 from engine.segment_clipping.on_boundary.chords import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of

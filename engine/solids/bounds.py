@@ -12,10 +12,10 @@ from engine.arrays import FloatArray
 from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
-from engine.budget import Budget, Cancel
 from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
-from engine.parallel import Options, Progress, check_options
 from engine.predicates.rational import nearest_float
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex

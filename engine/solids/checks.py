@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.budget import poll, polled
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
+from engine.running.budget import poll, polled
 
 Where = tuple[str | int, ...]
 

@@ -36,11 +36,11 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.budget import Budget
 from engine.direct import entry_of
 from engine.errors import FaceNotSimpleError
 from engine.jit import inline, kernel
 from engine.predicates.rational import orient2d_rational, scaled_integers
+from engine.running.budget import Budget
 from engine.solids.checks import digits
 from engine.solids.ears import ENDED_EARLY, SIMPLE, TURNS_BACK, Corners, Ring, cut_ears, find_meeting
 

@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
-from engine.budget import Budget, Cancel, poll
 from engine.direct import entry_of
 from engine.errors import (
     InconsistentOrientationError,
@@ -25,6 +24,7 @@ from engine.errors import (
     RepeatedIndexError,
     RingTooShortError,
 )
+from engine.running.budget import Budget, Cancel, poll
 from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets, as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces

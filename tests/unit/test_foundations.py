@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from engine import budget, errors
-from engine.budget import Budget, Cancel, concatenated, polled
 from engine.direct import entry_of
 from engine.errors import CancelledError, InvalidInputError
 from engine.jit import kernel
+from engine.running.budget import Budget, Cancel, concatenated, polled
 
 
 @kernel

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from engine import parallel
-from engine.budget import Budget, Cancel
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
-from engine.parallel import check_options, is_unlimited, run_chunks
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import check_options, is_unlimited, run_chunks
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, None])

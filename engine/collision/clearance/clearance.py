@@ -8,7 +8,6 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, read_only
-from engine.budget import UNLIMITED, Budget, Cancel
 from engine.collision.clearance.forms import (
     MEETING,
     STILL2,
@@ -27,7 +26,8 @@ from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
 from engine.errors import InvalidInputError
-from engine.parallel import Options, Progress, check_options, run_chunks
+from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.pose import Pose

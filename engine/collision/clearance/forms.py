@@ -15,7 +15,6 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.budget import UNLIMITED, Budget
 from engine.collision.clearance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
 from engine.collision.clearance.exact import Gap, Rational, ScaledGap
 from engine.collision.clearance.outlines import nearest_under_poses
@@ -26,6 +25,7 @@ from engine.collision.simple.boundary import pulled_back
 from engine.collision.simple.closed_forms import FORMS, form_of
 from engine.direct import entry_of
 from engine.predicates.rational import minus, squared_length
+from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.half_space import HalfSpace
 from engine.solids.pose import motion_of

@@ -17,7 +17,6 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
-from engine.budget import Budget
 from engine.collision.clearance.boxes import DONE, Room, new_room
 from engine.collision.clearance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
 from engine.collision.clearance.near_triangles import FACE
@@ -35,6 +34,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_arrays
 from engine.collision.result import Clearance, Feature, Poses
 from engine.direct import entry_of
+from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh

@@ -18,7 +18,6 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
-from engine.budget import Budget
 from engine.collision.meshes.exact_body import (
     Corners,
     ExactBody,
@@ -29,6 +28,7 @@ from engine.collision.meshes.exact_body import (
     without_axis,
 )
 from engine.predicates.rational import cross, dot, minus, sign_of
+from engine.running.budget import Budget
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
 Rational2 = tuple[Rational, Rational]

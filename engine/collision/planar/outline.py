@@ -21,7 +21,6 @@ from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
-from engine.budget import Budget
 from engine.collision.exact_images import image_point, rounded
 from engine.collision.result import (
     FIRST_WITHIN,
@@ -34,8 +33,9 @@ from engine.collision.result import (
     Witness,
     Work,
 )
-from engine.containment.rational_locate import rational_location
+from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
+from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon

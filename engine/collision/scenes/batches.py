@@ -15,7 +15,6 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.aabb import place_boxes
-from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import TAKEN, check_pose, pair_function
 from engine.collision.convex.body import ConvexBody, convex_body_of, pooled
@@ -26,7 +25,8 @@ from engine.collision.planar.outline_batch import outline_pool, relate_outline_p
 from engine.collision.simple.form_relations import relate_box_pairs
 from engine.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
-from engine.parallel import run_chunks
+from engine.running.budget import Budget
+from engine.running.parallel import run_chunks
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.pose import Pose, motions_of

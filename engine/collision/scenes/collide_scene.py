@@ -16,7 +16,6 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.bounding.box_grid import BLOCK, pairs_of_boxes
-from engine.budget import Budget, Cancel
 from engine.collision.clearance.clearance import checked_distance, has_plane
 from engine.collision.clearance.convex_gaps import gaps_of_pairs
 from engine.collision.clearance.forms import are_small, gap_of_planes, told_under_poses
@@ -32,7 +31,8 @@ from engine.collision.simple.closed_forms import form_of
 from engine.collision.simple.form_relations import N_NUMBERS
 from engine.direct import entry_of
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
-from engine.parallel import Progress, check_options, run_chunks
+from engine.running.budget import Budget, Cancel
+from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Accuracy, Relation

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
-from engine.budget import Budget
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_point, rounded, value_at
 from engine.collision.meshes.exact_body import ExactBody, exact_pair, faces_in
 from engine.collision.meshes.exact_regions import cells_of, sides_at
@@ -25,10 +24,11 @@ from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
-from engine.containment.rational_locate import rational_location
+from engine.containment.methods.rational_locate import rational_location
 from engine.direct import entry_of
 from engine.jit import kernel
 from engine.predicates.rational import common_integers, cross, dot, minus, sign_of, squared_length
+from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.types import Location

@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, Int8Array, Int32Array, IntArray
-from engine.budget import Budget
 from engine.containment.cells.lattice import (
     LEVELS,
     PARTS,
@@ -28,10 +27,10 @@ from engine.containment.cells.lattice import (
 from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, MIXED_CELL, OUTSIDE_CELL
 from engine.containment.cells.status import fill_leaves, locate_parts
 from engine.containment.cells.top import ask_cells, lattice_of, top_places, top_statuses
-from engine.containment.policy import cost_in_tree
-from engine.containment.prepared import TriangleTree, tree_of
+from engine.containment.prepared.triangle_tree import TriangleTree, cost_in_tree, tree_of
 from engine.lanes.cells import groups_of
 from engine.lanes.tracing import LANES
+from engine.running.budget import Budget
 from engine.solids.polyhedron import Polyhedron
 
 _LONG_ON_TOP, _LONG_IN_SMALL, _LONG = 24, 8, 32

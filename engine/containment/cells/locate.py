@@ -19,7 +19,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.containment.cells.lattice import LEVELS, PARTS, finest, parts_of, reference_point, scaled_difference
-from engine.containment.posed.filters import NOT_FINITE, has_not_finite
+from engine.containment.methods.filters import NOT_FINITE, has_not_finite
 from engine.jit import allocating_kernel, called, inline, merged
 from engine.lanes.addresses import array_at
 from engine.lanes.cells import parity_across, prefetch_group

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
-from engine.budget import Budget
 from engine.containment.cells.build import Cells
 from engine.jit import kernel
+from engine.running.budget import Budget
 
 _FEWEST_POINTS: Final = 1 << 17
 _FEWEST_GROUPS: Final = 1 << 14

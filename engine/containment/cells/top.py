@@ -11,11 +11,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, Int32Array, IntArray, read_only
-from engine.budget import Budget
 from engine.containment.cells.lattice import UNKNOWN, Lattice, Mesh, list_top
 from engine.containment.cells.status import label_empty, reference_points
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.prepared import TriangleTree, tree_of
+from engine.containment.prepared.triangle_tree import TriangleTree, tree_of
+from engine.running.budget import Budget
 from engine.solids.polyhedron import Polyhedron
 from engine.types import UNDECIDED
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of
-from engine.containment.posed.filters import NOT_FINITE, has_not_finite
+from engine.containment.methods.filters import NOT_FINITE, has_not_finite
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact, orient2d_filter
 from engine.predicates.vectors import as_point2

@@ -12,11 +12,11 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.budget import UNLIMITED, Budget
 from engine.containment.at_once import located_at_once
 from engine.containment.locators import Locator, locator_of
 from engine.direct import entry_of
-from engine.parallel import Progress, run_chunks
+from engine.running.budget import UNLIMITED, Budget
+from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.decide_then_cut import Clipped
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, cut_on_mesh, cut_on_outline
 from engine.segment_clipping.on_boundary.chords import look_before

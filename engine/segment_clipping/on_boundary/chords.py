@@ -13,12 +13,12 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
-from engine.budget import Budget
 from engine.containment.locators import Locator
 from engine.direct import entry_of
 from engine.jit import kernel
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
+from engine.running.budget import Budget
 from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END, NO_ROOM, find_contacts_2d
 from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline

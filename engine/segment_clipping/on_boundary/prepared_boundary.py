@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
-from engine.containment.rational_locate import next_in_ring
+from engine.containment.methods.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import CORNER_ROWS

@@ -17,7 +17,7 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, Line, arrange
 from engine.arrangement.nodes import Rational, float_nodes, rational_nodes
 from engine.arrangement.subdivision import Subdivision
-from engine.budget import Budget
+from engine.running.budget import Budget
 
 
 def arrange_segments(

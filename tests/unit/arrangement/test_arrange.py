@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from engine.arrangement.arrange import CROSS, MISS, Arrangement, arrange_rings, classify_pairs
-from engine.budget import Budget
 from engine.errors import DeadlineExceededError
+from engine.running.budget import Budget
 from engine.types import UNDECIDED
 from tests.unit.arrangement.segments import arrange_segments
 

@@ -9,8 +9,8 @@ import pytest
 
 from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
 from engine.bounding.grid import cell_of, make_axis
-from engine.budget import Budget, Cancel
 from engine.errors import CancelledError
+from engine.running.budget import Budget, Cancel
 
 FLAG = np.zeros(1, np.uint8)
 

@@ -10,8 +10,8 @@ import pytest
 
 import engine.bounding.double_description as double_description
 from engine.bounding.double_description import corners_of_half_spaces
-from engine.budget import Budget
 from engine.errors import DeadlineExceededError, TooComplexError
+from engine.running.budget import Budget
 
 CUBE = [[1, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1], [0, 0, 1, 1], [0, 0, -1, 1]]
 

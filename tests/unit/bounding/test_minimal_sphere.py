@@ -24,9 +24,9 @@ from engine.bounding.minimal_sphere import (
     root_up,
     smallest_ball,
 )
-from engine.budget import Budget, Cancel
 from engine.errors import CancelledError, DeadlineExceededError, NotRepresentableError
 from engine.predicates.rational import nearest_float
+from engine.running.budget import Budget, Cancel
 
 Rational = tuple[Fraction, ...]
 

@@ -8,10 +8,10 @@ import pytest
 from engine import Surface
 from engine.bounding import bvh
 from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
-from engine.budget import Budget, Cancel
 from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
 from engine.errors import CancelledError
 from engine.lanes.boxes import EMPTY
+from engine.running.budget import Budget, Cancel
 
 
 def check_tree(boxes: np.ndarray, tree: Bvh) -> None:

@@ -10,13 +10,13 @@ import pytest
 
 import engine
 from engine import Aabb, HalfSpace, Pose, Relation, Solid
-from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import PAIRS, TAKEN, Answers, PlacedPair, accuracy_of, pair_function
 from engine.collision.detail import NO_DETAIL
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
 from engine.collision.result import meets_as
 from engine.predicates.rational import dot
+from engine.running.budget import Budget
 from engine.types import Rcc8
 from tests.unit.collision import lattices
 

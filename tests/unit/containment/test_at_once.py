@@ -12,12 +12,12 @@ import engine
 from engine import Surface, contains, locate, locate_scene
 from engine.containment.at_once import MOST, located_at_once
 from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.filters import locate_by_polynomial, locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.posed.filters import locate_by_polynomial, locate_in_box
-from engine.containment.rational_locate import rational_location
+from engine.containment.methods.rational_locate import rational_location
 from engine.errors import UnsupportedSolidError
 from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, merged
 

@@ -24,7 +24,7 @@ from engine import (
     contains,
     locate,
 )
-from engine.containment.rational_locate import rational_location, to_body_frame, to_world_frame
+from engine.containment.methods.rational_locate import rational_location, to_body_frame, to_world_frame
 from tests.reference.containment import locate as reference
 from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, spelled
 

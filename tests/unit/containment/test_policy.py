@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from engine import Polygon, Polyhedron, locate
-from engine.budget import Budget
 from engine.containment.locators import locator_of
 from engine.containment.policy import (
     CELLS,
@@ -18,6 +17,7 @@ from engine.containment.policy import (
     cost_of_cells,
     faces_over,
 )
+from engine.running.budget import Budget
 from tests.unit.containment.scenes import box_mesh, made, merged
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from engine.containment.locate import locate
 from engine.containment.locators import locator_of
-from engine.containment.prepared import tree_of
-from engine.containment.rings import rings_of
+from engine.containment.prepared.rings import rings_of
+from engine.containment.prepared.triangle_tree import tree_of
 from engine.errors import DeadlineExceededError
 from engine.scenes.locate_scene import locate_scene
 from engine.solids.base import Solid

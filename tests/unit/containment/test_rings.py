@@ -10,10 +10,10 @@ import pytest
 
 from engine import Polygon, Triangle, locate
 from engine.arrays import read_only
+from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.polygon_ray_parity import MIXED, locate_in_rings
-from engine.containment.posed.filters import NOT_FINITE
-from engine.containment.rational_locate import no_check, rational_location
-from engine.containment.rings import closed_rings, edges_of, ring_cells_of, rings_of
+from engine.containment.methods.rational_locate import no_check, rational_location
+from engine.containment.prepared.rings import closed_rings, edges_of, ring_cells_of, rings_of
 from engine.solids.checks import as_points
 from engine.types import UNDECIDED
 

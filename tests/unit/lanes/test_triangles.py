@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron
-from engine.containment.prepared import tree_of
+from engine.containment.prepared.triangle_tree import tree_of
 from engine.jit import kernel
 from engine.lanes.triangles import near_triangles, overhead
 from engine.segment_clipping.on_boundary.mesh_streams import local_segment, shear_of

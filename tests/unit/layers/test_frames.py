@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import engine
-from engine.budget import Budget
 from engine.errors import InvalidInputError, InvalidOperationError, NotFiniteError, UnsupportedSolidError
 from engine.layers.rows import HOWS
 from engine.polygon_overlay.touching import collapsed
+from engine.running.budget import Budget
 from tests.unit.layers.cells import Cells, layer, runs
 
 geopandas = pytest.importorskip("geopandas")

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.budget import Budget, Cancel
 from engine.errors import CancelledError
 from engine.layers import json_text
 from engine.layers.json_text import NotJsonError, key_of, text_of
+from engine.running.budget import Budget, Cancel
 
 SCALARS = [None, True, 0, 1, -1.5e300, 2**70, 0.1, "", "é", 'a"b\n', 3.0]
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.budget import Budget, Cancel
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -30,6 +29,7 @@ from engine.polygon_clipping.clip_polygons import (
 )
 from engine.polygon_clipping.planes import kernel_scene
 from engine.polygon_clipping.planes import planes_of as planes_of_solid
+from engine.running.budget import Budget, Cancel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex

@@ -12,8 +12,8 @@ import pytest
 import engine
 from engine.arrangement.snap_rounding import snap_rings
 from engine.arrays import read_only
-from engine.budget import Budget
 from engine.polygon_overlay import grid as grids
+from engine.running.budget import Budget
 from tests.reference import fast_overlay
 from tests.reference.exact import Q
 from tests.unit.polygon_overlay.checks import OPERATIONS, assert_counts_add_up, assert_valid

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.budget import Cancel
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -22,6 +21,7 @@ from engine.errors import (
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import Operation, overlay
 from engine.polygon_overlay.result import Overlay
+from engine.running.budget import Cancel
 from engine.solids.polygon import Polygon
 from engine.solids.sphere import Sphere
 from tests.unit.polygon_overlay.checks import (

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from engine.arrays import read_only
-from engine.budget import Budget
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.overlay import overlay_rings
 from engine.polygon_overlay.result import Overlay
+from engine.running.budget import Budget
 from tests.conftest import DATA
 from tests.unit.polygon_overlay.checks import (
     OPERATIONS,

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.budget import Budget
 from engine.polygon_overlay import rounds as overlay_rounds
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.kernel import MAY_CROSS
@@ -18,6 +17,7 @@ from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.polygon_arrays import gathered
 from engine.polygon_overlay.rounds import settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, arranged_again, overlay_compiled, run_kernel
+from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay import families as families
 from tests.unit.polygon_overlay.checks import OPERATIONS

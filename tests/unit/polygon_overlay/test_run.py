@@ -13,13 +13,13 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from engine.budget import Budget
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.polygon_arrays import gathered
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, overlay_few, run_kernel
+from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])

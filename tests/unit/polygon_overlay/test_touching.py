@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.budget import Budget
 from engine.errors import DeadlineExceededError
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import RingArrays
@@ -18,6 +17,7 @@ from engine.polygon_overlay.in_integers import parts_exactly
 from engine.polygon_overlay.polygon_arrays import Chosen, gathered
 from engine.polygon_overlay.run import EACH_PART, run_kernel
 from engine.polygon_overlay.touching import Touching, _read, touching
+from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 
 SIZE = 5

@@ -30,7 +30,7 @@ from engine import (
     WrongDimensionError,
     clip_segments,
 )
-from engine.budget import Cancel
+from engine.running.budget import Cancel
 from tests.reference.exact import nearest_double
 from tests.reference.scene_segments import Piece, pieces_in_scene, ranks, rounded_point
 from tests.unit.scenes.scenes import FACES, OCTAHEDRON, Random, pose_of, solids_of

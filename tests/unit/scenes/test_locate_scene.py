@@ -10,9 +10,9 @@ import pytest
 import engine
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Pose, Sphere, Triangle, locate, locate_scene
 from engine.arrays import read_only
-from engine.budget import Budget
-from engine.containment.prepared import tree_of
-from engine.containment.rational_locate import rational_location
+from engine.containment.methods.rational_locate import rational_location
+from engine.containment.prepared.triangle_tree import tree_of
+from engine.running.budget import Budget
 from engine.scenes import locate as locate_module
 from engine.scenes.bodies import Bodies
 from engine.scenes.locate import locate_all

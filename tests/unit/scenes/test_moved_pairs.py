@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Csg, HalfSpace, Polygon, Pose, Scene, Solid, Sphere, Triangle
-from engine.budget import Budget
-from engine.containment.rational_locate import no_check, to_world_frame
+from engine.containment.methods.rational_locate import no_check, to_world_frame
+from engine.running.budget import Budget
 from engine.scenes.body_box import body_box
 from engine.scenes.scratch import scratch_for
 from engine.scenes.standing import PairRows, Placed, list_pairs

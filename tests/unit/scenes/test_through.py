@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Scene, Solid, Sphere, Surface
-from engine.budget import Budget
+from engine.running.budget import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.posed_mesh import WANTS_BODY
 from engine.scenes.scratch import MOST_MET, scratch_for

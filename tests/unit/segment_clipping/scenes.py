@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import engine
-from engine.budget import Budget
+from engine.running.budget import Budget
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.pieces import Piece
 from engine.segment_clipping.profiles import exact_pieces

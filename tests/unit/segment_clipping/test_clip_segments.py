@@ -10,7 +10,6 @@ import time
 import numpy as np
 import pytest
 
-from engine.budget import Cancel
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -19,6 +18,7 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
+from engine.running.budget import Cancel
 from engine.segment_clipping import clip_segments as segments_module
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.aabb import Aabb

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.budget import Budget, Cancel
+from engine.running.budget import Budget, Cancel
 from engine.segment_clipping.exact_pieces import (
     ZERO,
     Contact,

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from engine import Aabb, HalfSpace, LinePieces, Polygon, Solid, Sphere, Triangle, clip_lines, clip_segments
-from engine.budget import Budget
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -17,6 +16,7 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
+from engine.running.budget import Budget
 from engine.segment_clipping import lines
 from tests.reference.segments import clip_segments as reference_pieces
 from tests.unit.segment_clipping.on_boundary.test_boundary import REGIONS as BOUNDARIES

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.budget import Budget
+from engine.running.budget import Budget
 
 TETRAHEDRON = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.budget import Budget
+from engine.running.budget import Budget
 from engine.solids.ear_cutting import UNSURE, cut_faces, cut_ring
 from tests.reference.exact import vector
 from tests.reference.solids import cut_face

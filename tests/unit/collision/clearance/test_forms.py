@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from engine import Aabb, HalfSpace, Pose, Sphere, clearance
-from engine.budget import Budget
 from engine.collision.clearance.clearance import do_meet
 from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
 from engine.collision.clearance.spreads import spread_pair
 from engine.collision.result import Clearance, Feature
+from engine.running.budget import Budget
 from tests.unit.collision.clearance.makers import turn
 
 

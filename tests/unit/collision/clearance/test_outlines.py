@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from engine import Polygon, Pose, Relation, Sphere, clearance, clearance_poses, collide
-from engine.budget import UNLIMITED
 from engine.collision.clearance.forms import between_outlines
 from engine.collision.clearance.spreads import spread_pair
 from engine.collision.result import Clearance, Feature
+from engine.running.budget import UNLIMITED
 from tests.unit.collision.clearance.makers import Json, distance, is_nearest
 from tests.unit.collision.lattices import solid
 

@@ -10,12 +10,12 @@ import pytest
 
 import engine.collision.clearance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
-from engine.budget import Budget
 from engine.collision.clearance.exact import nearest_of_triangles
 from engine.collision.clearance.near_triangles import FACE, nearest_points, rounding_of, seen_from
 from engine.collision.clearance.spreads import SpreadPair, _ExactPair, spread_pair
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import kernel
+from engine.running.budget import Budget
 from engine.types import Point3
 from tests.reference.distance import squared_distance
 from tests.reference.exact import Q, q, square, sub, vector

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from engine import Pose, Surface
-from engine.budget import Budget
 from engine.collision.exact_images import image_point
 from engine.collision.meshes.exact_body import (
     Corners,
@@ -24,6 +23,7 @@ from engine.collision.meshes.exact_body import (
 from engine.collision.meshes.exact_regions import Sides, points_within, regions_of, sides_at, sides_over
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.triangle_triangle import APART
+from engine.running.budget import Budget
 from tests.reference.contact import triangles_meet
 from tests.reference.exact import vector
 from tests.unit.collision.meshes.bodies import TURN, mesh

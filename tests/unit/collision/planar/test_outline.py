@@ -10,8 +10,8 @@ import pytest
 
 import engine
 from engine import Aabb, Polygon, Pose, Sphere, Triangle, collide
-from engine.budget import Budget
 from engine.collision.planar.outline import is_clean, live_edges, outline_of, rounded, single_points
+from engine.running.budget import Budget
 from tests.unit.collision.lattices import COUNTS, Maker, aabb, check_pairs, polygon, triangle
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]

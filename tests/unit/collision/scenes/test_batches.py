@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from engine import Aabb, Pose, Relation, Solid, Sphere, Surface, collide
-from engine.budget import Budget
 from engine.collision.codes import UNSETTLED
 from engine.collision.scenes.batches import SceneBatches, scene_bodies
+from engine.running.budget import Budget
 
 
 def test_agrees_with_single_pairs_where_it_answers() -> None:

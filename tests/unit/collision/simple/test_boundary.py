@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from engine import Aabb, HalfSpace, Polygon, Polyhedron, Pose, Solid, Sphere, Surface
-from engine.budget import Budget
 from engine.collision.exact_images import image_half_space, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.result import Work
@@ -21,6 +20,7 @@ from engine.collision.simple.boundary import (
     simplex_distance,
 )
 from engine.predicates.rational import cross, minus, sign_of, squared_length
+from engine.running.budget import Budget
 from tests.reference.contact import squared_distance_to_segment, squared_distance_to_triangle
 from tests.reference.exact import vector
 from tests.unit.collision.meshes.bodies import brick

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
-from engine.budget import Budget
 from engine.containment import policy
 from engine.containment.cells import order as cell_order
 from engine.containment.cells.build import build_cells
@@ -17,6 +16,7 @@ from engine.containment.cells.status import label_empty
 from engine.containment.cells.top import TopCells, build_top_cells, can_have_cells
 from engine.jit import kernel
 from engine.lanes.addresses import array_at, plain_array_at
+from engine.running.budget import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.scenes import box_mesh, made, merged
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from engine import NotFiniteError, Polyhedron, locate
-from engine.budget import Budget
 from engine.containment.cells.build import build_cells
 from engine.containment.cells.locate import locate_by_cells
+from engine.running.budget import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.methods.test_polyhedron_ray_parity import HARD
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged

@@ -11,9 +11,9 @@ import pytest
 
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Polyhedron, Solid, locate
 from engine.arrays import read_only
-from engine.budget import Budget
-from engine.containment.posed import locators as posed
-from engine.containment.rational_locate import rational_location
+from engine.containment import posed_locators as posed
+from engine.containment.methods.rational_locate import rational_location
+from engine.running.budget import Budget
 from tests.unit.containment.scenes import box_mesh, made
 
 FILTERS: dict[type[Solid], Callable[..., Any]] = {

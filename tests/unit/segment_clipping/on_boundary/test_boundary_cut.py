@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from engine.arrays import read_only
-from engine.budget import Budget
 from engine.containment.locators import locator_of
+from engine.running.budget import Budget
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.on_boundary.boundary import clip_chunk
 from engine.segment_clipping.on_boundary.contacts import GROUP, LEAF_SIZE

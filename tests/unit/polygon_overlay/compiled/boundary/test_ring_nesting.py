@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.budget import Budget
 from engine.polygon_overlay import in_integers
 from engine.polygon_overlay.found import Found, joined, one_pair
 from engine.polygon_overlay.run import arranged_again
+from engine.running.budget import Budget
 
 Ring = list[tuple[float, float]]
 

@@ -17,8 +17,8 @@ from typing import Final, TypedDict
 
 import numpy as np
 
-from engine.budget import Budget, Cancel, shown, work_under
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
+from engine.running.budget import Budget, Cancel, shown, work_under
 
 Progress = Callable[[int], object]
 """Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""

@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, read_only
-from engine.budget import Budget
 from engine.containment.locators import Counts, Fill, Locator, by_kernel, csg_locator, locator_of, rational_half, settle
 from engine.containment.methods.ball import locate_in_ball
+from engine.containment.methods.filters import locate_by_polynomial, locate_in_box, locate_in_rows_blurred
+from engine.containment.methods.frames import Frames, frames_of, move_to_body_frame
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.posed.filters import locate_by_polynomial, locate_in_box, locate_in_rows_blurred
-from engine.containment.posed.frames import Frames, frames_of, move_to_body_frame
-from engine.containment.prepared import prism_rows, tree_of
-from engine.containment.rational_locate import Check, to_world_frame
-from engine.containment.rings import rings_of
+from engine.containment.methods.rational_locate import Check, to_world_frame
+from engine.containment.prepared.rings import rings_of
+from engine.containment.prepared.triangle_tree import prism_rows, tree_of
+from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_in_space, rows_of
