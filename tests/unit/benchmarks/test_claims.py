@@ -6,12 +6,11 @@ import copy
 import json
 import re
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks import machine, report, web_page
+from benchmarks import hard_cases, machine, report, web_page
 
 RESULTS = report.named_by_the_page()
 FOUND: dict[str, Any] = json.loads(RESULTS.read_text("utf-8"))
@@ -162,19 +161,23 @@ def test_every_question_of_the_page_is_there() -> None:
 # --- The catalogue of hard cases shows pictures that are drawn and figures of every set that it names ---
 
 
-HARD_CASES = Path(__file__).resolve().parents[3] / "docs" / "hard_cases.md"
-TEXT = HARD_CASES.read_text("utf-8")
-MARK = re.compile(r"<!-- measured: (.*?) -->\n(?:.+\n)*")
+TEXT = hard_cases.PAGE.read_text("utf-8")
 
 
 def test_every_picture_is_stored_and_shown() -> None:
     shown = re.findall(r"\(pictures/hard_(\w+)\.svg\)", TEXT)
-    stored = (HARD_CASES.parent / "pictures").glob("hard_*.svg")
+    stored = (hard_cases.PAGE.parent / "pictures").glob("hard_*.svg")
     assert sorted(shown) == sorted(path.stem.removeprefix("hard_") for path in stored)
 
 
 def test_every_set_has_its_figures_and_none_of_ours_is_wrong() -> None:
-    for mark in MARK.finditer(TEXT):
+    for mark in hard_cases.MARK.finditer(TEXT):
         wanted, lines = mark[1].split("; "), mark[0].splitlines()[1:]
         assert [line.split("*")[1] for line in lines] == wanted
         assert all("**ours 0**" in line for line in lines)
+        assert {each.split(" ")[0] for each in wanted} <= set(hard_cases.SETS)
+
+
+def test_a_line_of_figures() -> None:
+    found = hard_cases.sentence("cases x/y", {"ours": (0, 8), "a": (3, 5), "b": (0, 8)})
+    assert found == "- *cases x/y* (8): **ours 0**, b 0, a 3 of 5\n"

@@ -86,7 +86,6 @@ def name_of(found: engine.Collision) -> str | None:
     return None if found.detail is None else found.detail.label
 
 
-@pytest.mark.some(9)
 @pytest.mark.parametrize(("first", "second", "expected"), [c[1:] for c in CASES], ids=[c[0] for c in CASES])
 def test_by_hand(first: Solid, second: Solid, expected: str | None) -> None:
     found = collide(made(first), made(second), detail=True)
