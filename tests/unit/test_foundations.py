@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine import budget, errors
+from engine import errors
 from engine.direct import entry_of
 from engine.errors import CancelledError, InvalidInputError
 from engine.jit import kernel
+from engine.running import budget
 from engine.running.budget import Budget, Cancel, concatenated, polled
 
 

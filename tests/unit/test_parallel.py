@@ -11,8 +11,8 @@ import weakref
 import numpy as np
 import pytest
 
-from engine import parallel
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
+from engine.running import parallel
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import check_options, is_unlimited, run_chunks
 
