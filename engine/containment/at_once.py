@@ -14,7 +14,7 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array
 from engine.containment.locators import Locator, locator_of, polygon_by, polyhedron_by, rational_half, settle
 from engine.containment.methods.filters import NOT_FINITE
-from engine.containment.methods.rational_locate import combine, over_tree
+from engine.containment.methods.rational_locate import combine, is_located, over_tree
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
 from engine.direct import entry_of
 from engine.errors import NotFiniteError
@@ -24,6 +24,7 @@ from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
 from engine.solids.csg import Csg
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
+from engine.solids.registry import row_of
 from engine.types import UNDECIDED
 
 MOST: Final = 1024
@@ -55,7 +56,7 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
             return None
         if not 0 < len(points) <= MOST:
             return None
-        if solid.type == "surface":
+        if not is_located(row_of(solid)):
             return None
         plain = None if isinstance(points, np.ndarray) else plain_floats(points, 2)
         if plain is not None and plain.shape[1] == solid.dimension:

@@ -90,8 +90,9 @@ def register(row: Row) -> None:
 
 
 def row_of(solid: object) -> Row:
-    """Return the row of a solid, an empty one for what has none."""
-    return _BY_CLASS.get(type(solid), _NO_ROW)
+    """Return the row of a solid, that of the class it inherits from where its own has none; else an empty one."""
+    rows = (_BY_CLASS[kind] for kind in type(solid).__mro__ if kind in _BY_CLASS)
+    return _BY_CLASS.get(type(solid)) or next(rows, _NO_ROW)
 
 
 def names(takes: Callable[[Row], object]) -> str:

@@ -72,6 +72,19 @@ def test_a_mesh_is_a_mesh() -> None:
         registry.register(registry.Row(solid=Sponge, about="", meets={3: "mesh"}))
 
 
+def test_a_class_of_the_caller_has_the_row_that_it_inherits() -> None:
+    class Room(engine.Aabb):
+        __slots__ = ("number",)
+
+    room, box = Room([0, 0], [2, 1]), engine.Aabb([0, 0], [2, 1])
+    points, segments = [[1, 0.5], [2, 1], [3, 3]], [[[-1.0, 0.5], [5.0, 0.5]]]
+    assert engine.locate(points, room).tolist() == engine.locate(points, box).tolist() == [1, 0, -1]
+    assert engine.bounds(room).aabb.max.tolist() == [2, 1]
+    assert engine.clip_segments(segments, room).end.tolist() == [[2.0, 0.5]]
+    assert engine.collide(room, box).relation is engine.collide(box, box).relation
+    assert engine.locate_scene(points, [room, box]).offsets.tolist() == [0, 2, 4, 4]
+
+
 def test_every_public_solid_has_a_row() -> None:
     named = {value for value in vars(engine).values() if isinstance(value, type) and issubclass(value, engine.Solid)}
     assert {row.solid for row in engine.solid_types.values()} == named - {engine.Solid}
