@@ -14,7 +14,7 @@ from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import lowest_bit
 from engine.scenes.scratch import Scratch, scratch_at
-from engine.segment_clipping.on_boundary.mesh_streams import Way, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import Way, local_segment
 from engine.segment_clipping.pieces import point_of
 from engine.types import Point3
 

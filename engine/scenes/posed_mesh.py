@@ -18,19 +18,18 @@ from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.prepared.triangle_tree import tree_at
 from engine.jit import inline
 from engine.lanes.addresses import array_at
-from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
-from engine.lanes.lanes import lowest_bit, prefetch
+from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.tracing import LANES
-from engine.lanes.triangles import CORNER_ROWS, near_triangles
+from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.cut_point import T_BOUND
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
-from engine.segment_clipping.on_boundary.contacts import APART, CROSSED, DEGENERATE, PROPER, START, are_one, place_of
+from engine.segment_clipping.on_boundary.contacts import CROSSED, DEGENERATE, PROPER, START, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
-from engine.segment_clipping.on_boundary.mesh_streams import local_segment, shear_of
-from engine.segment_clipping.on_boundary.touching_cut import Crossings, sort_crossings
-from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, corner, exact_contact, triangle_at
+from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts
+from engine.segment_clipping.on_boundary.touching_cut import sort_crossings
+from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 from engine.segment_clipping.pieces import put_point, slack_of
 from engine.types import UNDECIDED, Point3
 
@@ -77,100 +76,18 @@ def _tree_of(address: int) -> Any:
 
 
 @inline
-def _ask_triangles(mesh: PlacedMesh, ends: Any, n: int, is_any: bool, cuts: Crossings, n_met: int) -> int:
-    """Append those of the n triangles that wait in cuts.faces which a segment crosses to the n_met ones met before;
-    return as `_gather` does.
-
-    ends: p and q, known to a blur a coordinate.
-    """
-    p, q, blur = ends
-    for place in range(n):
-        element = cuts.faces[place]
-        a, b, c = triangle_at(mesh.elements, element)
-        kind = contact_filter(a, b, c, p, q, blur)
-        if kind == UNDECIDED and blur == 0.0:
-            kind = exact_contact(a, b, c, p, q)
-        if kind == APART:
-            continue
-        if is_any and kind != DEGENERATE:
-            return 1
-        if kind == DEGENERATE or n_met == MOST_MET or (kind != PROPER and place_of(kind) >= START):
-            if not is_any:
-                return UNSURE
-            n_met = UNSURE
-            continue
-        prefetch(mesh.faces, element)
-        cuts.met[n_met], cuts.codes[n_met] = element, CROSSED if kind == PROPER else kind
-        n_met += 1
-    return n_met
-
-
-@inline
-def _ask_blocks(mesh: PlacedMesh, ends: Any, shear: Any, n: int, is_any: bool, cuts: Crossings, n_met: int) -> int:
-    """Do what `_ask_triangles` does with the triangles of the n blocks that wait in cuts.order.
-
-    shear: of `shear_of`.
-    """
-    (i, j, k), place, r, s, reach, slack = shear
-    n_waiting = 0
-    for turn in range(n):
-        block = cuts.order[turn]
-        bits = near_triangles(mesh.corners, block, i, j, k, place, r, s, reach, slack)
-        while bits != 0:
-            below = mesh.child[mesh.n_inner + block, lowest_bit(bits)]
-            bits &= bits - 1
-            if below != EMPTY:
-                cuts.faces[n_waiting] = -1 - below
-                n_waiting += 1
-                prefetch(mesh.elements, (-1 - below) * 9)
-                prefetch(mesh.elements, (-1 - below) * 9 + 8)
-        if n_waiting + LANES > MOST_MET or turn == n - 1:
-            n_met, n_waiting = _ask_triangles(mesh, ends, n_waiting, is_any, cuts, n_met), 0
-            if n_met != 0 and (n_met > 0) == is_any:
-                break
-    return n_met
-
-
-@inline
-def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, words: IntArray) -> int:
-    """Fill met with the triangles that a segment crosses; return how many, UNSURE where one may be met otherwise. Where
-    `is_any` one that is surely met is enough, and 1 is returned.
-
-    What lies on another line of memory waits until all that is asked before it is asked: lines come side by side.
-    """
-    scratch = scratch_at(words)
-    stack, cuts = scratch.stack, scratch.cuts
-    way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)
-    shear, ends, n_met, n_blocks, depth = shear_of(way), (p, q, blur), 0, 0, int(way.is_near)
-    stack[0], cuts.order[0] = 0, 0
-    if mesh.n_inner == 0:
-        depth, n_blocks = 0, depth
-    while depth > 0 or n_blocks > 0:  # bound: each node enters the stack once
-        if depth > 0:
-            depth -= 1
-            node = stack[depth]
-            bits = enter_boxes(mesh.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
-            while bits != 0:
-                below = mesh.child[node, lowest_bit(bits)]
-                bits &= bits - 1
-                if below < 0:  # case: numbers that are none, which nothing parts
-                    continue
-                prefetch(mesh.child, below * WIDTH)
-                if below >= mesh.n_inner:
-                    cuts.order[n_blocks] = below - mesh.n_inner
-                    n_blocks += 1
-                    for line in range(0, CORNER_ROWS * LANES, 16):
-                        prefetch(mesh.corners, (below - mesh.n_inner) * (CORNER_ROWS * LANES) + line)
-                else:
-                    stack[depth] = below
-                    depth += 1
-                    for line in range(0, BOX_ROWS * WIDTH, 16):
-                        prefetch(mesh.boxes, below * (BOX_ROWS * WIDTH) + line)
-        if depth == 0 or n_blocks + WIDTH > MOST_MET:
-            n_met, n_blocks = _ask_blocks(mesh, ends, shear, n_blocks, is_any, cuts, n_met), 0
-            if n_met != 0 and (n_met > 0) == is_any:
-                break
-    return n_met
+def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
+    """Fill met and codes with the triangles that a segment crosses; return how many, UNSURE where one may be met
+    otherwise. Where `is_any` one that is surely met is enough, and 1 is returned."""
+    cuts = scratch.cuts
+    waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
+    n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
+    for i in range(n_met):
+        kind = cuts.codes[i]
+        if kind == DEGENERATE or (not is_any and kind != PROPER and place_of(kind) >= START):
+            return UNSURE
+        cuts.codes[i] = CROSSED if kind == PROPER else kind
+    return max(n_met, UNSURE)
 
 
 @inline
@@ -275,7 +192,7 @@ def crossings_in(
     if not is_placed:
         q = corner(segments, item, 1)
     mesh, is_in = _mesh_of(lines, numbers), False
-    n_met = _gather(mesh, p, q, blur, is_any, words)
+    n_met = _gather(mesh, p, q, blur, is_any, scratch)
     if n_met < 0 or (is_any and n_met > 0):
         return n_met, False
     if is_closed and _is_near_box(numbers, p, blur):

@@ -35,7 +35,7 @@ from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
-from engine.segment_clipping.on_boundary.mesh_streams import AHEAD, Way
+from engine.segment_clipping.on_boundary.mesh_contacts import Way
 from engine.segment_clipping.on_boundary.touching_cut import Crossings
 from engine.segment_clipping.pieces import Pieces, put_piece
 from engine.types import OPEN
@@ -48,6 +48,8 @@ MESH: Final = 3
 """Kinds of bodies, UNREADY until one is prepared; OTHER ones are cut in exact arithmetic."""
 MET: Final = 1
 """State of a segment, beside SETTLED, which meets nothing, and OPEN."""
+AHEAD: Final = 8
+"""Segments between the one that memory is asked for and the one worked on."""
 Firsts = namedtuple("Firsts", "source body start end t faces ranks")
 """One piece of each segment, as `ScenePieces` has them."""
 

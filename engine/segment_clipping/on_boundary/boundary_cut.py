@@ -14,7 +14,7 @@ from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.jit import allocating_kernel, called, inline
 from engine.segment_clipping.on_boundary.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe
-from engine.segment_clipping.on_boundary.mesh_streams import gather_contacts, streams_for
+from engine.segment_clipping.on_boundary.mesh_contacts import gather_triangles, mesh_contacts_for
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.on_boundary.touching_cut import (
     UNSURE,
@@ -146,12 +146,12 @@ def cut_on_mesh(
 ) -> None:
     """Cut segments (m, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = streams_for(mesh, size, n[2]), crossings_for(2 * n[2], 3), n[0]
+    contacts, cuts, last = mesh_contacts_for(size, n[2]), crossings_for(2 * n[2], 3), n[0]
     n[1], found = 0, 0
     while n[0] == last < locations.shape[0] and found >= 0:
         last = min(n[0] + size, locations.shape[0])
         group = segments[n[0] : last]
-        found = gather_contacts(contacts, mesh, group, group.shape[0], stop)
+        found = gather_triangles(contacts, mesh, group, group.shape[0], stop)
         if found >= 0:
             n[0], n[1] = cut_group(group, locations, n[0], mesh, contacts, cuts, stop, out, n[1], state)
     n[2] *= 2 if found < 0 else 1

@@ -20,7 +20,7 @@ from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
 from engine.running.budget import Budget
 from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END, NO_ROOM, find_contacts_2d
-from engine.segment_clipping.on_boundary.mesh_streams import find_mesh_contacts
+from engine.segment_clipping.on_boundary.mesh_contacts import find_contacts_3d
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
 
@@ -113,7 +113,7 @@ def contacts_with(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[IntArray, FlagArray, IntArray]:
     """Return the elements that segments (n, 2, dim) may meet, GROUP at most, and how; offsets (n + 1,) of each."""
-    kernel: Any = find_mesh_contacts if isinstance(boundary, Mesh) else find_contacts_2d
+    kernel: Any = find_contacts_3d if isinstance(boundary, Mesh) else find_contacts_2d
     room, found = _LEAST_ROOM + _EACH * len(segments), NO_ROOM
     met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)
     while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once

@@ -1,6 +1,6 @@
 """Which elements of a boundary does a segment meet, and how: edges of a polygon, triangles of a polyhedron.
 
-For each segment a tree of boxes (in space: mesh_streams.py) gives the elements nearby, exact orientation signs sort
+For each segment a tree of boxes (in space: mesh_contacts.py) gives the elements nearby, exact orientation signs sort
 them:
 
     edge a b, segment p q in the plane         triangle a b c, segment p q in space

@@ -62,8 +62,6 @@ class Mesh(NamedTuple):
     """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
     n_inner: int
     """How many they are; unless there is but one block, they begin with the root."""
-    n_levels: int
-    """How many inner nodes stand above one another at most."""
     corners: Float32Array
     """(n_blocks, 9, 8), see `corners_of`."""
 
@@ -145,7 +143,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
         on_lines(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, tree.origin,
-        1.0 / tree.scale, n_inner, _levels_of(tree.child[:n_inner]), corners_of(tree, n_inner, elements),
+        1.0 / tree.scale, n_inner, corners_of(tree, n_inner, elements),
     )  # fmt: skip
 
 
@@ -158,17 +156,6 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
     child = tree.child[order]
     child = np.where(child >= 0, place[np.maximum(child, 0)], child)
     return Bvh(on_lines(tree.boxes[order]), on_lines(child), tree.origin, tree.scale), int((~is_block).sum())
-
-
-def _levels_of(child: Int32Array) -> int:
-    """Return on how many levels the inner nodes of a tree stand, from their children."""
-    n_levels = 0
-    level: Int32Array = np.zeros(min(len(child), 1), np.int32)
-    while len(level):
-        below = child[level].ravel()
-        level = below[(below >= 0) & (below < len(child))]
-        n_levels += 1
-    return n_levels
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:

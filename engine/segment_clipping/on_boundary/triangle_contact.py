@@ -127,12 +127,12 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 
 
 @merged
-def triangle_contact(elements: FloatArray, element: int, segments: FloatArray, item: int) -> int:
-    """Return how one of some segments (m, 2, 3) and one of some triangles (k, 3, 3) meet."""
+def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, blur: float) -> int:
+    """Return how a segment, its ends known to `blur` a coordinate, and one of some triangles (k, 3, 3) meet; UNDECIDED
+    where the filter does not decide and blur is above 0."""
     a, b, c = triangle_at(elements, element)
-    p, q = corner(segments, item, 0), corner(segments, item, 1)
-    kind = contact_filter(a, b, c, p, q, 0.0)
-    return kind if kind != UNDECIDED else exact_contact(a, b, c, p, q)
+    kind = contact_filter(a, b, c, p, q, blur)
+    return kind if kind != UNDECIDED or blur > 0.0 else exact_contact(a, b, c, p, q)
 
 
 @merged

@@ -9,7 +9,7 @@ import numpy as np
 from engine.predicates.rational import common_integers, cross, minus
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_stretch
 from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, END, START
-from engine.segment_clipping.on_boundary.mesh_streams import LIMIT, find_mesh_contacts, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, find_contacts_3d, local_segment
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
 from engine.segment_clipping.on_boundary.triangle_contact import exact_contact
 from engine.types import Point3
@@ -42,7 +42,7 @@ def test_contacts_are_those_of_all_triangles() -> None:
     stop, room = np.zeros(1, np.uint8), 100_000
 
     def found(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
-        n_contacts, met, kinds, offsets = find_mesh_contacts(segments, mesh, stop, room)
+        n_contacts, met, kinds, offsets = find_contacts_3d(segments, mesh, stop, room)
         assert n_contacts == offsets[-1]
         return met, kinds, offsets
 
