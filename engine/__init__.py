@@ -1,14 +1,13 @@
 """Exact answers to four questions about a scene: containment, collision, segment clipping, polygon clipping."""
 
 from engine import layers
-from engine.collision.clearance.clearance import clearance, clearance_poses
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.result import Clearance, Collision, Feature, Witness
-from engine.collision.scenes.collide_scene import ScenePairs, collide_scene
 from engine.collision.triangles import collide_triangles
 from engine.compare import Comparison, compare
 from engine.containment.locate import contains, locate
+from engine.distance.clearance import clearance, clearance_poses
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -45,6 +44,7 @@ from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
 from engine.polygon_overlay.union_all import filled, union_all
 from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of solids)
 from engine.running.budget import Cancel
+from engine.scenes.collide_scene import ScenePairs, collide_scene
 from engine.scenes.ends import ScenePieces
 from engine.scenes.locate import SceneLocations
 from engine.scenes.locate_scene import locate_scene

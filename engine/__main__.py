@@ -27,9 +27,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.collision.clearance.clearance import clearance_poses
 from engine.collision.collide_poses import collide_poses
 from engine.containment.locate import locate
+from engine.distance.clearance import clearance_poses
 from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_features, read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table

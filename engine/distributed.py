@@ -23,9 +23,9 @@ from distributed import Client, Future, as_completed
 
 from engine.arrays import BoolArray, FloatArray, Int8Array
 from engine.collision import collide_poses as poses
-from engine.collision.clearance import clearance as clearances
-from engine.collision.clearance.clearance import checked_distance
 from engine.containment import locate as containment
+from engine.distance import clearance as clearances
+from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs

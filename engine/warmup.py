@@ -13,22 +13,22 @@ from collections.abc import Callable
 import numpy as np
 
 from engine.cold_start import fill_cache, note_full
-from engine.collision.clearance.clearance import clearance
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
-from engine.collision.scenes.collide_scene import collide_scene
 from engine.collision.triangles import collide_triangles
 from engine.containment.cells.build import cells_of
 from engine.containment.cells.order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.methods.rational_locate import rational_location
 from engine.containment.posed_locators import posed_locator
+from engine.distance.clearance import clearance
 from engine.errors import InvalidInputError
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
 from engine.running.budget import Budget
 from engine.running.parallel import check_options
+from engine.scenes.collide_scene import collide_scene
 from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments

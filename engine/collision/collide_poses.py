@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.collision.batches import posed_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.collide import Answers, PlacedPair, Witnesses, accuracy_of, collide_pair, pair_function
 from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
@@ -21,7 +22,6 @@ from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work, has_faces
-from engine.collision.scenes.batches import posed_batch
 from engine.collision.simple.against_ball import centers_in_frame, named
 from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.closed_forms import told_by_forms

@@ -17,7 +17,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
-from engine.collision.scenes.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
+from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.methods.rational_locate import is_located
 from engine.containment.posed_locators import posed_locator

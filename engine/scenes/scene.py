@@ -9,10 +9,9 @@ from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
-from engine.collision.clearance.clearance import checked_distance
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
-from engine.collision.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
+from engine.distance.clearance import checked_distance
 from engine.errors import (
     EngineError,
     IndexOutOfRangeError,
@@ -24,6 +23,7 @@ from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
+from engine.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
 from engine.scenes.ends import ScenePieces, in_order, joined
 from engine.scenes.locate import SceneLocations, locate_all
 from engine.scenes.standing import Standing

@@ -12,7 +12,7 @@ from engine.__main__ import COMMANDS as COMMANDS_ON_FILES
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMED = re.compile(r"`([\w./]+(?:\.py|/|\.md|\.json))`")
-PLACES = ("", "engine", "tests", "service", "tests/contract", "engine/collision/meshes", "engine/collision/scenes")
+PLACES = ("", "engine", "tests", "service", "tests/contract", "engine/collision/meshes", "engine/collision")
 
 
 def names_in(page: str) -> set[str]:

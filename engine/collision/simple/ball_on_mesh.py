@@ -13,9 +13,9 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
-from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
+from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, SLACK, OwnPoint, box_between, locate_point, next_face
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import allocating, inline, kernel

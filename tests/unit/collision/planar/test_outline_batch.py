@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polygon, Pose, Solid, Triangle, collide
+from engine.collision.batches import SceneBatches, scene_bodies
 from engine.collision.codes import UNSETTLED
 from engine.collision.planar import outline_batch
 from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement
 from engine.collision.planar.outline_batch import collide_outlines, outline_parts, outline_pool
 from engine.collision.result import Work
-from engine.collision.scenes.batches import SceneBatches, scene_bodies
 from engine.running.budget import Budget
 
 SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]

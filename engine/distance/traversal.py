@@ -22,7 +22,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray
-from engine.collision.clearance.boxes import (
+from engine.collision.meshes.mesh_arrays import MeshArrays
+from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
+from engine.distance.boxes import (
     CLOSER,
     DONE,
     FULL,
@@ -40,9 +42,7 @@ from engine.collision.clearance.boxes import (
     size_of,
     way_of,
 )
-from engine.collision.clearance.refined import certify, refine
-from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
+from engine.distance.refined import certify, refine
 from engine.jit import inline, kernel, merged
 from engine.lanes.boxes import EMPTY, FRAME_ROWS
 from engine.lanes.discs import inverse_ratio

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from engine import Polygon, Pose, Relation, Sphere, clearance, clearance_poses, collide
-from engine.collision.clearance.forms import between_outlines
-from engine.collision.clearance.spreads import spread_pair
 from engine.collision.result import Clearance, Feature
+from engine.distance.forms import between_outlines
+from engine.distance.spreads import spread_pair
 from engine.running.budget import UNLIMITED
-from tests.unit.collision.clearance.makers import Json, distance, is_nearest
 from tests.unit.collision.lattices import solid
+from tests.unit.distance.makers import Json, distance, is_nearest
 
 
 def flush(rng: random.Random, scale: float) -> tuple[Json, Json]:

@@ -28,12 +28,12 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.collision.clearance.boxes import Search, View, keep_below, scaled
-from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
 from engine.collision.meshes.mesh_arrays import triangle_of
+from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import Placement
 from engine.collision.meshes.triangle_triangle import Facet, corner
+from engine.distance.boxes import Search, View, keep_below, scaled
+from engine.distance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
 from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff

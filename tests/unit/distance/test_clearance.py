@@ -30,7 +30,8 @@ from engine import (
     clearance_poses,
 )
 from engine.collision.result import Clearance, Feature
-from tests.unit.collision.clearance.makers import (
+from tests.unit.collision.lattices import solid
+from tests.unit.distance.makers import (
     FAMILIES,
     KINDS,
     Family,
@@ -44,7 +45,6 @@ from tests.unit.collision.clearance.makers import (
     pose,
     turn,
 )
-from tests.unit.collision.lattices import solid
 
 COUNTS = pytest.mark.parametrize("n", [4, pytest.param(400, marks=pytest.mark.full)])
 

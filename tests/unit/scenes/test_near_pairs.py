@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, HalfSpace, InvalidInputError, Polyhedron, Pose, Relation, Sphere, Triangle, clearance, collide
-from engine.collision.scenes.collide_scene import collide_scene
+from engine.scenes.collide_scene import collide_scene
 
 TURN = [[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]
 

@@ -17,10 +17,6 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
-from engine.collision.clearance.boxes import DONE, Room, new_room
-from engine.collision.clearance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
-from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.traversal import BEYOND, TOLD, Asked, find_nearest
 from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import (
     BOX_TRIANGLES,
@@ -30,10 +26,14 @@ from engine.collision.meshes.mesh_arrays import (
     mesh_body_of,
     mesh_body_of_triangles,
 )
+from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_arrays
 from engine.collision.result import Clearance, Feature, Poses
 from engine.direct import entry_of
+from engine.distance.boxes import DONE, Room, new_room
+from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
+from engine.distance.traversal import BEYOND, TOLD, Asked, find_nearest
 from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

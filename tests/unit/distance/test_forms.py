@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from engine import Aabb, HalfSpace, Pose, Sphere, clearance
-from engine.collision.clearance.clearance import do_meet
-from engine.collision.clearance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
-from engine.collision.clearance.spreads import spread_pair
 from engine.collision.result import Clearance, Feature
+from engine.distance.clearance import do_meet
+from engine.distance.forms import MEETING, between_form_and_plane, between_forms, gap_of_planes
+from engine.distance.spreads import spread_pair
 from engine.running.budget import Budget
-from tests.unit.collision.clearance.makers import turn
+from tests.unit.distance.makers import turn
 
 
 def number(rng: random.Random, size: float) -> float:

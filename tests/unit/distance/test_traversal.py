@@ -8,18 +8,18 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-import engine.collision.clearance.spreads as spreads
+import engine.distance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
-from engine.collision.clearance.exact import nearest_of_triangles
-from engine.collision.clearance.near_triangles import FACE, nearest_points, rounding_of, seen_from
-from engine.collision.clearance.spreads import SpreadPair, _ExactPair, spread_pair
+from engine.collision.meshes.near_triangles import FACE, nearest_points, rounding_of, seen_from
 from engine.collision.meshes.triangle_triangle import Facet
+from engine.distance.exact import nearest_of_triangles
+from engine.distance.spreads import SpreadPair, _ExactPair, spread_pair
 from engine.jit import kernel
 from engine.running.budget import Budget
 from engine.types import Point3
 from tests.reference.distance import squared_distance
 from tests.reference.exact import Q, q, square, sub, vector
-from tests.unit.collision.clearance.makers import turn
+from tests.unit.distance.makers import turn
 
 
 def ball(n: int, seed: int) -> Polyhedron:

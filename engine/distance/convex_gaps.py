@@ -19,14 +19,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.collision.clearance.closed_forms import gap_of_forms
-from engine.collision.clearance.near_triangles import FACE
-from engine.collision.clearance.refined import ROUNDING, corner_of, ends_of, height_above
-from engine.collision.clearance.wide import Wide, Wide3, dot3, less, less3, root
 from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays, point_of
 from engine.collision.convex.pair import PlacedBody, farthest, inner_point, largest, placed_body
+from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
+from engine.distance.closed_forms import gap_of_forms
+from engine.distance.refined import ROUNDING, corner_of, ends_of, height_above
+from engine.distance.wide import Wide, Wide3, dot3, less, less3, root
 from engine.jit import called, inline, kernel, merged
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff, two_sum, workspace

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Sphere, Triangle
-from engine.collision.clearance.spreads import SpreadPair, in_space
-from engine.collision.clearance.traversal import TOLD, Asked
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.result import Feature
+from engine.distance.spreads import SpreadPair, in_space
+from engine.distance.traversal import TOLD, Asked
 from engine.running.budget import Budget
 
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.clearance.near_triangles import FACE
+from engine.collision.meshes.near_triangles import FACE
 from engine.collision.result import Clearance, Feature
 from engine.errors import NotRepresentableError
 from engine.predicates.rational import cross, dot, minus, nearest, nearest_with_root, squared_length

@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, FloatArray
-from engine.collision.clearance.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.placement import Placement, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import inline, merged

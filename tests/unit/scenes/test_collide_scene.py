@@ -29,9 +29,9 @@ from engine import (
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
-from engine.collision.scenes.collide_scene import collide_scene
 from engine.errors import InvalidInputError
 from engine.jit import KERNELS
+from engine.scenes.collide_scene import collide_scene
 from tests.reference.shapes import box
 
 EYE = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -119,7 +119,7 @@ def test_pairs_found_in_several_blocks_are_sorted(monkeypatch: pytest.MonkeyPatc
     at = np.random.default_rng(5).uniform(0, 8, (600, 3))
     solids = [Sphere(place, 0.5) for place in at]
     expected = collide_scene(solids, witnesses=True, detail=True)
-    monkeypatch.setattr("engine.collision.scenes.collide_scene.pairs_of_boxes", partial(pairs_of_boxes, block=50))
+    monkeypatch.setattr("engine.scenes.collide_scene.pairs_of_boxes", partial(pairs_of_boxes, block=50))
     found = collide_scene(solids, witnesses=True, detail=True)
     assert as_list(found) == as_list(expected) == sorted(as_list(expected))
     assert found.witnesses == expected.witnesses

@@ -15,15 +15,15 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.collision.clearance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
-from engine.collision.clearance.exact import Gap, Rational, ScaledGap
-from engine.collision.clearance.outlines import nearest_under_poses
-from engine.collision.clearance.spreads import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.collision.exact_images import Vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.collision.simple.closed_forms import FORMS, form_of
 from engine.direct import entry_of
+from engine.distance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
+from engine.distance.exact import Gap, Rational, ScaledGap
+from engine.distance.outlines import nearest_under_poses
+from engine.distance.spreads import BALL, feature_of, outline_of, radius_of, spread_of
 from engine.predicates.rational import minus, squared_length
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid

@@ -16,20 +16,20 @@ import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.bounding.box_grid import BLOCK, pairs_of_boxes
-from engine.collision.clearance.clearance import checked_distance, has_plane
-from engine.collision.clearance.convex_gaps import gaps_of_pairs
-from engine.collision.clearance.forms import are_small, gap_of_planes, told_under_poses
-from engine.collision.clearance.spreads import SpreadPair, in_space
+from engine.collision.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import Answers, PlacedPair, accuracy_of
 from engine.collision.convex.body import pooled
 from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Witness, Work
-from engine.collision.scenes.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.simple.closed_forms import form_of
 from engine.collision.simple.form_relations import N_NUMBERS
 from engine.direct import entry_of
+from engine.distance.clearance import checked_distance, has_plane
+from engine.distance.convex_gaps import gaps_of_pairs
+from engine.distance.forms import are_small, gap_of_planes, told_under_poses
+from engine.distance.spreads import SpreadPair, in_space
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks

@@ -16,8 +16,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
 from engine.collision.planar.outline_batch import box_blocks
+from engine.distance.wide import Wide, less, over, plus, product, root, times
 from engine.jit import called, inline
 from engine.predicates.vectors import as_point2
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrays import FloatArray
-from engine.collision.clearance.wide import Wide, less, over, plus, product, root, times
 from engine.collision.simple.form_relations import IS_BALL, RADIUS
+from engine.distance.wide import Wide, less, over, plus, product, root, times
 from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace

@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.clearance.vertex_edge import Found, Placed, Wide2, measure, minus2, point
-from engine.collision.clearance.wide import Wide, less
 from engine.collision.planar.outline_batch import BLOCK
+from engine.distance.vertex_edge import Found, Placed, Wide2, measure, minus2, point
+from engine.distance.wide import Wide, less
 from engine.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.orientation import lower

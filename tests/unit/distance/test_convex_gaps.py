@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Pose, Sphere, clearance
-from engine.collision.clearance.convex_gaps import gaps_of_pairs
 from engine.collision.convex.body import convex_body_of, pooled
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.simple.form_relations import N_NUMBERS
+from engine.distance.convex_gaps import gaps_of_pairs
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]

@@ -11,12 +11,12 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.collision.clearance.closed_forms import UNSURE
-from engine.collision.clearance.outline_search import MOST_NEAR, ROOM, Look, line_of, look_for, row_of, search, way_to
-from engine.collision.clearance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, minus2, place, point
-from engine.collision.clearance.wide import Wide, less, over, plus, times
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.planar.outline_batch import inside, n_blocks, relate_placed
+from engine.distance.closed_forms import UNSURE
+from engine.distance.outline_search import MOST_NEAR, ROOM, Look, line_of, look_for, row_of, search, way_to
+from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, minus2, place, point
+from engine.distance.wide import Wide, less, over, plus, times
 from engine.jit import allocating_kernel, called, inline
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace

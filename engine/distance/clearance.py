@@ -8,7 +8,13 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, read_only
-from engine.collision.clearance.forms import (
+from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
+from engine.collision.collide import Answers, check_pose, collide_pair, pair_function
+from engine.collision.collide_poses import as_poses, batch_of
+from engine.collision.meshes.mesh_arrays import STILL
+from engine.collision.meshes.placement import PoseArrays
+from engine.collision.result import Clearance, Poses, Work
+from engine.distance.forms import (
     MEETING,
     STILL2,
     are_small,
@@ -18,13 +24,7 @@ from engine.collision.clearance.forms import (
     gap_of_planes,
     told_under_poses,
 )
-from engine.collision.clearance.spreads import SpreadPair, in_space, spread_pair
-from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
-from engine.collision.collide import Answers, check_pose, collide_pair, pair_function
-from engine.collision.collide_poses import as_poses, batch_of
-from engine.collision.meshes.mesh_arrays import STILL
-from engine.collision.meshes.placement import PoseArrays
-from engine.collision.result import Clearance, Poses, Work
+from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, run_chunks
