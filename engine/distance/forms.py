@@ -33,6 +33,7 @@ from engine.solids.sphere import Sphere
 
 _MOST_PAIRS: Final = 1 << 18
 """Of edges of two outlines: to look at all of them takes some milliseconds, where boxes part none."""
+_NONE: Final = np.empty(0)
 PLANE: Final = Feature("plane")
 MEETING: Final = Clearance(0.0)
 """The answer for bodies with a common point."""
@@ -99,32 +100,20 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
 
 def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return what `between_forms` does, of two bodies of the plane; None where that is not sure, or they are large."""
-    if not are_small(first, second):
+    if first.dimension == 3:
         return None
+    one, other = outline_of(first), outline_of(second)
+    if len(one[0]) * len(other[0]) > _MOST_PAIRS:
+        return None
+    motions = [STILL2 if at is None else (at.rotation[None], at.translation[None]) for at in poses]
     points = np.empty((2, 2))
-    at, there = poses
-    motion = STILL2 if at is None else (at.rotation[None], at.translation[None])
-    their_motion = STILL2 if there is None else (there.rotation[None], there.translation[None])
-    distance, *ends = under_poses(first, second, (*motion, *their_motion), UNLIMITED, points)[0].tolist()
-    own, theirs = map(int, ends)
+    distance, own, theirs = entry_of(nearest_under_poses)(
+        *one[:3], *motions[0], *other[:3], *motions[1], _NONE, points, UNLIMITED.flag
+    )
     if own < 0 or least is not None:
         return _told(distance, least)
     points.setflags(write=False)
-    return Clearance(distance, points, (outline_of(first)[3][own], outline_of(second)[3][theirs]))
-
-
-def under_poses(
-    first: Solid, second: Solid, motions: Sequence[FloatArray], budget: Budget, points: FloatArray
-) -> FloatArray:
-    """Return what `nearest_under_poses` finds; motions: rotations and translations of each body, read-only."""
-    turns, moves, their_turns, their_moves = motions
-    found = np.empty((len(their_turns), 3))
-    entry_of(nearest_under_poses)(
-        *outline_of(first)[:3], turns, moves, *outline_of(second)[:3], their_turns, their_moves, found, points,
-        budget.flag,
-    )  # fmt: skip
-    budget.check()
-    return found
+    return Clearance(distance, points, (one[3][own], other[3][theirs]))
 
 
 STILL2: Final = tuple(array[None] for array in motion_of(None, 2))
@@ -135,9 +124,15 @@ def told_under_poses(
     first: Solid, second: Solid, motions: Sequence[FloatArray], least: Fraction | None, budget: Budget
 ) -> FloatArray:
     """Return the distances under poses, NaN where they are not sure; with a distance 0.0 for bodies that are nearer
-    than that, infinity for others."""
-    told = under_poses(first, second, motions, budget, np.empty((2, 2)))[:, 0].copy()
-    told[told == UNSURE] = np.nan
+    than that, infinity for others; motions: rotations and translations of each body, read-only."""
+    turns, moves, their_turns, their_moves = motions
+    found = np.empty(len(their_turns))
+    entry_of(nearest_under_poses)(
+        *outline_of(first)[:3], turns, moves, *outline_of(second)[:3], their_turns, their_moves, found,
+        np.empty((2, 2)), budget.flag,
+    )  # fmt: skip
+    budget.check()
+    told = np.where(found == UNSURE, np.nan, found)
     if least is not None:
         bound = float(least)
         told = np.where(told > bound, np.inf, np.where(told < bound, 0.0, np.nan))
@@ -145,7 +140,7 @@ def told_under_poses(
 
 
 def are_small(first: Solid, second: Solid) -> bool:
-    """Tell whether two bodies are outlines of the plane that `under_poses` takes."""
+    """Tell whether two bodies are outlines of the plane that `nearest_under_poses` takes."""
     if first.dimension == 3:
         return False
     return len(outline_of(first)[0]) * len(outline_of(second)[0]) <= _MOST_PAIRS

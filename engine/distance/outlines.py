@@ -133,16 +133,19 @@ def nearest_under_poses(
     vertices: FloatArray, following: IntArray, radius: float, turns: FloatArray, moves: FloatArray, other: FloatArray,
     their_following: IntArray, their_radius: float, their_turns: FloatArray, their_moves: FloatArray, found: FloatArray,
     points: FloatArray, flag: FlagArray,
-) -> None:  # fmt: skip
-    """Fill found (n, 3) with what `_nearest` returns for each pose of the second; the first has as many poses, or one.
-    The points are those of the last. Returns early when the flag is raised."""
+) -> tuple[float, int, int]:  # fmt: skip
+    """Return what `_nearest` does under the last pose of the second, whose points are written too, and fill found with
+    the distance under each, where it is not empty; the first has as many poses, or one.
+
+    Stops early when the flag is raised.
+    """
     n, m, k = len(following), len(their_following), _n_rows(following)
     room = np.empty((k + _n_rows(their_following), 4))
     at, boxes, their_at, their_boxes = room[:n], room[n:k], room[k : k + m], room[k + m :]
-    error, reach = 0.0, np.inf
-    for item in range(len(found)):
+    error, reach, nearest = 0.0, np.inf, (UNSURE, -1, -1)
+    for item in range(len(their_turns)):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
-            return
+            break
         if item < len(turns):
             error, reach = place(vertices, following, turns[item], moves[item], at, boxes)
         their_error, their_reach = place(
@@ -150,5 +153,7 @@ def nearest_under_poses(
         )
         a = Placed(at, following, boxes, error, reach)
         b = Placed(their_at, their_following, their_boxes, their_error, their_reach)
-        distance, first, second = _nearest(a, b, radius, their_radius, points)
-        found[item, 0], found[item, 1], found[item, 2] = distance, first, second
+        nearest = _nearest(a, b, radius, their_radius, points)
+        if len(found) > 0:
+            found[item] = nearest[0]
+    return nearest
