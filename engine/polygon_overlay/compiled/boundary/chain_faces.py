@@ -113,7 +113,7 @@ def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> in
 
 
 @merged
-def test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
+def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
     """Return e if it is above v and nearer than ``nearest``, else ``nearest``."""
     x = edges.x
     b = edges.after[e]
@@ -148,7 +148,7 @@ def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
-            nearest = test_edge(edges, v, names[tree.places[place]], nearest)
+            nearest = _test_edge(edges, v, names[tree.places[place]], nearest)
     return nearest
 
 

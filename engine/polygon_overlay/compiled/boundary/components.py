@@ -1,4 +1,4 @@
-"""Components of rings, each joined to the face it lies in: by boxes first, by the edge above it where that is open.
+"""Components of rings, each joined to the face it lies in: by boxes first, by the edge above it where these hold it.
 
 A component lies in a face of another only if its box lies in the other's. Where no box holds its own it is in the
 unbounded face. Else the edge above its last vertex is looked for, among those of the components whose boxes do: what is
@@ -10,8 +10,6 @@ of them, its box would hold that edge's component's, and so this one's.
     |  []   []   []   []    |     windows in a wall: each looks at the wall's edges, none at other windows
     |  []   []   []   []    |
     '-----------------------'
-
-Few edges are looked at one by one, those of large components by a tree over the edges of all that hold another.
 """
 
 from __future__ import annotations
@@ -22,19 +20,13 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import inline, merged
-from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING, edge_above, half_below, test_edge
+from engine.arrays import FlagArray, Int32Array, IntArray
+from engine.jit import inline
+from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING, edge_above, half_below
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import LEAF, OFTEN, POLL, RUN, BoxTree, box_holds, build_tree, leaves_of
 from engine.polygon_overlay.compiled.loading import Given
-from engine.predicates.error_free import workspace
 
-_SMALL: Final = 32
-"""Edges of a component up to which each is looked at."""
-_TOGETHER: Final = 16
-"""Components, neighbours in the plane, for which those that hold them are looked for at once."""
-TOO_MANY: Final = -2
 _HOLDS: Final = 1
 _IS_OPEN: Final = 2
 """States of a component: its box holds another's; the edge above it is not known yet."""
@@ -82,45 +74,14 @@ def _box_of(edges: Edges, components: Components, k: int) -> tuple[float, float,
 
 
 @inline
-def _test_component(edges: Edges, marks: FlagArray, components: Components, v: int, k: int, nearest: int) -> int:
-    """Return what is nearest above vertex v, of the edges of component k and ``nearest``, or TOO_MANY."""
-    ring, n = components.ring[k], 0
-    while ring >= 0:  # bound: the rings of the component
-        first = components.first[ring]
-        last = edges.before[first]
-        n += last + 1 - first
-        if n > _SMALL:
-            return TOO_MANY
-        for e in range(first, last + 1):
-            if not marks[e] & RUN:
-                nearest = test_edge(edges, v, e, nearest)
-        ring = components.following[ring]
-    return nearest
-
-
-@merged
-def _may_hold(boxes: FloatArray, i: int, low: Any, high: Any) -> bool:
-    """Tell whether a box reaches beyond the innermost of some boxes' sides, as one that holds any of them does."""
-    return (boxes[i, 0] <= low[0]) & (boxes[i, 1] >= high[0]) & (boxes[i, 2] <= low[1]) & (boxes[i, 3] >= high[1])
-
-
-@inline
-def _look_in_boxes(edges: Edges, components: Components, begin: int, n: int, tree: BoxTree, above: Any) -> None:
-    """Set ``above`` to the edges next above the components at places ``begin`` to begin + 15, or NOTHING, if those
-    whose boxes hold theirs are small; else their states are open."""
-    stack, n_leaves, boxes, places = tree.stack, leaves_of(n), tree.boxes, tree.places
-    size, low, high = min(_TOGETHER, n - begin), workspace(2), workspace(2)
-    low[0] = low[1] = -np.inf
-    high[0] = high[1] = np.inf
-    for j in range(size):
-        k, above[j] = places[begin + j], NOTHING
-        low[0], high[0] = max(low[0], boxes[k, 0]), min(high[0], boxes[k, 1])
-        low[1], high[1] = max(low[1], boxes[k, 2]), min(high[1], boxes[k, 3])
+def _look_in_boxes(components: Components, k: int, n: int, tree: BoxTree) -> None:
+    """Mark the components whose boxes hold that of component k, and k if there are any."""
+    stack, n_leaves, boxes, state = tree.stack, leaves_of(n), tree.boxes, components.state
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
         node = stack[depth, 0]
-        if not _may_hold(tree.nodes, node, low, high):
+        if not box_holds(tree.nodes, node, boxes, k):
             continue
         if node < n_leaves:
             stack[depth, 0], stack[depth + 1, 0] = 2 * node + 1, 2 * node
@@ -128,16 +89,10 @@ def _look_in_boxes(edges: Edges, components: Components, begin: int, n: int, tre
             continue
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
-            other = places[place]
-            for j in range(size if _may_hold(boxes, other, low, high) else 0):
-                k = places[begin + j]
-                if other == k or not box_holds(boxes, other, boxes, k):
-                    continue
-                components.state[other] |= _HOLDS
-                v, nearest = components.highest[components.ring[k]], int(above[j])
-                found = _test_component(edges, tree.marks, components, v, other, nearest)
-                components.state[k] |= _IS_OPEN * (found == TOO_MANY)
-                above[j] = nearest if found == TOO_MANY else found
+            other = tree.places[place]
+            if other != k and box_holds(boxes, other, boxes, k):
+                state[other] |= _HOLDS
+                state[k] |= _IS_OPEN
 
 
 @inline
@@ -170,54 +125,35 @@ def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int, int], stop
     vertices, rings, cycles and runs.
     """
     n, n_rings, n_cycles, n_runs = sizes
-    given, tree, faces, components = w.given, w.tree, w.faces, w.components
+    given, tree, faces, components, stars = w.given, w.tree, w.faces, w.components, w.stars
     for i in range(n_cycles + 1):
         if i & POLL == 0 and stop[0]:
             return
         faces.joined[i] = faces.regions[i] = i
-    edges, boxes, endless = given.edges, tree.boxes, float("inf")
+    edges, boxes, points, m = given.edges, tree.boxes, w.unions.points, 0
     n_components = _find_components(given, w.unions.rings, n, n_rings, components)
-    for k in range(n_components if n_components > 1 else 0):
-        boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = _box_of(edges, components, k)
-        if n_runs > 0:  # what is left out may be anywhere
-            boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = -endless, endless, -endless, endless
     if n_components > 1:
+        for k in range(n_components):
+            boxes[k, 0], boxes[k, 1], boxes[k, 2], boxes[k, 3] = _box_of(edges, components, k)
+            if n_runs > 0:  # what is left out may be anywhere
+                boxes[k, 0] = boxes[k, 2] = -np.inf
+                boxes[k, 1] = boxes[k, 3] = np.inf
         build_tree(tree, n_components, stop)
-    else:
-        tree.places[0] = 0
-    n_open, above = 0, workspace(_TOGETHER)
-    for place in range(n_components):
-        j = place % _TOGETHER
-        if j == 0:  # order: neighbours in the plane look at the same nodes
+        for place in range(n_components):  # order: neighbours in the plane look at the same nodes
             if stop[0]:
                 return
-            _look_in_boxes(edges, components, place, n_components, tree, above)
-        k = tree.places[place]
-        if components.state[k] & _IS_OPEN:
-            n_open += 1
-            continue
-        top = components.highest[components.ring[k]]
-        _join_one(w, top, int(above[j]), n_cycles)
-    if n_open == 0:
-        return
-    m = _gather_edges(edges, components, n_components, tree, names)
-    build_tree(tree, m, stop)
+            _look_in_boxes(components, tree.places[place], n_components, tree)
+        m = _gather_edges(edges, components, n_components, tree, names)
+    if m > 0:
+        build_tree(tree, m, stop)
     for k in range(n_components):
         if k & OFTEN == 0 and stop[0]:
             return
+        top, beyond, above = components.highest[components.ring[k]], n_cycles, NOTHING
         if components.state[k] & _IS_OPEN:
-            top = components.highest[components.ring[k]]
             above = edge_above(edges, tree, names, top, m)
-            _join_one(w, top, above, n_cycles)
-
-
-@inline
-def _join_one(w: Any, top: int, above: int, n_cycles: int) -> None:
-    """Join the outer cycle at the last vertex of a component to the face below the edge above it."""
-    faces, stars, points = w.faces, w.stars, w.unions.points
-    node = stars.node_of[root_of(points, top)]
-    outer, beyond = faces.cycle[stars.half[stars.ends[node] - 1]], n_cycles
-    if above != NOTHING:
-        beyond = faces.cycle[half_below(w.given.edges, w.events, w.along, points, w.chains, above, top)]
-    unite(faces.joined, outer, beyond)
-    unite(faces.regions, outer, beyond)
+        if above != NOTHING:
+            beyond = faces.cycle[half_below(edges, w.events, w.along, points, w.chains, above, top)]
+        outer = faces.cycle[stars.half[stars.ends[stars.node_of[root_of(points, top)]] - 1]]
+        unite(faces.joined, outer, beyond)
+        unite(faces.regions, outer, beyond)
