@@ -121,32 +121,6 @@ def load_convex(
 
 
 @inline
-def _are_apart(edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int) -> bool:
-    """Tell whether a lower chain is surely under an upper one: it is all along, if it is where both begin and end.
-
-    For the one is convex, the other concave. Edges i and j are the first that have an x in common. Vertical edges are
-    the first of an upper chain and the last of a lower one, so that there too the ends are what counts.
-    """
-    x, y = edges.x, edges.y
-    if i_step < 0:
-        i, i_end, j, j_end = j, j_end, i, i_end
-    if x[i] < x[j]:
-        left_is_sure = _is_left(x[i], y[i], x[i + 1], y[i + 1], x[j], y[j])
-    else:
-        left_is_sure = _is_left(x[j - 1], y[j - 1], x[j], y[j], x[i], y[i])
-    if not left_is_sure:
-        return False
-    p, q = i_end, j_end
-    while x[p - 1] > x[q]:  # bound: edge i begins no further right than chain j ends
-        p -= 1
-    while x[q + 1] > x[p]:
-        q += 1
-    if x[p] < x[q]:
-        return _is_left(x[q], y[q], x[q + 1], y[q + 1], x[p], y[p])
-    return x[q] < x[p] and _is_left(x[p - 1], y[p - 1], x[p], y[p], x[q], y[q])
-
-
-@inline
 def _enter_passage(edges: Edges, e: int, f: int, passages: Passages) -> int:
     """Enter the crossing of two edges, if they cross; return how many, or GENERAL."""
     x, y = edges.x, edges.y
@@ -182,8 +156,6 @@ def _find_passages(
     while j != j_end and x[j + j_step] < x[i]:
         j += j_step
     if i == i_end or j == j_end:
-        return 0
-    if i_step != j_step and _are_apart(edges, i, i_end, i_step, j, j_end):
         return 0
     n_found = 0
     for k in range((i_end - i) * i_step + (j_end - j) * j_step):  # each turn ends an edge of one chain
