@@ -26,7 +26,7 @@ from engine.arrangement.union_find import root_of, unite
 from engine.arrays import FlagArray, FloatArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
-from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, FEW, BoxTree, begin_pairs, boxes_meet, next_pairs
+from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, BoxTree, begin_pairs, boxes_meet, next_pairs
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 
@@ -245,7 +245,7 @@ def find_contacts(
     are_far = True
     depth = begin_pairs(tree, n, stop)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
-        found, depth = (_few_pairs(edges, tree, n), 0) if n <= FEW else next_pairs(tree, n, depth)
+        found, depth = next_pairs(tree, n, depth)
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
             b, d = after[i], after[j]
@@ -285,28 +285,6 @@ def find_contacts(
             _put_in_doubt(tree.marks, i, j)
             are_far = are_far and (b == j or d == i) and not unions.is_node[b if b == j else i]  # else they fold
     return Contacts(n_events, n_crossings, n_exact, are_far)
-
-
-@inline
-def _few_pairs(edges: Edges, tree: BoxTree, n: int) -> int:
-    """Write the pairs of boxes that meet, of so few that all fit, but for edges that follow one another and turn
-    (BENT); return how many."""
-    boxes, marks, pairs = tree.boxes, tree.marks, tree.pairs
-    found = 0
-    for i in range(n):
-        x_min, x_max, y_min, y_max = boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3]
-        begin = i + 2 if edges.after[i] == i + 1 and marks[i + 1] & BENT else i + 1
-        last = edges.before[i] if marks[i] & BENT else i  # of the ring, where i is its first
-        for j in range(begin, n):
-            pairs[found, 0], pairs[found, 1] = i, j
-            found += (  # as boxes_meet, of one that is loaded once
-                (x_min <= boxes[j, 1])
-                & (boxes[j, 0] <= x_max)
-                & (y_min <= boxes[j, 3])
-                & (boxes[j, 2] <= y_max)
-                & (j != last)
-            )
-    return found
 
 
 @merged
