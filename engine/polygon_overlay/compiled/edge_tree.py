@@ -38,7 +38,8 @@ FEW: Final = 40
 """Boxes up to which all pairs are looked at: fewer steps than a tree, and no more pairs than a portion."""
 PORTION: Final = 2048
 """Pairs at once: some 50 us of exact tests."""
-_DIGITS: Final = 2048
+_NUMBER: Final = 31
+"""Bits of the number of a box, below those of its place on the curve."""
 _STEPS: Final = 1 << 16
 """Steps of the walk at once, about a millisecond."""
 ANYWHERE: Final = 2 + 4 + 8 + 16
@@ -118,7 +119,7 @@ def _spread(bits: int) -> int:
 
 
 @allocating
-def order_boxes(boxes: FloatArray, n: int, places: Any, stop: FlagArray) -> bool:
+def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
     """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order.
 
     Only the lower left corners are looked at.
@@ -141,32 +142,18 @@ def order_boxes(boxes: FloatArray, n: int, places: Any, stop: FlagArray) -> bool
     by_x, by_y = 65535.0 / wide if wide > 0.0 else 0.0, 65535.0 / high if high > 0.0 else 0.0
     for k in range(n):
         x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
-        keys[k] = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
-    spare_keys, spare, counts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(_DIGITS + 1, np.int64)
-    for shift in (0, 11, 22):  # the last digit first: each pass keeps the order of those before it
-        counts[:] = 0
-        for k in range(n):
-            if k & POLL == 0 and stop[0]:
-                return True
-            counts[((keys[k] >> shift) & (_DIGITS - 1)) + 1] += 1
-        for digit in range(_DIGITS):
-            counts[digit + 1] += counts[digit]
-        for k in range(n):
-            if k & POLL == 0 and stop[0]:
-                return True
-            digit = (keys[k] >> shift) & (_DIGITS - 1)
-            at = counts[digit]
-            spare_keys[at], spare[at] = keys[k], places[k]
-            counts[digit] = at + 1
-        for k in range(n):
-            keys[k], places[k] = spare_keys[k], spare[k]
+        key = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
+        keys[k] = key << _NUMBER | k
+    keys.sort()
+    for k in range(n):
+        places[k] = keys[k] & ((1 << _NUMBER) - 1)
     return True
 
 
 @inline
 def build_tree(tree: BoxTree, n: int, stop: FlagArray) -> None:
     """Fill the nodes, their marks and the places of the first n boxes."""
-    fill_nodes(tree, n, ANYWHERE if order_boxes(tree.boxes, n, tree.places, stop) else 0, stop)
+    fill_nodes(tree, n, ANYWHERE if order_boxes(tree.boxes, n, tree.places) else 0, stop)
 
 
 @inline

@@ -112,7 +112,7 @@ def load_rings(
         for k in range(last_ring - first_ring):
             first = offsets[first_ring + k]
             tree.boxes[k, 0], tree.boxes[k, 2] = vertices[first, 0], vertices[first, 1]
-        order_boxes(tree.boxes, last_ring - first_ring, order, stop)
+        order_boxes(tree.boxes, last_ring - first_ring, order)
     x_min, x_max, y_min, y_max = box
     x, y, origins = given.edges.x, given.edges.y, given.origins
     safe = True
@@ -224,7 +224,7 @@ def build_edge_tree(edges: Edges, n: int, n_rings: int, order: IntArray, tree: B
             corners[ring, 0] = min(corners[ring, 0], boxes[e, 0])
             corners[ring, 2] = min(corners[ring, 2], boxes[e, 2])
         at = last + 1
-    order_boxes(corners, n_rings, order, stop)
+    order_boxes(corners, n_rings, order)
     at = 0
     for k in range(n_rings):
         for e in range(starts[order[k]], edges.before[starts[order[k]]] + 1):

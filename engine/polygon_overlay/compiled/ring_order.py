@@ -2,14 +2,13 @@
 
 So they are left in the output, with the source of each vertex, and evidence about rings.
 
-The first vertex of a ring is its leftmost, then lowest; rings are compared vertex by vertex from there on. Many are
-first put where its coordinates say, as if these were evenly spread, the last digit first: that leaves little to merge.
+The first vertex of a ring is its leftmost, then lowest; rings are compared vertex by vertex from there on.
 """
 
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,16 +23,11 @@ from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 from engine.predicates.orientation import orient2d
 from engine.types import Point2
 
-_FEW: Final = 64
-"""Rings that are merged only."""
-_MOST_PARTS: Final = 1 << 14
-"""Parts of a range, whose counts the cache still holds."""
-
 Output = namedtuple("Output", "vertices sources rings pieces evidence")
 """Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
 that begin with 0, evidence (m, 2) int64: a ring, and one that it comes from."""
 
-Ranking = namedtuple("Ranking", "start x y is_hole piece order spare counts")
+Ranking = namedtuple("Ranking", "start x y is_hole piece order spare")
 """By ring: index of its first vertex, its place, whether it is a hole, rank of its piece; order: the rings in order."""
 
 
@@ -62,43 +56,12 @@ def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int)
 
 
 @inline
-def _spread(ranking: Ranking, keys: Any, n: int) -> None:
-    """Put the first n entries of ``ranking.order`` in the order of the parts of equal width that their keys are in.
-
-    Entries of one part stay as they are.
-    """
-    order, spare, counts = ranking.order, ranking.spare, ranking.counts
-    least = most = keys[order[0]]
-    for k in range(n):
-        spare[k] = order[k]
-        least, most = min(least, keys[order[k]]), max(most, keys[order[k]])
-    n_parts = min(n, _MOST_PARTS)
-    scale = (n_parts - 1) / (most - least) if most > least else 0.0
-    counts[:n_parts] = 0
-    for k in range(n):
-        counts[int((keys[spare[k]] - least) * scale)] += 1
-    at = 0
-    for part in range(n_parts):
-        size = counts[part]
-        counts[part], at = at, at + size
-    for k in range(n):
-        part = int((keys[spare[k]] - least) * scale)
-        order[counts[part]] = spare[k]
-        counts[part] += 1
-
-
-@inline
 def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: FlagArray) -> None:
     """Sort the first n entries of ``ranking.order``: merging runs of doubling length that are not in order.
 
     is_by_piece: pieces differ.
     """
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
-    if n > _FEW:
-        _spread(ranking, ranking.y, n)
-        _spread(ranking, first_x, n)
-        if is_by_piece:
-            _spread(ranking, ranking.piece, n)
     width = 1
     while width < n:  # bound: log n turns
         for low in range(0, n - width, 2 * width):

@@ -43,7 +43,7 @@ Buffers = namedtuple(
     "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
-_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 8, 5, 18
+_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 8, 5, 17
 _HALF_INTEGERS, _HALF_LABELS, _HALF_OCTETS = 11, 2, 4
 _POINT_FLOATS, _POINT_INTEGERS, _POINT_CODES, _POINT_OCTETS = 2, 6, 2, 4
 """How many rows there are of each."""
@@ -241,9 +241,9 @@ def rows_of(words: IntArray) -> Workspace:
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[4], h[5], hb[1], hb[2], c[16]),
         components=Components(r[3], r[4], r[5], r[6], r[7]),
-        holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[17]),
+        holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[9]),
         walk=Walk(h[6], c[8]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
-        ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8], c[9]),  # in place of chains and events
+        ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8]),  # in place of chains and events
     )  # fmt: skip

@@ -36,9 +36,7 @@ def test_pieces_by_shells_and_holes_after_their_shell(seed: int) -> None:
     n, points = len(rings), np.array([vertex for _, ring in rings for vertex in ring])
     offsets, regions = np.cumsum([0, *(len(ring) for _, ring in rings)]), np.array([region for region, _ in rings])
     found = Rings(np.arange(len(points)), np.arange(len(points)), np.zeros(len(points), np.uint8), offsets, regions)
-    ranking = Ranking(
-        *(np.zeros(n, kind) for kind in (np.int64, float, float, np.uint8, np.int64, np.int64, np.int64, np.int64))
-    )
+    ranking = Ranking(*(np.zeros(n, kind) for kind in (np.int64, float, float, np.uint8, np.int64, np.int64, np.int64)))
     x, y = np.ascontiguousarray(points.T)
     none = np.zeros(0)
     rounded = Rounded(x, y, np.zeros(len(x), np.uint8), none, none, none)
@@ -55,9 +53,7 @@ def holes_among(rings: list[list[tuple[float, float]]]) -> list[bool] | None:
     found = Rings(
         np.arange(len(points)), np.arange(len(points)), np.ones(len(points), np.uint8), offsets, np.zeros(n, np.int64)
     )
-    ranking = Ranking(
-        *(np.zeros(n, kind) for kind in (np.int64, float, float, np.uint8, np.int64, np.int64, np.int64, np.int64))
-    )
+    ranking = Ranking(*(np.zeros(n, kind) for kind in (np.int64, float, float, np.uint8, np.int64, np.int64, np.int64)))
     x, y = (np.ascontiguousarray(axis) for axis in points.T)
     none = np.zeros(0)
     rounded = Rounded(x, y, np.zeros(len(x), np.uint8), none, none, none)
