@@ -16,8 +16,6 @@ from engine.cold_start import fill_cache, note_full
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.triangles import collide_triangles
-from engine.containment.cells.build import cells_of
-from engine.containment.cells.order import gathered, order_by_cell
 from engine.containment.locate import locate
 from engine.containment.methods.rational_locate import rational_location
 from engine.containment.posed_locators import posed_locator
@@ -117,24 +115,10 @@ def _locate(dimension: int) -> None:
 
 
 def _warm_cells() -> None:
-    """Ask two balls of 560 faces and a ring of 300 edges about so many points that cells pay, and lists get long."""
-    turn, rise = np.linspace(0, 2 * np.pi, 20, endpoint=False), np.linspace(-1, 1, 15)
-    belts = np.array([[r * np.cos(turn), r * np.sin(turn), 0 * turn + z] for r, z in zip(1.1 - rise**2, rise)])
-    vertices = np.concatenate([belts.transpose(0, 2, 1).reshape(-1, 3), [[0, 0, -1.0], [0, 0, 1.0]]])
-    faces = []
-    for k in range(20):
-        a, b = k, (k + 1) % 20
-        for belt in range(0, 20 * 14, 20):
-            faces += [[belt + a, belt + b, belt + 20 + b], [belt + a, belt + 20 + b, belt + 20 + a]]
-        faces += [[300, b, a], [301, 280 + a, 280 + b]]
-    many = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3))
-    tiny = [[301 + 1 + vertex for vertex in face] for face in faces]  # a detail, for which cells go deep
-    ball = Polyhedron(np.concatenate([vertices, 1e-3 * vertices + 2.0]), faces + tiny)
-    locate(many, ball)
-    locate_scene(many, [ball])  # so many that level 0 of its cells pays
-    points = as_points(many, 3)
-    with Budget() as budget:  # large batches near large meshes are asked in the order of their cells
-        gathered(points, order_by_cell(points, cells_of(ball, budget), budget))
+    """Ask a cube and a ring of 300 edges about so many points that cells pay."""
+    many, cube = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3)), _cube()
+    locate(many, cube)
+    locate_scene(many, [cube])
     around = np.linspace(0, 2 * np.pi, 300, endpoint=False)
     locate(np.ascontiguousarray(many[:, :2]), Polygon([np.column_stack([np.cos(around), np.sin(around)])]))
 

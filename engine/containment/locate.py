@@ -11,7 +11,6 @@ import numpy as np
 
 from engine.arrays import BoolArray, Int8Array
 from engine.containment.at_once import located_at_once
-from engine.containment.cells.order import gathered
 from engine.containment.locators import locator_of
 from engine.errors import NotFiniteError
 from engine.running.budget import Budget, Cancel
@@ -80,18 +79,11 @@ def locate(
     with Budget(deadline, cancel) as budget:
         budget.check()
         locator = choice.chosen(len(array), budget)
-        order = None if locator.order is None else locator.order(array, budget)
 
         def task(start: int, stop: int) -> None:
             if locator.decisions != "exact":
                 check_finite(array[start:stop], ("points",))
-            if order is None:
-                counts = locator.fill(array[start:stop], locations[start:stop], budget)
-            else:
-                places = order[start:stop]
-                located = np.empty(stop - start, np.int8)
-                counts = locator.fill(gathered(array, places), located, budget)
-                locations[places] = located
+            counts = locator.fill(array[start:stop], locations[start:stop], budget)
             beyond.append(counts.beyond)
             rational.append(counts.rational)
 

@@ -14,7 +14,6 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import locate_by_cells
-from engine.containment.cells.order import order_if_it_pays
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
@@ -61,8 +60,6 @@ class Locator(NamedTuple):
     decisions: Literal["exact", "float64"] = "exact"
     for_batch: Callable[[int, Budget], Locator] | None = None
     """Returns the locator to use for so many points, where that depends: it may build a structure that pays."""
-    order: Callable[[FloatArray, Budget], IntArray | None] | None = None
-    """Returns the order in which a large batch is best asked, None for as it is."""
     direct: tuple[Any, ...] = ()
     """The kernel, and what stands between points and locations among its arguments, where that is all there is."""
     is_long: bool = False
@@ -203,12 +200,7 @@ def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
     by_rays = by_kernel("ray_parity", locate_by_tree, solid, EXACT, tree_of(solid, budget.check))
     if choice != CELLS:
         return by_rays
-    cells = cells_of(solid, budget)
-    return Locator(
-        "segment_parity",
-        _filled_by(locate_by_cells, cells, rest=by_rays.fill),
-        order=lambda points, budget: order_if_it_pays(points, cells, budget),
-    )
+    return Locator("segment_parity", _filled_by(locate_by_cells, cells_of(solid, budget), rest=by_rays.fill))
 
 
 def implicit_locator(solid: Implicit) -> Locator:

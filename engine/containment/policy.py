@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from engine.containment.cells.top import can_have_cells, lattice_of
+from engine.containment.cells.lattice import can_have_cells, lattice_of
 from engine.containment.prepared.rings import edges_met
 from engine.containment.prepared.triangle_tree import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, faces_over
 from engine.running.budget import Budget
@@ -37,7 +37,7 @@ _CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 3
 """Points from which cells are built on ordinary meshes, where a tree has taken half as long by then."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 1_500.0
 _ENTRIES_A_FACE, _CELLS_AN_ENTRY = 3.0, 900.0
-"""On level 0; and what more of them cost, with all that deeper levels make of them."""
+"""And what more of them cost."""
 
 _IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
 _SLABS, _SLABS_AN_EDGE = 40_000.0, 15.0
@@ -46,7 +46,7 @@ _IN_SLABS: Final = 50.0
 
 
 def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
-    """Return what cells cost to build: by how many the faces reach into on level 0."""
+    """Return what cells cost to build: by how many the faces reach into."""
 
     def find() -> float:
         _, entries = lattice_of(solid, budget)

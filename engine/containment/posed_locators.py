@@ -50,7 +50,7 @@ def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
     if row.posed is not None:
         made: Locator = row.posed(solid, pose)
         return made
-    return locator_of(solid)._replace(fill=rational_half(solid, pose), for_batch=None, order=None, direct=())
+    return locator_of(solid)._replace(fill=rational_half(solid, pose), for_batch=None, direct=())
 
 
 def posed_csg(solid: Csg, pose: Pose) -> Locator:

@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.containment.at_once import located_at_once
-from engine.containment.cells.top import MOST_FACES, top_cells_if_they_pay
+from engine.containment.cells.build import MOST_FACES, sides_if_they_pay
 from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
 from engine.containment.prepared.triangle_tree import tree_of
@@ -236,7 +236,7 @@ def _build_trees(standing: Standing, asked: IntArray, budget: Budget, workers: i
     def build(start: int, stop: int) -> None:
         for solid, n_asked in chosen[start:stop]:
             tree_of(solid, budget.check)
-            top_cells_if_they_pay(solid, n_asked, budget)
+            sides_if_they_pay(solid, n_asked, budget)
 
     run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
     return bool(chosen) and standing.has_new_trees([solid for solid, _ in chosen])

@@ -73,7 +73,7 @@ class LocateTables(NamedTuple):
     ys: FloatArray
     cell_frames: FloatArray
     cell_places: IntArray
-    """``(n, 6)`` and ``(n, 4)``: what `TopCells` has of a polyhedron, 0 where there is none."""
+    """``(n, 6)`` and ``(n, 4)``: what `Sides` has of a polyhedron, 0 where there is none."""
     addresses: IntArray
     sizes: IntArray
     places: FloatArray
@@ -185,8 +185,8 @@ class Kinds:
 
 
 def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
-    """Return of polyhedra the cells of level 0 and the trees, of those that have them by now."""
-    cells, trees = [solid.kept("top_cells") for solid in solids], [solid.kept("tree") for solid in solids]
+    """Return of polyhedra the sides of their cells and the trees, of those that have them by now."""
+    cells, trees = [solid.kept("sides") for solid in solids], [solid.kept("tree") for solid in solids]
     lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_line(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())
     return (

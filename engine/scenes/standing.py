@@ -189,7 +189,7 @@ class Standing(Preparing):
     def has_new_trees(self, solids: list[Polyhedron]) -> bool:
         """Tell whether tables lack what is prepared of some solids by now; then they are made again when asked for."""
         known: set[int] = self.base.prepared("trees", lambda: set())
-        new = {2 * id(solid) + (solid.kept("top_cells") is not None) for solid in solids} - known
+        new = {2 * id(solid) + (solid.kept("sides") is not None) for solid in solids} - known
         if new:
             known |= new
             for bodies in (self.base, self.kept("few"), self):

@@ -10,7 +10,7 @@ import pytest
 
 from engine import Polyhedron, locate
 from engine.containment import locators
-from engine.containment.cells.top import can_have_cells
+from engine.containment.cells.lattice import can_have_cells
 from engine.containment.policy import CELLS, LISTS, PASS
 from tests.hard.points import STORED, generated_solids, hard_points
 from tests.reference.many_points import locate_points

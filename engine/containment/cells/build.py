@@ -1,50 +1,49 @@
-"""Builds the cells of a polyhedron, level by level, with the budget of the call that pays for it.
+"""Builds the cells of a polyhedron, with the budget of the call that pays for it.
 
-Cost: linear in the faces and the entries, 0.6 to 1.5 us a face on one thread and 200 to 600 bytes; of needles 7 to
-12 us and 2,200 bytes.
+Two cells without triangles that share a wall lie on one side of the surface, so only the first of each such group, in
+scanning order, is asked about, by a vertical ray; the others copy. So are the reference points of the others.
+
+Cost: linear in the faces and the entries, some 0.5 us a face on one thread and 150 to 500 bytes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, Int8Array, Int32Array, IntArray
+from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.containment.cells.lattice import (
-    LEVELS,
-    PARTS,
-    SPLIT,
-    UNKNOWN,
+    PLACE,
     Lattice,
-    Level,
     Mesh,
-    keep_of_details,
-    list_parts,
-    list_top,
+    can_have_cells,
+    count_triangles,
+    lattice_of,
+    list_triangles,
+    reference_point,
+    scaled_difference,
 )
-from engine.containment.cells.locate import CODE_SHIFT, INSIDE_CELL, MIXED_CELL, OUTSIDE_CELL
-from engine.containment.cells.status import fill_leaves, locate_parts
-from engine.containment.cells.top import ask_cells, lattice_of, top_places, top_statuses
+from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.prepared.triangle_tree import TriangleTree, cost_in_tree, tree_of
-from engine.lanes.cells import groups_of
+from engine.jit import inline, kernel
+from engine.lanes.cells import ROWS, groups_of, set_entry, set_nothing
 from engine.lanes.tracing import LANES
+from engine.predicates.vectors import corners_of
 from engine.running.budget import Budget
 from engine.solids.polyhedron import Polyhedron
+from engine.types import UNDECIDED
 
-_LONG_ON_TOP, _LONG_IN_SMALL, _LONG = 24, 8, 32
-"""Lists longer than this are cut into parts: on level 0, there in meshes so small that the memory of short lists stays
-in the cache, and below. Finer parts take more memory than they save time."""
-_SMALL_MESH: Final = 1 << 12
-_MOST_ENTRIES: Final = 24
-"""Entries a face (and 2^14 more) above which a level is not cut further."""
+MIXED_CELL: Final = -1
+"""Code of a cell that is left to the tree: its side is not known, or its list costs more than the tree."""
+_UNKNOWN: Final = 0
 _GROUP: Final = 8.0
-"""Nanoseconds that a group of a list costs a point: lists that cost more than the tree are left to it."""
+"""Nanoseconds that a group of a list costs a point."""
 _FEWEST_GROUPS: Final = 32
-_COARSE: Final = 2
-"""Cuts that every long list gets: deeper ones are for detail, where most triangles are smaller than the cell. What
-meets in a vertex or runs side by side is not told apart by finer cells."""
+MOST_FACES: Final = 1 << 14
+"""Of a solid whose sides serve scenes."""
+_PAYS_FROM, _PAYS_PER_FACE = 1 << 10, 2
+_AT_ONCE: Final = 4096
 
 
 class Cells(NamedTuple):
@@ -52,13 +51,23 @@ class Cells(NamedTuple):
 
     lattice: Lattice
     statuses: Int8Array
-    """(n + 1,) of level 0: the location of all points of a cell, UNDECIDED where its code says more, and last that of
-    points beyond the lattice; small enough to stay in the cache."""
+    """(n + 1,): the location of all points of a cell, UNDECIDED where a triangle may reach into it, and last that of
+    points beyond the lattice."""
     codes: Int32Array
-    """Level 0, then 64 a brick."""
-    n_levels: int
+    """(n,): of an UNDECIDED cell its first group, doubled, and whether its reference point is inside; MIXED_CELL."""
     groups: Float32Array
-    """(n, 14, 8): what leaves keep of their triangles (lanes/cells.py)."""
+    """(n_groups, 14, 8): what cells keep of their triangles (lanes/cells.py)."""
+
+
+class Sides(NamedTuple):
+    """What `side_in_cell` reads."""
+
+    frame: FloatArray
+    """``(6,)``: the low corner of the lattice, and cells to a unit."""
+    place: tuple[int, int, int, int]
+    """Address of `statuses`, and cells along each axis."""
+    statuses: Int8Array
+    """As `Cells` has them."""
 
 
 def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
@@ -68,94 +77,122 @@ def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
-    tree = tree_of(solid, budget.check)
-    lattice, _ = lattice_of(solid, budget)
+    tree, (lattice, _) = tree_of(solid, budget.check), lattice_of(solid, budget)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
-    level, index, found = _top_level(tree, mesh, budget)
-    codes, leaves = [], []
-    long_on_top = _LONG_IN_SMALL if len(tree.triangles) <= _SMALL_MESH else _LONG_ON_TOP
-    longest = LANES * max(_FEWEST_GROUPS, cost_in_tree(solid) / _GROUP)
-    n_groups = n_bricks = 0
-    for depth in range(LEVELS):
-        lengths = np.diff(level.firsts)
-        is_cut = lengths > (_LONG if depth else long_on_top)
-        if depth == LEVELS - 1 or len(level.lists) > _MOST_ENTRIES * len(tree.triangles) + (1 << 14):
-            is_cut[:] = False
-        elif depth >= _COARSE:
-            long = np.flatnonzero(is_cut)
-            keep_of_details(mesh, level, long, is_cut, budget.flag)
-            budget.check()
-        parents = np.flatnonzero(is_cut)
-        kept = np.flatnonzero(~is_cut & (level.statuses != UNKNOWN) & (lengths <= longest))
-        sizes = (lengths[kept] + LANES - 1) // LANES
-        starts = n_groups + np.cumsum(sizes) - sizes
-        code = np.full(len(found), MIXED_CELL, np.int32)
-        code[found == -1], code[found == 1] = OUTSIDE_CELL, INSIDE_CELL
-        code[index] = MIXED_CELL
-        code[index[kept]] = 4 * starts + 2 * (level.statuses[kept] > 0)
-        code[index[parents]] = 2 * (n_bricks + np.arange(len(parents))) + 1
-        n_groups, n_bricks = n_groups + int(sizes.sum()), n_bricks + len(parents)
-        codes.append(code)
-        leaves.append((level, kept, starts))
-        if not len(parents):
-            break
-        level, index, found = _next_level(tree, mesh, level, parents, budget)
-    groups = groups_of(n_groups)
-    for of_level in leaves:
-        fill_leaves(mesh, *of_level, groups, budget.flag)
-        budget.check()
-    return Cells(
-        lattice, np.append(np.minimum(codes[0], MIXED_CELL) + CODE_SHIFT, -1).astype(np.int8), np.concatenate(codes),
-        len(codes), groups,
-    )  # fmt: skip
-
-
-def _listed(
-    lister: Callable[[IntArray, Int32Array, bool], object], n: int, budget: Budget
-) -> tuple[IntArray, IntArray, IntArray, Int32Array]:
-    """Return the lengths of n lists, which of them are not empty, where those begin and the last ends, and the lists.
-
-    lister: counts, then fills, as `list_top` does.
-    """
-    counts = np.zeros(n, np.int64)
-    lister(counts, np.empty(0, np.int32), False)
-    budget.check()
+    counts = count_triangles(mesh, budget)
     ends = np.cumsum(counts)
     lists = np.empty(int(ends[-1]), np.int32)
-    lister(ends - counts, lists, True)
+    list_triangles(mesh, ends - counts, lists, True, budget.flag)
     budget.check()
-    index = np.flatnonzero(counts)
-    return counts, index, np.append(ends[index] - counts[index], ends[-1]), lists
-
-
-def _top_level(tree: TriangleTree, mesh: Mesh, budget: Budget) -> tuple[Level, IntArray, Int8Array]:
-    """Return level 0, the place of its cells among all, and the statuses of all, those without lists included."""
-    nx, ny, nz = mesh.lattice.n
-    counts, index, firsts, lists = _listed(lambda *rest: list_top(mesh, *rest, budget.flag), nx * ny * nz, budget)
-    found = top_statuses(tree, mesh.lattice, counts, False, budget)
-    places = top_places(mesh.lattice, index)
-    return Level(0, places, found[index], firsts, lists), index, found
-
-
-def _next_level(
-    tree: TriangleTree, mesh: Mesh, above: Level, parents: IntArray, budget: Budget
-) -> tuple[Level, IntArray, Int8Array]:
-    """Return the level below `above`, as `_top_level` does, of which all cells are the parts of `parents`."""
-    n = len(parents) * PARTS
-    counts, index, firsts, lists = _listed(
-        lambda *rest: list_parts(mesh, above, parents, *rest, budget.flag), n, budget
-    )
-    found = np.empty(n, np.int8)
-    groups = groups_of(int(np.diff(above.firsts)[parents].max() + LANES - 1) // LANES)
-    locate_parts(mesh, above, parents, counts, groups, found, budget.flag)
+    found = _sides_of(tree, lattice, counts, False, budget)
+    longest = LANES * max(_FEWEST_GROUPS, cost_in_tree(solid) / _GROUP)
+    leaves = np.flatnonzero((counts > 0) & (found != _UNKNOWN) & (counts <= longest))
+    last_groups = np.cumsum((counts[leaves] + LANES - 1) // LANES)
+    starts = np.append(0, last_groups)[:-1]
+    codes = np.full(len(counts), MIXED_CELL, np.int32)
+    codes[leaves] = 2 * starts + (found[leaves] > 0)
+    groups = groups_of(int(last_groups[-1]) if len(leaves) else 0)
+    fill_groups(mesh, leaves, starts, (ends - counts)[leaves], ends[leaves], lists, groups, budget.flag)
     budget.check()
-    unknown, depth = np.flatnonzero(found == UNKNOWN), above.depth + 1
-    found[unknown] = ask_cells(tree, mesh.lattice, _part_places(above.places[parents], unknown), depth, budget)
-    return Level(depth, _part_places(above.places[parents], index), found[index], firsts, lists), index, found
+    return Cells(lattice, _statuses(found, counts), codes, groups)
 
 
-def _part_places(places: Int32Array, parts: IntArray) -> Int32Array:
-    """Return the indices of parts on their level, given those of their parents on the level above."""
-    part = parts % PARTS
-    offset = np.stack([part % SPLIT, part // SPLIT % SPLIT, part // (SPLIT * SPLIT)], axis=1)
-    return np.ascontiguousarray(places[parts // PARTS] * SPLIT + offset, np.int32)
+def sides_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Sides | None:
+    """Return the sides of the cells of `solid` if the points asked in scenes so far pay for building them.
+
+    That takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us.
+    """
+    seen = solid.prepared("scene_points_seen", lambda: [0], budget.check)
+    seen[0] += n_points
+    n_faces = len(solid.triangles)
+    if n_faces > MOST_FACES or seen[0] < _PAYS_FROM + _PAYS_PER_FACE * n_faces:
+        return None
+    if not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
+        return None
+    return solid.prepared("sides", lambda: build_sides(solid, budget), budget.check)
+
+
+def build_sides(solid: Polyhedron, budget: Budget) -> Sides:
+    """Return the sides of the cells of `solid`. Raises what `Budget.check` raises."""
+    tree, (lattice, _) = tree_of(solid, budget.check), lattice_of(solid, budget)
+    counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget)
+    statuses = _statuses(_sides_of(tree, lattice, counts, True, budget), counts)
+    return Sides(np.array([*lattice.low, *lattice.scale]), (statuses.ctypes.data, *lattice.n), statuses)
+
+
+def _statuses(found: Int8Array, counts: IntArray) -> Int8Array:
+    return np.append(np.where((counts > 0) | (found == _UNKNOWN), UNDECIDED, found), -1).astype(np.int8)
+
+
+@kernel
+def label_empty(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
+    """Fill labels (nz * ny * nx,) int64 with the cell that each empty cell copies from, itself for one that is asked.
+
+    Cells with a list label themselves.
+    """
+    for cell in range(len(counts)):
+        labels[cell] = cell
+        if counts[cell] != 0:
+            continue
+        if cell % nx > 0 and counts[cell - 1] == 0:
+            labels[cell] = labels[cell - 1]
+        elif cell // nx % ny > 0 and counts[cell - nx] == 0:
+            labels[cell] = labels[cell - nx]
+        elif cell >= nx * ny and counts[cell - nx * ny] == 0:
+            labels[cell] = labels[cell - nx * ny]
+
+
+def _sides_of(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget) -> Int8Array:
+    """Return the sides of cells, by vertical rays: of all of an empty one, of the reference point of another one.
+
+    _UNKNOWN where that point is not in its cell, on the boundary, or not decided by the compiled ray. counts: lengths
+    of the cells' lists. only_empty: the other ones are not asked about.
+    """
+    (nx, ny, _), labels = lattice.n, np.empty(len(counts), np.int64)
+    label_empty(counts, nx, ny, labels)
+    asked = np.flatnonzero((labels == np.arange(len(labels))) & ((counts == 0) | (not only_empty)))
+    sides, no_blurs = np.zeros(len(counts), np.int8), np.zeros(_AT_ONCE)
+    for start in range(0, len(asked), _AT_ONCE):
+        cells = asked[start : start + _AT_ONCE]
+        places = np.stack([cells % nx, cells // nx % ny, cells // (nx * ny)], axis=1)
+        points, found = np.array(lattice.low) + (places + PLACE) * lattice.size, np.empty(len(cells), np.int8)
+        with np.errstate(all="ignore"):
+            locate_by_tree(read_only(points), no_blurs[: len(cells)], tree, found, budget.flag)
+        budget.check()
+        is_in_cell = (((points - lattice.low) * lattice.scale).astype(np.int64) == places).all(axis=1)
+        sides[cells] = np.where(is_in_cell & (np.abs(found) == 1), found, _UNKNOWN)
+    return sides[labels]
+
+
+@kernel
+def fill_groups(
+    mesh: Mesh, leaves: IntArray, starts: IntArray, firsts: IntArray, ends: IntArray, lists: Int32Array,
+    groups: Float32Array, flag: FlagArray,
+) -> None:  # fmt: skip
+    """Fill groups (n, 14, 8) with the lists of cells, each from the group in `starts`, about its reference point."""
+    nx, ny, _ = mesh.lattice.n
+    for item in range(len(leaves)):
+        if flag[0]:
+            break
+        cell = leaves[item]
+        reference = reference_point(mesh.lattice, cell % nx, cell // nx % ny, cell // (nx * ny))
+        _fill_list(mesh, lists[firsts[item] : ends[item]], reference, groups, starts[item])
+
+
+@inline
+def _fill_list(
+    mesh: Mesh, triangles: Int32Array, reference: tuple[float, ...], groups: Float32Array, first_group: int
+) -> None:
+    """Write the groups of a cell's triangles, in units of cells."""
+    scale, n_groups = mesh.lattice.scale, (len(triangles) + LANES - 1) // LANES
+    for place in range(n_groups * LANES):
+        row = groups[first_group + place // LANES, :, place % LANES]
+        row[ROWS - 1] = 1.0 if place // LANES == n_groups - 1 else 0.0
+        if place >= len(triangles):
+            set_nothing(row)
+            continue
+        a, b, c = corners_of(mesh.vertices, mesh.triangles, triangles[place])
+        set_entry(
+            row, scaled_difference(a, reference, scale), scaled_difference(b, reference, scale),
+            scaled_difference(c, reference, scale), scaled_difference(b, a, scale), scaled_difference(c, a, scale),
+        )  # fmt: skip

@@ -1,36 +1,43 @@
-"""The grid of cells over a polyhedron: where cells lie, and which triangles reach into them.
+"""The grid of cells over a polyhedron, and which triangles reach into which cell.
 
-Level 0 is a dense grid; a cell with a long list is cut into a brick of 4 x 4 x 4, and so on. Sizes are powers of two,
-so an index on the finest level, shifted right, is the index on a coarser one. An index is ``int((x - low) * scale)``,
-each step monotone, so the doubles of a cell are those between two borders; a triangle is listed in every cell from the
-index of its least to that of its largest coordinate, but where a separating axis proves that it stays outside
-(reach.py). The lists are conservative.
+Sizes are powers of two. An index is ``int((x - low) * scale)``, each step monotone, so the doubles of a cell are those
+between two borders; a triangle is listed in every cell from the index of its least to that of its largest coordinate,
+but where a separating axis proves that it stays outside (reach.py). The lists are conservative.
 """
 
 from __future__ import annotations
 
+from math import frexp, ldexp
 from typing import Any, Final, NamedTuple
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
+import numpy as np
+
+from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.containment.cells.reach import layer_reached, row_reached, walls_of
+from engine.containment.prepared.triangle_tree import TriangleTree, tree_of
 from engine.jit import inline, kernel
 from engine.predicates.vectors import corners_of
-from engine.types import Point3
+from engine.running.budget import Budget
+from engine.solids.polyhedron import Polyhedron
 
-LEVELS: Final = 12
-"""At most: 96 cells cut eleven times have indices below 2^30."""
-SPLIT: Final = 4
-"""Parts of a cell along each axis."""
-PARTS: Final = SPLIT**3
-_FINEST: Final = 2.0 ** (2 * (LEVELS - 1))
-UNKNOWN: Final = 0
-"""Status of a cell that is not known, or whose reference point lies on the surface or in another cell."""
 PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
 """Where the reference point lies in its cell: no symmetry that faces of a lattice might share."""
+_WANTED: Final = 4.0
+"""Cells along an axis for each triangle along an edge of a cube."""
+_MOST_CELLS: Final = 160.0
+"""Along an axis."""
+_FEWEST_CELLS: Final = 12
+_MOST_ENTRIES: Final = 12.0
+_FEW_ENTRIES: Final = 1 << 16
+"""Cells that list a triangle, in the mean, and in all, from which the grid is made coarser, to so many along an axis at
+least."""
+_SAMPLE: Final = 1024
+_RANGE: Final = 2.0**400
+"""Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
 
 
 class Lattice(NamedTuple):
-    """The cells of level 0; sizes are powers of two."""
+    """A grid of cells; sizes are powers of two."""
 
     low: tuple[float, float, float]
     scale: tuple[float, float, float]
@@ -47,145 +54,106 @@ class Mesh(NamedTuple):
     lattice: Lattice
 
 
-class Level(NamedTuple):
-    """The cells of one level that have lists."""
-
-    depth: int
-    places: Int32Array
-    """``(m, 3)`` indices on the level."""
-    statuses: Int8Array
-    """``(m,)`` side of the reference point: -1, 1, or UNKNOWN."""
-    firsts: IntArray
-    """``(m + 1,)``: where each cell's triangles begin in `lists`."""
-    lists: Int32Array
-
-
-class Block(NamedTuple):
-    """Cells of a level side by side: from which index on, how many along the axes, the number of the first."""
-
-    depth: int
-    x: int
-    y: int
-    z: int
-    nx: int
-    ny: int
-    nz: int
-    first: int
+@inline
+def index_of(value: float, low: float, scale: float) -> int:
+    """Return the index of a value that is not below `low`."""
+    return int((value - low) * scale)
 
 
 @inline
-def finest(value: float, low: float, scale: float) -> int:
-    """Return the index on the finest level of a value that is not below `low`."""
-    return int((value - low) * (scale * _FINEST))
+def reference_point(lattice: Lattice, x: int, y: int, z: int) -> Any:
+    """Return the reference point of a cell."""
+    low, size = lattice.low, lattice.size
+    return low[0] + (x + PLACE[0]) * size[0], low[1] + (y + PLACE[1]) * size[1], low[2] + (z + PLACE[2]) * size[2]
 
 
 @inline
-def parts_of(level: int) -> float:
-    """Return how many cells of a level there are to one of level 0 along an axis."""
-    return 1.0 if level == 0 else 4.0 if level == 1 else 16.0 if level == 2 else float(1 << 2 * level)
+def scaled_difference(a: Any, b: Any, scale: tuple[float, ...]) -> Any:
+    """Return a - b in units of cells: one rounding each."""
+    return (a[0] - b[0]) * scale[0], (a[1] - b[1]) * scale[1], (a[2] - b[2]) * scale[2]
 
 
 @inline
-def share_of(level: int) -> float:
-    """Return 1 / parts_of(level)."""
-    return 1.0 if level == 0 else 0.25 if level == 1 else 0.0625 if level == 2 else 1.0 / parts_of(level)
-
-
-@inline
-def reference_point(lattice: Lattice, x: int, y: int, z: int, level: int) -> Any:
-    """Return the reference point of a cell by its indices on a level."""
-    low, size, share = lattice.low, lattice.size, share_of(level)
-    return (
-        low[0] + (x + PLACE[0]) * (size[0] * share),
-        low[1] + (y + PLACE[1]) * (size[1] * share),
-        low[2] + (z + PLACE[2]) * (size[2] * share),
-    )
-
-
-@inline
-def scaled_difference(a: Any, b: Point3, scale: tuple[float, ...], parts: float) -> Any:
-    """Return a - b in units of the cells of a level: one rounding each."""
-    return ((a[0] - b[0]) * (scale[0] * parts), (a[1] - b[1]) * (scale[1] * parts), (a[2] - b[2]) * (scale[2] * parts))
-
-
-@inline
-def _list_triangle(mesh: Mesh, triangle: int, block: Block, ends: IntArray, items: Int32Array, is_fill: bool) -> None:
-    """Count or list a triangle in the cells of a block that it reaches into, in scanning order."""
-    low, scale, (depth, x_low, y_low, z_low, nx, ny, nz, first_cell) = mesh.lattice.low, mesh.lattice.scale, block
-    parts, shift = parts_of(depth), 2 * (LEVELS - 1 - depth)
-    a, b, c = corners_of(mesh.vertices, mesh.triangles, triangle)
-    x_first = max((finest(min(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, 0)
-    x_last = min((finest(max(a[0], b[0], c[0]), low[0], scale[0]) >> shift) - x_low, nx - 1)
-    y_first = max((finest(min(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, 0)
-    y_last = min((finest(max(a[1], b[1], c[1]), low[1], scale[1]) >> shift) - y_low, ny - 1)
-    z_first = max((finest(min(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z_low, 0)
-    z_last = min((finest(max(a[2], b[2], c[2]), low[2], scale[2]) >> shift) - z_low, nz - 1)
-    # nothing helps a triangle in one cell, on level 0 in two
-    if (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= (depth == 0):
-        for z in range(z_first, z_last + 1):
-            for y in range(y_first, y_last + 1):
-                for x in range(x_first, x_last + 1):
-                    _list_in(triangle, first_cell + (z * ny + y) * nx + x, ends, items, is_fill)
-        return
-    walls = walls_of(scaled_difference(b, a, scale, parts), scaled_difference(c, a, scale, parts))
-    base = scaled_difference(low, a, scale, parts)
-    x0, y0, z0 = base[0] + (x_low + 0.5), base[1] + (y_low + 0.5), base[2] + (z_low + 0.5)
-    for z in range(z_first, z_last + 1):
-        y_from, y_to = layer_reached(walls, z0 + z, y0, y_first, y_last)
-        for y in range(y_from, y_to + 1):
-            x_from, x_to = row_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
-            for x in range(x_from, x_to + 1):
-                _list_in(triangle, first_cell + (z * ny + y) * nx + x, ends, items, is_fill)
-
-
-@inline
-def _list_in(triangle: int, cell: int, ends: IntArray, items: Int32Array, is_fill: bool) -> None:
-    if is_fill:
-        items[ends[cell]] = triangle
-    ends[cell] += 1
+def _span(a: float, b: float, c: float, low: float, scale: float, n: int) -> tuple[int, int]:
+    """Return the first and the last index that the coordinates of a triangle's corners reach."""
+    return max(index_of(min(a, b, c), low, scale), 0), min(index_of(max(a, b, c), low, scale), n - 1)
 
 
 @kernel
-def list_top(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray) -> None:
-    """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) what reaches into each cell of level 0."""
-    nx, ny, nz = mesh.lattice.n
+def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray) -> None:
+    """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) what reaches into each cell."""
+    low, scale, (nx, ny, nz) = mesh.lattice.low, mesh.lattice.scale, mesh.lattice.n
     for triangle in range(len(mesh.triangles)):
         if flag[0]:
             break
-        _list_triangle(mesh, triangle, Block(0, 0, 0, 0, nx, ny, nz, 0), ends, items, is_fill)
+        a, b, c = corners_of(mesh.vertices, mesh.triangles, triangle)
+        x_first, x_last = _span(a.x, b.x, c.x, low[0], scale[0], nx)
+        y_first, y_last = _span(a.y, b.y, c.y, low[1], scale[1], ny)
+        z_first, z_last = _span(a.z, b.z, c.z, low[2], scale[2], nz)
+        is_small = (x_last - x_first) + (y_last - y_first) + (z_last - z_first) <= 1  # nothing helps in two cells
+        walls = walls_of(scaled_difference(b, a, scale), scaled_difference(c, a, scale))
+        base = scaled_difference(low, a, scale)
+        x0, y0, z0 = base[0] + 0.5, base[1] + 0.5, base[2] + 0.5
+        for z in range(z_first, z_last + 1):
+            y_from, y_to = (y_first, y_last) if is_small else layer_reached(walls, z0 + z, y0, y_first, y_last)
+            for y in range(y_from, y_to + 1):
+                x_from, x_to = x_first, x_last
+                if not is_small:
+                    x_from, x_to = row_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
+                for cell in range((z * ny + y) * nx + x_from, (z * ny + y) * nx + x_to + 1):
+                    if is_fill:
+                        items[ends[cell]] = triangle
+                    ends[cell] += 1
 
 
-@kernel
-def list_parts(
-    mesh: Mesh, level: Level, parents: IntArray, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray
-) -> None:
-    """Count or list, as `list_top` does, the triangles that reach into the 64 parts of each parent cell.
+def can_have_cells(solid: Polyhedron) -> bool:
+    """Tell whether the coordinates are in the range of the cells; all but scenes near the ends of the exponents are."""
+    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    with np.errstate(over="ignore"):
+        extent = (high - low).max()
+    return bool(1.0 / _RANGE < extent < _RANGE and np.abs(solid.vertices).max() < _RANGE)
 
-    level: that of the parents; parents: (p,) some of its cells; ends: (p * 64,).
+
+def lattice_of(solid: Polyhedron, budget: Budget) -> tuple[Lattice, float]:
+    """Return the grid, and how long its lists are in all, as a sample of the triangles says; prepared once.
+
+    It is so coarse that long needles and large faces are not listed in more than some cells each.
     """
-    for parent in range(len(parents)):
-        if flag[0]:
-            break
-        cell = parents[parent]
-        x, y, z = level.places[cell, 0] * SPLIT, level.places[cell, 1] * SPLIT, level.places[cell, 2] * SPLIT
-        block = Block(level.depth + 1, x, y, z, SPLIT, SPLIT, SPLIT, parent * PARTS)
-        for entry in range(level.firsts[cell], level.firsts[cell + 1]):
-            _list_triangle(mesh, level.lists[entry], block, ends, items, is_fill)
+    return solid.prepared("lattice", lambda: _find_lattice(tree_of(solid, budget.check), budget), budget.check)
 
 
-@kernel
-def keep_of_details(mesh: Any, level: Any, cells: Any, is_kept: Any, flag: Any) -> None:
-    """Set is_kept of each of `cells`: whether most triangles of its list are smaller than a cell along each axis."""
-    scale, parts = mesh.lattice.scale, parts_of(level.depth)
-    for cell in cells:
-        if flag[0]:
-            break
-        first, end, n_small = level.firsts[cell], level.firsts[cell + 1], 0
-        for entry in range(first, end):
-            a, b, c = corners_of(mesh.vertices, mesh.triangles, level.lists[entry])
-            largest = 0.0
-            for axis in range(3):
-                low, high = min(a[axis], b[axis], c[axis]), max(a[axis], b[axis], c[axis])
-                largest = max(largest, (high - low) * (scale[axis] * parts))
-            n_small += largest < 1.0
-        is_kept[cell] = 2 * n_small > end - first
+def _find_lattice(tree: TriangleTree, budget: Budget) -> tuple[Lattice, float]:
+    some, most = tree.triangles[:: len(tree.triangles) // _SAMPLE + 1].copy(), _MOST_CELLS
+    while True:  # bound: halved each turn
+        lattice = _make_lattice(tree, most)
+        counts = count_triangles(Mesh(tree.vertices, some, lattice), budget)
+        entries = float(counts.sum()) / len(some) * len(tree.triangles)
+        if entries <= _MOST_ENTRIES * len(tree.triangles) + _FEW_ENTRIES or max(lattice.n) <= _FEWEST_CELLS:
+            return lattice, entries
+        most = min(most, max(lattice.n)) / 2.0
+
+
+def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
+    """Return of each cell how many triangles reach into it."""
+    nx, ny, nz = mesh.lattice.n
+    counts = np.zeros(nx * ny * nz, np.int64)
+    list_triangles(mesh, counts, np.empty(0, np.int32), False, budget.flag)
+    budget.check()
+    return counts
+
+
+def _make_lattice(tree: TriangleTree, most: float) -> Lattice:
+    """Return a grid of at most so many cells along the longest axis; flat axes are in one cell."""
+    extent = np.subtract(tree.high, tree.low)
+    largest = float(extent.max())
+    size = _power_of_two(largest / min(most, max(8.0, _WANTED * len(tree.triangles) ** (1.0 / 3.0))))
+    x, y, z = [size if float(e) >= size else _power_of_two(max(float(e), largest * 2.0**-40)) for e in extent]
+    low = tuple(low - size * (95.0 / 256.0) for low, size in zip(tree.low, (x, y, z)))
+    n: Any = tuple(int((high - least) / size) + 1 for high, least, size in zip(tree.high, low, (x, y, z)))
+    return Lattice((low[0], low[1], low[2]), (1.0 / x, 1.0 / y, 1.0 / z), (x, y, z), n)
+
+
+def _power_of_two(value: float) -> float:
+    """Return the power of two next above or equal to value."""
+    mantissa, exponent = frexp(value)
+    return ldexp(1.0, exponent - 1 if mantissa == 0.5 else exponent)

@@ -161,7 +161,7 @@ def test_nothing_and_errors() -> None:
 
 
 def test_a_scene_asked_often_answers_alike() -> None:
-    """Polyhedra are asked by rays first, then by level 0 of the cells: same answers, walls and vertices included."""
+    """Polyhedra are asked by rays first, then by the sides of cells: same answers, walls and vertices included."""
     random = np.random.default_rng(3)
     shifts = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [1e6, 0, 0]])
     meshes = [merged(box_mesh([0, 0, 0], [4, 4, 4]), box_mesh([1, 1, 1], [2, 3, 5])) for _ in shifts]
@@ -173,7 +173,7 @@ def test_a_scene_asked_often_answers_alike() -> None:
     expected = np.stack([locate(points, solid) for solid in solids], axis=1)
     for _ in range(3):
         assert (table(locate_scene(points, solids), len(solids)) == expected).all()
-    assert all(solid.kept("top_cells") is not None for solid in solids)
+    assert all(solid.kept("sides") is not None for solid in solids)
 
 
 def test_instances_by_cells_equal_the_reference() -> None:
@@ -184,7 +184,7 @@ def test_instances_by_cells_equal_the_reference() -> None:
     points = np.concatenate([np.array(mesh["vertices"]) @ pose.rotation.T + pose.translation for pose in poses])
     points = np.concatenate([points, random.uniform(-6, 8, (4000, 3))])
     found = [table(locate_scene(points, [solid] * len(poses), poses), len(poses)) for _ in range(2)]
-    assert solid.kept("top_cells") is not None
+    assert solid.kept("sides") is not None
     assert (found[0] == found[1]).all()
     for body in (0, 5, 11):
         as_json = {"rotation": poses[body].rotation.tolist(), "translation": poses[body].translation.tolist()}

@@ -1,4 +1,4 @@
-"""Cells: how they are built, ordered and marked."""
+"""Cells: how they are built and marked."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import pytest
 
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
 from engine.containment import policy
-from engine.containment.cells import order as cell_order
-from engine.containment.cells.build import build_cells
+from engine.containment.cells.build import Sides, build_cells, build_sides, label_empty
+from engine.containment.cells.lattice import can_have_cells
 from engine.containment.cells.locate import side_in_cell
-from engine.containment.cells.status import label_empty
-from engine.containment.cells.top import TopCells, build_top_cells, can_have_cells
 from engine.jit import kernel
 from engine.lanes.addresses import array_at, plain_array_at
 from engine.running.budget import Budget
@@ -49,7 +47,7 @@ def test_a_cancelled_build_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
     assert locate([[0.5, 0.5, 0.5]] * 100, solid).tolist() == [1] * 100
 
 
-# --- Level 0 of the cells: what it tells is what `locate` tells, and it tells most of a box ---
+# --- The sides of cells: what they tell is what `locate` tells, and they tell most of a box ---
 
 
 @kernel
@@ -63,7 +61,7 @@ def _ask(frames: Any, places: Any, points: Any, blur: float, found: Any) -> None
         found[item] = side_in_cell(frames, places, 0, (points[item, 0], points[item, 1], points[item, 2]), blur)
 
 
-def _sides(cells: TopCells, points: np.ndarray[Any, Any], blur: float) -> np.ndarray[Any, Any]:
+def _sides(cells: Sides, points: np.ndarray[Any, Any], blur: float) -> np.ndarray[Any, Any]:
     found = np.empty(len(points), np.int8)
     _ask(cells.frame[None], np.array([cells.place]), points, blur, found)
     return found
@@ -80,7 +78,7 @@ def test_cells_tell_what_locate_tells(scale: float, shift: float) -> None:
     lattice = np.clip((np.round(random.uniform(-1, 10, (5000, 3)) * 4) / 4 + shift) * scale, low, high)
     points = np.concatenate([points, lattice])
     with Budget() as budget:
-        cells = build_top_cells(solid, budget)
+        cells = build_sides(solid, budget)
     sides = _sides(cells, points, 0.0)
     is_told = sides != UNDECIDED
     assert (sides[is_told] == locate(points, solid)[is_told]).all()
@@ -103,26 +101,6 @@ def test_an_array_by_its_address() -> None:
     assert plain_array_at(values.ctypes.data, (2, 3), np.float64).tolist() == [[0, 1, 2], [3, 4, 5]]
     assert plain_array_at(values.ctypes.data, (0,), np.float64).tolist() == []
     assert _first_of(values.ctypes.data) == 5.0
-
-
-# --- Points in the order of their cells get the answers that they get as they stand ---
-
-
-def test_ordered_points_get_the_same_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(policy, "_CELLS_FROM", 0)
-    solid = made(merged(box_mesh([0, 0, 0], [3, 3, 3]), box_mesh([1, 1, 1], [4, 4, 2])))
-    points = np.random.default_rng(8).uniform(-0.5, 4.5, (20_000, 3))
-    points[::5, 2] = 3.0  # on a face
-    plain = locate(points, solid)
-    monkeypatch.setattr(cell_order, "_FEWEST_POINTS", 1)
-    monkeypatch.setattr(cell_order, "_FEWEST_GROUPS", 1)
-    monkeypatch.setattr(cell_order, "_SHARE", 0.0)
-    with Budget() as budget:
-        order = cell_order.order_if_it_pays(points, build_cells(solid, budget), budget)
-    assert order is not None
-    assert (np.sort(order) == np.arange(len(points))).all()
-    assert (locate(points, solid) == plain).all()
-    assert (locate(points, solid, workers=1) == plain).all()
 
 
 # --- Sides of cells: empty ones that share a wall copy from the first of them ---
