@@ -25,7 +25,7 @@ from engine.predicates.cut_point import T_BOUND
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
-from engine.segment_clipping.on_boundary.contacts import CROSSED, DEGENERATE, PROPER, START, are_one, place_of
+from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts
 from engine.segment_clipping.on_boundary.touching_cut import sort_crossings
@@ -84,9 +84,9 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, s
     n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
     for i in range(n_met):
         kind = cuts.codes[i]
-        if kind == DEGENERATE or (not is_any and kind != PROPER and place_of(kind) >= START):
+        if kind == Kind.DEGENERATE or (not is_any and kind != Kind.PROPER and place_of(kind) >= Place.START):
             return UNSURE
-        cuts.codes[i] = CROSSED if kind == PROPER else kind
+        cuts.codes[i] = CROSSED if kind == Kind.PROPER else kind
     return max(n_met, UNSURE)
 
 
@@ -108,7 +108,7 @@ def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_cl
                 return UNSURE
             continue
         for rank in range(begin, place):
-            turns ^= (cuts.codes[order[rank]] & 1) == 1
+            turns ^= (cuts.codes[order[rank]] & Bit.CROSSES) != 0
             cuts.faces[first] = min(cuts.faces[first], cuts.faces[order[rank]])
         begin = place
         if turns or not is_closed or not is_in:
@@ -205,7 +205,7 @@ def crossings_in(
             is_in = at >= 0
         else:
             for i in range(n_met):
-                is_in ^= scratch.cuts.codes[i] & 1 == 1
+                is_in ^= scratch.cuts.codes[i] & Bit.CROSSES != 0
     for i in range(n_met):
         if not _cut_at(mesh, segments, item, i, frame, scratch):
             return UNSURE, False

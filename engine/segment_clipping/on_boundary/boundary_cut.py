@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.jit import allocating_kernel, called, inline
-from engine.segment_clipping.on_boundary.contacts import GROUP, PROPER, edge_contacts_for, gather_edges
+from engine.segment_clipping.on_boundary.contacts import GROUP, Kind, edge_contacts_for, gather_edges
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import gather_triangles, mesh_contacts_for
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
@@ -64,7 +64,7 @@ def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
     """Tell whether some contacts are proper crossings."""
     are_proper = True
     for i in range(first, last):
-        are_proper &= kinds[i] == PROPER
+        are_proper &= kinds[i] == Kind.PROPER
     return are_proper
 
 

@@ -19,7 +19,7 @@ from engine.jit import kernel
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
 from engine.running.budget import Budget
-from engine.segment_clipping.on_boundary.contacts import ALONG, DEGENERATE, END, NO_ROOM, find_contacts_2d
+from engine.segment_clipping.on_boundary.contacts import NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.mesh_contacts import find_contacts_3d
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
@@ -27,7 +27,7 @@ from engine.segment_clipping.on_boundary.triangle_contact import corner, triangl
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
 """Location of the second end that says where the line beside the segment is before its first contact."""
-_AT_END: Final = 2 * END + 5
+_AT_END: Final = 2 * Place.END + 5
 """The code of what is crossed there; one less, of what is not."""
 _AT_ONCE: Final = 64
 """Chords whose contacts are held together."""
@@ -73,11 +73,11 @@ def _turns(
     sure and no edge runs there; then the elements that hold its end, and whose they are."""
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
-    holds_end = kinds | 1 == _AT_END
-    turning = owners[(kinds & 1 == 1) & ~holds_end]
+    holds_end = kinds | Bit.CROSSES == _AT_END
+    turning = owners[(kinds & Bit.CROSSES != 0) & ~holds_end]
     is_sure = np.ones(len(segments), np.bool_)
-    is_sure[owners[kinds == DEGENERATE]] = False
-    along = np.flatnonzero(kinds == ALONG)
+    is_sure[owners[kinds == Kind.DEGENERATE]] = False
+    along = np.flatnonzero(kinds == Kind.ALONG)
     edges, ends = boundary.elements[met[along]], segments[owners[along], 1]
     reaches = ((edges.min(axis=1) <= ends) & (ends <= edges.max(axis=1))).all(axis=1)
     is_sure[owners[along[reaches]]] = False

@@ -13,15 +13,20 @@ one line or plane. An undecided one, and triangles that the segment runs in, are
 them (exact_pieces.py). A segment whose contacts are all proper needs no other decision than the location of its first
 end.
 
-What touches has a code, 2 * place + 5 where the line beside the segment crosses the element, else 2 * place + 4:
+What touches in a point has a code (`code_of`), its bits from the lowest:
 
-    0 .. 2  in that corner        3 .. 5  in the side from corner place - 3 on        START, END  there the segment ends
+    CROSSES   the line beside the segment crosses the element there
+    4 bits    place + 2: 0 .. 2 that corner, 3 .. 5 the side from corner place - 3 on, then START, END, WITHIN
+    ALONG     the segment runs along an edge of the plane, which is crossed nowhere; others are named before it
+    BEGINS    it begins to there
+    CEASES    it ends to there
 
 Source: the separating axes of segment and box stand in C. Ericson, Real-time collision detection, 2005, section 5.3.3.
 """
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -32,19 +37,35 @@ from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, Point2
 
-APART: Final = 0
-PROPER: Final = 1
-DEGENERATE: Final = UNDECIDED  # a sign that is none is handed on
-START: Final = 6
-END: Final = 7
-WITHIN: Final = 8
-CROSSED: Final = 2 * WITHIN + 5
+
+class Kind(IntEnum):
+    """How a segment and an element meet, where that is no code of `code_of`."""
+
+    APART = 0
+    PROPER = 1
+    DEGENERATE = UNDECIDED
+    ALONG = 32
+
+
+class Place(IntEnum):
+    """Where an element is touched, beside its corners (0 .. 2) and its sides (3 .. 5, from corner place - 3 on)."""
+
+    START = 6
+    END = 7
+    WITHIN = 8
+
+
+class Bit(IntEnum):
+    """The bits of a code beside the place, which is held plus 2 from the second bit on."""
+
+    CROSSES = 1
+    ALONG = Kind.ALONG
+    BEGINS = 64
+    CEASES = 128
+
+
+CROSSED: Final = 2 * Place.WITHIN + 5
 """The code of what is met in its open interior, no end of the segment."""
-ALONG: Final = 32
-"""Added where the segment runs along an edge of the plane, which is crossed nowhere; others are named before it."""
-BEGINS: Final = 64
-CEASES: Final = 128
-"""Added where it begins to, and where it ends."""
 GROUP: Final = 2048
 """Segments that are looked at together at most."""
 NO_ROOM: Final = -1
@@ -91,7 +112,7 @@ def code_of(place: int, is_crossed: bool) -> int:
 @merged
 def place_of(code: int) -> int:
     """Return the place that a code tells."""
-    return ((code & (ALONG - 1)) >> 1) - 2
+    return ((code & (Bit.ALONG - 1)) >> 1) - 2
 
 
 @merged
@@ -109,8 +130,8 @@ def axis_of(segments: FloatArray, item: int) -> int:
 def are_one(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
     """Tell whether what two codes say of two elements is one point: an end, or a corner or one side of both."""
     n, m = place_of(code), place_of(other)
-    if n >= START or m >= START:
-        return n == m and n <= END
+    if n >= Place.START or m >= Place.START:
+        return n == m and n <= Place.END
     if (n < 3) != (m < 3):
         return False
     if n < 3:
@@ -135,10 +156,10 @@ def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
     """Return the code of an edge a b of the plane that a segment p q touches, by their signs; ALONG where all are on
     one line, if they meet at all, DEGENERATE where a sign is UNDECIDED."""
     if of_a == UNDECIDED or of_b == UNDECIDED or of_p == UNDECIDED or of_q == UNDECIDED:
-        return DEGENERATE
+        return Kind.DEGENERATE
     if of_a == 0 and of_b == 0:
-        return ALONG
-    place = START if of_p == 0 else END if of_q == 0 else 0 if of_a == 0 else 1
+        return Kind.ALONG
+    place = Place.START if of_p == 0 else Place.END if of_q == 0 else 0 if of_a == 0 else 1
     return code_of(place, (of_a == 1) != (of_b == 1))
 
 
@@ -146,10 +167,10 @@ def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
 def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
     """Return ALONG where a segment p q and an edge a b of one line meet, else APART; DEGENERATE for an edge a = b."""
     if a.x == b.x and a.y == b.y:
-        return DEGENERATE
+        return Kind.DEGENERATE
     if max(a.x, b.x) < min(p.x, q.x) or max(p.x, q.x) < min(a.x, b.x):
-        return APART
-    return APART if max(a.y, b.y) < min(p.y, q.y) or max(p.y, q.y) < min(a.y, b.y) else ALONG
+        return Kind.APART
+    return Kind.APART if max(a.y, b.y) < min(p.y, q.y) or max(p.y, q.y) < min(a.y, b.y) else Kind.ALONG
 
 
 @inline
@@ -159,14 +180,14 @@ def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
     if of_a == of_b and (of_a == 1 or of_a == -1):
-        return APART
+        return Kind.APART
     of_p, of_q = orient2d(a, b, p), orient2d(a, b, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
-        return APART
+        return Kind.APART
     if abs(of_a) == 1 and abs(of_b) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
-        return PROPER  # two different signs each
+        return Kind.PROPER  # two different signs each
     code = touched_edge(of_a, of_b, of_p, of_q)
-    return code if code != ALONG else along_edge(a, b, p, q)
+    return code if code != Kind.ALONG else along_edge(a, b, p, q)
 
 
 @inline
@@ -212,7 +233,7 @@ def append_edges(contacts: EdgeContacts, outline: Any, segment: FloatArray, foun
         for place in range(start, min(start + LEAF_SIZE, n_edges)):
             element = outline.order[place]
             kind = edge_contact(outline.elements[element], segment)
-            if kind != APART:
+            if kind != Kind.APART:
                 if found == contacts.met.size:
                     return NO_ROOM
                 contacts.met[found], contacts.kinds[found] = element, kind

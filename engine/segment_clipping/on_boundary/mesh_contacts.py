@@ -31,7 +31,7 @@ from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
-from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, NO_ROOM, STOPPED, is_point
+from engine.segment_clipping.on_boundary.contacts import NO_ROOM, STOPPED, Kind, is_point
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh
 from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_contact
 from engine.types import Point3
@@ -120,7 +120,7 @@ def mesh_contacts_for(n_segments: int, n_contacts: int) -> MeshContacts:
 @inline
 def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
     """Tell whether a traversal may end: there is no room, or one contact is enough and is decided."""
-    return n_met < 0 or (is_any and n_met > 0 and kinds[0] != DEGENERATE)
+    return n_met < 0 or (is_any and n_met > 0 and kinds[0] != Kind.DEGENERATE)
 
 
 @inline
@@ -132,7 +132,7 @@ def _append_triangles(
     for place in range(n):
         element = triangles[place]
         kind = triangle_contact(mesh.elements, element, p, q, blur)
-        if kind == APART:
+        if kind == Kind.APART:
             continue
         row = 0 if is_any else n_met
         if row == met.size:
@@ -176,8 +176,8 @@ def append_contacts(
 ) -> int:
     """Append the triangles that a segment meets to met, how to kinds; return how many these are then, or NO_ROOM.
 
-    p and q are known to `blur` a coordinate; where that is above 0, what a filter cannot decide is DEGENERATE.
-    is_any: one contact is enough, and stands in the first row; it is DEGENERATE only where no other is decided.
+    p and q are known to `blur` a coordinate; where that is above 0, what a filter cannot decide is Kind.DEGENERATE.
+    is_any: one contact is enough, and stands in the first row; it is Kind.DEGENERATE only where no other is decided.
     """
     stack, blocks = waiting.stack, waiting.blocks
     way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)

@@ -15,20 +15,7 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array
 from engine.jit import allocating, called, inline
 from engine.segment_clipping.on_boundary.chords import INSIDE_BEFORE
-from engine.segment_clipping.on_boundary.contacts import (
-    ALONG,
-    BEGINS,
-    CEASES,
-    CROSSED,
-    DEGENERATE,
-    END,
-    PROPER,
-    START,
-    are_one,
-    axis_of,
-    code_of,
-    place_of,
-)
+from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_one, axis_of, code_of, place_of
 from engine.segment_clipping.on_boundary.crossing_values import cross_exactly, cut_at, is_item_safe, parameter_exactly
 from engine.segment_clipping.pieces import Pieces, put_own_end
 
@@ -46,13 +33,13 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
         return UNSURE
     for i in range(first, last):
         element, kind = contacts.met[i], contacts.kinds[i]
-        if kind == DEGENERATE or not (boundary.are_safe or is_item_safe(boundary.elements, element)):
+        if kind == Kind.DEGENERATE or not (boundary.are_safe or is_item_safe(boundary.elements, element)):
             return UNSURE
         cuts.met[n], cuts.faces[n] = element, boundary.faces[element]
-        if kind == ALONG:
+        if kind == Kind.ALONG:
             n = _put_stretch(segments, item, boundary.elements, cuts, n)
         else:
-            n = _put_place(segments, item, boundary.elements, CROSSED if kind == PROPER else kind, cuts, n)
+            n = _put_place(segments, item, boundary.elements, CROSSED if kind == Kind.PROPER else kind, cuts, n)
         if n == UNSURE:
             return UNSURE
     sort_crossings(cuts, n)
@@ -64,10 +51,10 @@ def _put_place(segments: FloatArray, item: int, elements: FloatArray, code: int,
     """Write parameter and point of a crossing or touch of ``cuts.met[n]``; return n + 1, UNSURE where not all is."""
     place, element, dimension = place_of(code), cuts.met[n], segments.shape[2]
     cuts.codes[n] = code
-    if START <= place <= END:
-        cuts.t[n] = place - START
+    if Place.START <= place <= Place.END:
+        cuts.t[n] = place - Place.START
         for k in range(dimension):
-            cuts.points[n, k] = segments[item, place - START, k] + 0.0
+            cuts.points[n, k] = segments[item, place - Place.START, k] + 0.0
         return n + 1
     if place < 3:
         k = axis_of(segments, item)
@@ -89,15 +76,17 @@ def _put_stretch(segments: FloatArray, item: int, elements: FloatArray, cuts: Cr
     rises = q > p
     near = 0 if (elements[element, 1, k] > elements[element, 0, k]) == rises else 1
     a, b = elements[element, near, k], elements[element, 1 - near, k]
-    begin = START if (a <= p if rises else a >= p) else near
-    end = END if (b >= q if rises else b <= q) else 1 - near
+    begin = Place.START if (a <= p if rises else a >= p) else near
+    end = Place.END if (b >= q if rises else b <= q) else 1 - near
     if b == p or a == q:  # case: one point
-        return _put_place(segments, item, elements, code_of(START if b == p else END, False) | ALONG, cuts, n)
-    n = _put_place(segments, item, elements, code_of(begin, False) | ALONG | BEGINS, cuts, n)
+        return _put_place(
+            segments, item, elements, code_of(Place.START if b == p else Place.END, False) | Bit.ALONG, cuts, n
+        )
+    n = _put_place(segments, item, elements, code_of(begin, False) | Bit.ALONG | Bit.BEGINS, cuts, n)
     if n == UNSURE:
         return UNSURE
     cuts.met[n], cuts.faces[n] = element, face
-    return _put_place(segments, item, elements, code_of(end, False) | ALONG | CEASES, cuts, n)
+    return _put_place(segments, item, elements, code_of(end, False) | Bit.ALONG | Bit.CEASES, cuts, n)
 
 
 @inline
@@ -111,10 +100,10 @@ def _is_in_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q
             begin = place
         elif i != first and not are_one(elements, cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]):
             return -2
-        turns ^= (cuts.codes[i] & 1 == 1) & (place_of(cuts.codes[i]) != END)
+        turns ^= (cuts.codes[i] & Bit.CROSSES != 0) & (place_of(cuts.codes[i]) != Place.END)
     if of_p != 0:
         return int(of_p > 0)
-    if n == 0 or place_of(cuts.codes[cuts.order[0]]) != START:
+    if n == 0 or place_of(cuts.codes[cuts.order[0]]) != Place.START:
         return -2
     if abs(of_q) == INSIDE_BEFORE:
         return int(of_q > 0)
@@ -126,7 +115,7 @@ def _put_node(
     out: Pieces, row: int, end: int, segments: FloatArray, item: int, cuts: Crossings, i: int, face: int
 ) -> None:
     """Write an end of a piece at a contact; where the segment itself begins or ends there, as its own end."""
-    if place_of(cuts.codes[i]) == START + end:
+    if place_of(cuts.codes[i]) == Place.START + end:
         put_own_end(out, row, end, segments, item, segments.shape[2] == 2)
         return
     out.t[row, end], out.faces[row, end] = cuts.t[i], face
@@ -149,15 +138,15 @@ def emit_touching(
         out.source[row] = source
         put_own_end(out, row, 0, segments, item, segments.shape[2] == 2)
     while place < n:  # bound: each turn passes a contact
-        first, best, face = cuts.order[place], 2 * ALONG, -1
+        first, best, face = cuts.order[place], 2 * Bit.ALONG, -1
         while place < n and cuts.t[cuts.order[place]] == cuts.t[first]:
             i = cuts.order[place]
             code, place = cuts.codes[i], place + 1
-            turned ^= code & 1
-            n_along += (1 if code & BEGINS else 0) - (1 if code & CEASES else 0)
-            if code & ALONG < best or (code & ALONG == best and cuts.faces[i] < face):
-                best, face = code & ALONG, cuts.faces[i]
-        is_last = place_of(cuts.codes[first]) == END
+            turned ^= code & Bit.CROSSES
+            n_along += (1 if code & Bit.BEGINS else 0) - (1 if code & Bit.CEASES else 0)
+            if code & Bit.ALONG < best or (code & Bit.ALONG == best and cuts.faces[i] < face):
+                best, face = code & Bit.ALONG, cuts.faces[i]
+        is_last = place_of(cuts.codes[first]) == Place.END
         if is_in < 0 and n_along == 0 and not is_last:
             return UNSURE
         if not is_open:

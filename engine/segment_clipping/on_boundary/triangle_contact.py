@@ -29,7 +29,7 @@ from engine.lanes.triangles import AXES_BEFORE, longest_axis
 from engine.predicates.error_free import workspace
 from engine.predicates.orientation import orient3d
 from engine.predicates.parameters import compare_differences
-from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, END, PROPER, START, code_of
+from engine.segment_clipping.on_boundary.contacts import Kind, Place, code_of
 from engine.types import UNDECIDED, Point3
 
 EDGE_BOUND: Final = 2.0**-48
@@ -46,25 +46,25 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
     """
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
-        return APART
+        return Kind.APART
     ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
     if of_p != 0 or of_q != 0:  # case: in the plane of the triangle the edge signs are all zero and say nothing
         has_left, has_right = ab == 1 or bc == 1 or ca == 1, ab == -1 or bc == -1 or ca == -1
         if has_left and has_right:
-            return APART
+            return Kind.APART
     if max(ab, bc, ca, of_p, of_q) == UNDECIDED or (of_p == 0 and of_q == 0):
-        return DEGENERATE
+        return Kind.DEGENERATE
     if ab == bc and bc == ca and ab != 0 and of_p != 0 and of_q != 0:
-        return PROPER
+        return Kind.PROPER
     k = longest_axis((q.x - p.x, q.y - p.y, q.z - p.z))
     way = 1 if q[k] > p[k] else -1
     first = way * ab if ab != 0 else _beside(a, b, p, q, k)
     second = way * bc if bc != 0 else _beside(b, c, p, q, k)
     third = way * ca if ca != 0 else _beside(c, a, p, q, k)
     if max(first, second, third) == UNDECIDED:
-        return DEGENERATE
-    place = START if of_p == 0 else END if of_q == 0 else 3 if ab == 0 else 4 if bc == 0 else 5
-    if place < START and (ab == 0) + (bc == 0) + (ca == 0) == 2:
+        return Kind.DEGENERATE
+    place = Place.START if of_p == 0 else Place.END if of_q == 0 else 3 if ab == 0 else 4 if bc == 0 else 5
+    if place < Place.START and (ab == 0) + (bc == 0) + (ca == 0) == 2:
         place = 0 if bc != 0 else 1 if ca != 0 else 2
     return code_of(place, first == second and second == third)
 
@@ -113,7 +113,7 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
     bound = EDGE_BOUND * (size * size * length) + UNDERFLOW + 16.0 * moved
     least, most = min(ab, bc, ca), max(ab, bc, ca)
     if least < -bound and most > bound:
-        return APART
+        return Kind.APART
     is_through = least > bound or most < -bound
     if blur == 0.0 and not is_through:
         return UNDECIDED
@@ -122,8 +122,8 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
     bound = END_BOUND * (size * size * (size + length)) + UNDERFLOW + 64.0 * moved
     least, most = min(of_p, of_q), max(of_p, of_q)
     if least > bound or most < -bound:
-        return APART
-    return PROPER if is_through and least < -bound and most > bound else UNDECIDED
+        return Kind.APART
+    return Kind.PROPER if is_through and least < -bound and most > bound else UNDECIDED
 
 
 @merged

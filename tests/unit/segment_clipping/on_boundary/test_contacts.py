@@ -10,16 +10,7 @@ import pytest
 
 from engine.predicates.rational import orient2d_rational
 from engine.segment_clipping.exact_pieces import triangle_stretch
-from engine.segment_clipping.on_boundary.contacts import (
-    ALONG,
-    APART,
-    DEGENERATE,
-    END,
-    NO_ROOM,
-    PROPER,
-    START,
-    find_contacts_2d,
-)
+from engine.segment_clipping.on_boundary.contacts import NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
 from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, exact_contact
@@ -29,13 +20,13 @@ from engine.types import UNDECIDED, Point3
 def contact(edge: list[list[float]], segment: list[list[float]]) -> int:
     signs = [orient2d_rational(*segment, end) for end in edge], [orient2d_rational(*edge, end) for end in segment]
     if any(pair in ([1, 1], [-1, -1]) for pair in signs):
-        return APART
+        return Kind.APART
     if all(sorted(pair) == [-1, 1] for pair in signs):
-        return PROPER
+        return Kind.PROPER
     (of_a, of_b), (of_p, of_q) = signs
     if of_a == of_b == 0:
-        return DEGENERATE if edge[0] == edge[1] else ALONG
-    place = START if of_p == 0 else END if of_q == 0 else 0 if of_a == 0 else 1
+        return Kind.DEGENERATE if edge[0] == edge[1] else Bit.ALONG
+    place = Place.START if of_p == 0 else Place.END if of_q == 0 else 0 if of_a == 0 else 1
     return 2 * place + 4 + ((of_a > 0) != (of_b > 0))
 
 
@@ -51,8 +42,8 @@ def test_contacts_are_those_of_all_edges() -> None:
         found = dict(zip(met[mine].tolist(), kinds[mine].tolist()))
         surely = {k: contact(edge, segment) for k, edge in enumerate(edges.tolist()) if i > 0}
         # boxes keep apart what only lines that touch, or points on a line, leave open
-        assert {k: kind for k, kind in found.items() if kind == PROPER} == {
-            k: kind for k, kind in surely.items() if kind == PROPER
+        assert {k: kind for k, kind in found.items() if kind == Kind.PROPER} == {
+            k: kind for k, kind in surely.items() if kind == Kind.PROPER
         }
         assert found.items() <= surely.items()
     assert find_contacts_2d(segments, outline, stop, 3)[0] == NO_ROOM
@@ -74,11 +65,11 @@ def test_contacts_are_those_of_whole_numbers() -> None:
         n_told += rough != UNDECIDED
         a, b, c, p, q = numbers.tolist()
         stretch = triangle_stretch(p, q, a, b, c)
-        assert rough in (kind, UNDECIDED) or (rough == APART and stretch is None)
-        assert kind in (APART, DEGENERATE) if stretch is None else kind != APART
+        assert rough in (kind, UNDECIDED) or (rough == Kind.APART and stretch is None)
+        assert kind in (Kind.APART, Kind.DEGENERATE) if stretch is None else kind != Kind.APART
         if stretch is not None:
-            assert (kind == DEGENERATE) == stretch[2]
-            assert kind != PROPER or 0 < stretch[0] == stretch[1] < 1
+            assert (kind == Kind.DEGENERATE) == stretch[2]
+            assert kind != Kind.PROPER or 0 < stretch[0] == stretch[1] < 1
     assert n_told > 150
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from engine.predicates.rational import common_integers, cross, minus
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_stretch
-from engine.segment_clipping.on_boundary.contacts import APART, DEGENERATE, END, START
+from engine.segment_clipping.on_boundary.contacts import Kind, Place
 from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, find_contacts_3d, local_segment
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
 from engine.segment_clipping.on_boundary.triangle_contact import exact_contact
@@ -26,7 +26,15 @@ def code_of(triangle: list[list[float]], p: list[float], q: list[float]) -> int:
     t, turns = stretch[0], is_crossed(start, end, corners)
     point = [x + t * (y - x) for x, y in zip(start, end)]
     sides = [not any(cross(minus(b, a), minus(point, a))) for a, b in zip(corners, [*corners[1:], corners[0]])]
-    place = START if t == 0 else END if t == 1 else corners.index(point) if point in corners else 3 + sides.index(True)
+    place = (
+        Place.START
+        if t == 0
+        else Place.END
+        if t == 1
+        else corners.index(point)
+        if point in corners
+        else 3 + sides.index(True)
+    )
     return 2 * place + 4 + turns
 
 
@@ -51,9 +59,9 @@ def test_contacts_are_those_of_all_triangles() -> None:
     for i, triangle in enumerate(corners):
         for k, segment in enumerate(segments):
             kind = exact_contact(*(Point3(*row) for row in (*triangle.tolist(), *segment.tolist())))
-            if kind > DEGENERATE:
+            if kind > Kind.DEGENERATE:
                 kind = code_of(triangle.tolist(), *segment.tolist())
-            if kind != APART:
+            if kind != Kind.APART:
                 expected[k].add((i, kind))
     assert any(expected)
     for k, pairs in enumerate(expected):
