@@ -17,7 +17,6 @@ from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.rational_locate import combine, is_located, over_tree
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
 from engine.direct import entry_of
-from engine.errors import NotFiniteError
 from engine.running.budget import UNLIMITED
 from engine.solids.base import Solid
 from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
@@ -70,9 +69,7 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
     if plan is None:
         if type(solid) is Csg:
             return _in_tree(array, solid)
-        choice, plan = _plan_of(solid, n_points)
-        if choice == CELLS:
-            return _in_cells(array, solid)
+        plan = _plan_of(solid, n_points)
         if plan is None:
             return None
     entry, prepared, method = plan
@@ -88,31 +85,19 @@ def _settled(array: FloatArray, solid: Solid, locations: Int8Array, n_beyond: in
     return locations, n_beyond, settle(rational_half(solid), array, locations, rest, UNLIMITED), method
 
 
-def _in_cells(array: Any, solid: Solid) -> Located:
-    by: Any = polygon_by if isinstance(solid, Polygon) else polyhedron_by
-    locator, locations = by(solid, CELLS, UNLIMITED), np.empty(len(array), np.int8)
-    try:
-        counts = locator.fill(array, locations, UNLIMITED)
-    except NotFiniteError:
-        check_finite(array, ("points",))
-        raise
-    return locations, *counts, locator.method
-
-
-def _plan_of(solid: Solid, n_points: int) -> tuple[int, Plan | None]:
-    """Return the choice of policy.py and a plan, kept where one is made; None where no kernel is compiled yet."""
+def _plan_of(solid: Solid, n_points: int) -> Plan | None:
+    """Return a plan, kept where one is made; None where cells are chosen, or no kernel is compiled yet."""
+    if isinstance(solid, Polygon) and len(solid.vertices) <= _SMALL:
+        return _kept(solid, "plan", polygon_by(solid, PASS, UNLIMITED))
     if isinstance(solid, Polygon):
-        if len(solid.vertices) <= _SMALL:
-            return PASS, _kept(solid, "plan", polygon_by(solid, PASS, UNLIMITED))
-        by: Any = polygon_by
         choice = choose_for_rings(solid, n_points)
-    elif isinstance(solid, Polyhedron):
-        choice, by = choose_for_mesh(solid, n_points, UNLIMITED), polyhedron_by
-    else:
-        return PASS, _kept(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))
-    if choice == CELLS and isinstance(solid, Polyhedron):
-        return choice, None
-    return PASS, solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], by(solid, choice, UNLIMITED))
+        return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polygon_by(solid, choice, UNLIMITED))
+    if isinstance(solid, Polyhedron):
+        choice = choose_for_mesh(solid, n_points, UNLIMITED)
+        if choice == CELLS:
+            return None
+        return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polyhedron_by(solid, choice, UNLIMITED))
+    return _kept(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))
 
 
 def _kept(solid: Solid, key: str, locator: Locator) -> Plan | None:

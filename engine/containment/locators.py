@@ -16,7 +16,7 @@ from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import locate_by_cells
 from engine.containment.methods.ball import locate_in_ball
 from engine.containment.methods.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
-from engine.containment.methods.half_spaces import locate_in_half_planes, locate_in_half_spaces
+from engine.containment.methods.half_spaces import locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
@@ -147,8 +147,7 @@ def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator
 def rows_locator(solid: HalfSpace | Convex) -> Locator:
     """Return the locator by the planes that bound a solid."""
     rows = rows_of(solid)
-    kernel = locate_in_half_planes if solid.dimension == 2 else locate_in_half_spaces
-    return by_kernel("half_spaces", kernel, solid, rows, np.ones(len(rows), np.bool_))
+    return by_kernel("half_spaces", locate_in_half_spaces, solid, rows, np.ones(len(rows), np.bool_))
 
 
 def ball_locator(solid: Sphere) -> Locator:

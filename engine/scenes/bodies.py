@@ -19,23 +19,23 @@ from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
 from engine.containment.locators import Locator, locator_of
-from engine.containment.methods.rational_locate import is_located
+from engine.containment.methods.frames import frames_of
+from engine.containment.methods.rational_locate import Check, is_located, over_tree
 from engine.containment.posed_locators import posed_locator
 from engine.direct import entry_of
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.running.budget import Budget
-from engine.scenes.body_box import body_box
-from engine.scenes.located import Kinds, LocateTables
-from engine.scenes.near_boxes import BodyTree, Where, list_near, put_keys
-from engine.scenes.scratch import scratch_for
+from engine.scenes.located import Kinds, LocateTables, moved_boxes
+from engine.scenes.near_boxes import BodyTree, put_keys
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
 from engine.solids.base import Preparing, Solid
 from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit
 from engine.solids.pose import Pose, motions_of
-from engine.solids.registry import row_of
+from engine.solids.registry import own_box, row_of
+from engine.solids.sphere import Sphere
 
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""
@@ -174,6 +174,34 @@ class Bodies(Preparing):
         self.prepared("cut", lambda: check_cut(self.solids), budget.check)
 
 
+def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray, FloatArray]:
+    """Return low, high (dim,) around a body; infinite for one that may have no bounds (half-spaces and the like).
+
+    check: as for `Solid.prepared`.
+    """
+    if isinstance(solid, Csg):
+        found: tuple[FloatArray, FloatArray] = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
+        return found
+    low, high, _ = own_box(solid, check)
+    if np.isinf(low).any():
+        return low, high
+    frames = frames_of([pose], len(low))
+    lows, highs = moved_boxes(low[None], high[None], frames, frames.rows)
+    if isinstance(solid, Sphere):  # its box was that of its centre
+        with np.errstate(over="ignore"):
+            lows, highs = lows - solid.radius, highs + solid.radius
+        lows, highs = (np.nextafter(np.nextafter(side, out), out) for side, out in ((lows, -np.inf), (highs, np.inf)))
+    return lows[0], highs[0]
+
+
+def _csg_box(operation: str, boxes: list[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """Return the box of a Boolean tree; an intersection that is empty keeps a box that holds nothing."""
+    lows, highs = (np.array(sides) for sides in zip(*(boxes[:1] if operation == "difference" else boxes)))
+    if operation == "union":
+        return lows.min(axis=0), highs.max(axis=0)
+    return lows.max(axis=0), highs.min(axis=0)
+
+
 _MANY: Final = 4096
 _AS_GIVEN: Final = read_only(np.arange(_MANY))
 
@@ -230,15 +258,3 @@ def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
         return _AS_GIVEN[:n]
     entry_of(put_keys)(segments, t, where.together, keys := np.empty(n, np.uint16))
     return np.argsort(keys, kind="stable")
-
-
-def candidates(where: Where, points: FloatArray, budget: Budget) -> IntArray:
-    """Return pairs (m, 2) of a point (n, dimension) and a body that it may lie in, by point; bodies in no order."""
-    room, scratch = 16 * len(points), scratch_for(len(where.together.low) + len(where.names))
-    while True:  # bound: the second turn has room
-        pairs = np.empty((room, 2), np.int64)
-        n = entry_of(list_near)(points, where, scratch, pairs, budget.flag)
-        budget.check()
-        if n <= room:
-            return pairs[:n]
-        room = n

@@ -21,7 +21,6 @@ from engine.direct import entry_of
 from engine.jit import kernel
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
-from engine.scenes.bodies import candidates
 from engine.scenes.located import MESH, LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in
 from engine.scenes.scratch import scratch_at, scratch_for
@@ -34,10 +33,8 @@ _BYTES: Final = 72
 """Of a body and point that it may hold: its key in its part and with the others, sorted, its point, body, location."""
 _MOST_SORTED: Final = 32
 """Bodies that hold a point, put in order one by one."""
-_FEW_POINTS, _FEW_PAIRS, _FEW_BESIDE_TABLES = 32, 16, 2
-"""So few are located body by body, without tables, or though there are some."""
-_FEW_BODIES, _FEW_VERTICES = 16, 1000
-"""So few, of so few vertices each, are located without a tree when they are asked about for the first time."""
+_FEW_POINTS, _FEW_BODIES, _FEW_VERTICES = 32, 16, 1000
+"""So few points are located body by body where so few, of so few vertices each, are asked about for the first time."""
 _MOST_IN_GROUP: Final = 1 << 14
 """Points that one body locates in one piece of work."""
 _FEWEST_FOR_TREES: Final = 64
@@ -125,7 +122,7 @@ def locate_all(
     if 0 < n <= _FEW_POINTS and n_bodies <= _FEW_BODIES and not standing.base.kept("can_locate"):
         if all(len(getattr(solid, "vertices", ())) <= _FEW_VERTICES for solid in standing.base.solids):
             return _first(points, standing, budget, progress)
-    where = standing.where(budget)
+    where, tables = standing.where(budget), standing.tables(budget)
 
     def task(start: int, stop: int) -> None:
         done, size, found = start, 2 * (stop - start) + standing.n_rows, list[IntArray]()
@@ -142,17 +139,10 @@ def locate_all(
         parts[start] = np.concatenate(found)
         asked.append(counted)
 
-    most = _FEW_PAIRS if standing.base.kept("tables") is None else _FEW_BESIDE_TABLES
-    if n <= _FEW_POINTS and len(pairs := candidates(where, points, budget)) <= most:
-        standing.base.check_located(budget)
-        keys = 4 * (pairs[:, 0] * n_bodies + standing.names_of(pairs[:, 1])) + UNDECIDED
-        keys.sort()
-    else:
-        tables = standing.tables(budget)
-        run_chunks(task, n, budget=budget, workers=workers, progress=progress)
-        keys = np.concatenate([np.zeros(0, np.int64), *(parts[start] for start in sorted(parts))])
-        if asked and len(tables.sizes):
-            has_new = _build_trees(standing, np.sum(asked, axis=0), budget, workers)
+    run_chunks(task, n, budget=budget, workers=workers, progress=progress)
+    keys = np.concatenate([np.zeros(0, np.int64), *(parts[start] for start in sorted(parts))])
+    if asked and len(tables.sizes):
+        has_new = _build_trees(standing, np.sum(asked, axis=0), budget, workers)
     located = (keys & 3).astype(np.int8)
     owners, bodies = np.divmod(keys >> 2, n_bodies)
     left = np.flatnonzero(located == UNDECIDED)
@@ -161,8 +151,6 @@ def locate_all(
         located[left], counts = _settled(points, owners[left], bodies[left], standing, has_new, budget, workers)
         held = located >= 0
         located, owners, bodies = located[held], owners[held], bodies[held]
-    if progress is not None and not parts:
-        progress(n)
     offsets = np.zeros(n + 1, np.int64)
     np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"

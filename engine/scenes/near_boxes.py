@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
+from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import WIDTH, Bvh
 from engine.jit import inline, kernel, merged
 from engine.lanes.addresses import array_at
@@ -212,21 +212,6 @@ def _of_box(
         found[n_found] = n_before + body
         n_found += _is_met(low, high, bodies, body, left_out)
     return n_found
-
-
-@kernel
-def list_near(points: FloatArray, where: Where, room: IntArray, pairs: IntArray, flag: FlagArray) -> int:
-    """List in pairs (room, 2) points (n, dim) and the bodies of a `Where` in whose boxes they lie; return how many,
-    more than there is room for where that is less."""
-    n_pairs, scratch = 0, scratch_at(room)
-    for item in range(points.shape[0]):
-        for place in range(bodies_in(points[item], points[item], where, scratch.stack, scratch.near)):
-            if n_pairs < pairs.shape[0]:
-                pairs[n_pairs, 0], pairs[n_pairs, 1] = item, scratch.near[place]
-            n_pairs += 1
-        if flag[0]:
-            break
-    return n_pairs
 
 
 @kernel

@@ -14,8 +14,6 @@ more than the largest bound of these, are settled and leave the block.
 A row may also be the rounded image of a rational one (a posed plane, a wall of a prism): each coefficient then carries
 another u, which the slack has room for (5 u of 8 u), but what the filter leaves open stays UNDECIDED.
 
-The plane and space have a kernel each, of one function: told only when it runs, it takes a fifth longer on few planes.
-
 Source: Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", for the form
 of the filter; the exact sign is `side.py`'s.
 """
@@ -28,7 +26,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite, in_space
-from engine.jit import allocating, inline, kernel, merged
+from engine.jit import allocating_kernel, inline, merged
 from engine.predicates.side import side_of_plane, side_of_plane_filter
 from engine.types import UNDECIDED, HalfSpace3, Point3
 
@@ -91,11 +89,16 @@ def _value(h: HalfSpace3, x: float, y: float, z: float, is_flat: bool) -> Any:
     return h.a * x + h.b * y + h.d if is_flat else h.a * x + h.b * y + h.c * z + h.d
 
 
-@allocating
-def _locate(
-    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray, is_flat: bool
+@allocating_kernel
+def locate_in_half_spaces(
+    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Do what both kernels do; is_flat is known when they are compiled."""
+    """Fill `locations` (n,) int8 for points (n, dim) and planes (m, dim + 1); UNDECIDED beyond the exponents' range.
+
+    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
+    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
+    """
+    is_flat = planes.shape[1] == 3
     if has_not_finite(points):
         return NOT_FINITE
     n_beyond, last = 0, len(planes) - 1
@@ -158,23 +161,3 @@ def _locate(
                 locations[item], is_unsure = _locate_one(points, item, planes, is_exact)
                 n_beyond += is_unsure
     return n_beyond
-
-
-@kernel
-def locate_in_half_planes(
-    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
-) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2) and planes (m, 3); UNDECIDED where the exponents are out of range.
-
-    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
-    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
-    """
-    return int(_locate(points, planes, is_exact, locations, flag, True))
-
-
-@kernel
-def locate_in_half_spaces(
-    points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
-) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3) and planes (m, 4); the rest as in the plane."""
-    return int(_locate(points, planes, is_exact, locations, flag, False))

@@ -8,7 +8,7 @@ import pytest
 from engine import Aabb, Csg, HalfSpace, Polygon, Pose, Scene, Solid, Sphere, Triangle
 from engine.containment.methods.rational_locate import no_check, to_world_frame
 from engine.running.budget import Budget
-from engine.scenes.body_box import body_box
+from engine.scenes.bodies import body_box
 from engine.scenes.scratch import scratch_for
 from engine.scenes.standing import PairRows, Placed, list_pairs
 from tests.unit.containment.scenes import box_mesh, made
