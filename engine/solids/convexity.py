@@ -20,13 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
-from engine.jit import allocating, inline, kernel
+from engine.jit import inline, kernel
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
 from engine.solids.polyhedron import Polyhedron
 from engine.types import Point3
 
-_FREE = -1
 _TRIES = 8
 
 
@@ -51,73 +50,51 @@ def convexity(solid: Polyhedron) -> Convexity | None:
 
 
 def _certified(solid: Polyhedron) -> Convexity | None:
+    vertices, triangles = read_only(solid.vertices), read_only(solid.triangles)
     with np.errstate(all="ignore"):  # an overflow is not certified; kernels, where they run uncompiled
-        center = solid.vertices[solid.triangles.ravel()].mean(axis=0)
-        if not np.isfinite(center).all():
+        center = vertices[triangles.ravel()].mean(axis=0)
+        side = _common_side(vertices, triangles, center) if np.isfinite(center).all() else 0
+        if side == 0:
             return None
-        side = _certify(read_only(solid.vertices), read_only(solid.triangles), center)
-    return None if side == 0 else Convexity(center, bool(side < 0))
+        starts, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+        edges, turned = starts * len(vertices) + ends, ends * len(vertices) + starts
+        order, turned_order = np.argsort(edges), np.argsort(turned)
+        edges = edges[order]
+        if (edges[1:] == edges[:-1]).any() or (edges != turned[turned_order]).any():
+            return None
+        others = np.empty_like(order)
+        others[turned_order] = order
+        is_convex = _is_convex(vertices, triangles, others, center, side)
+    return Convexity(center, side < 0) if is_convex else None
 
 
 @kernel
-def _certify(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
-    """Return the side, 1 or -1, of every face on which the centre of a convex solid lies; 0 where not certified."""
-    o = Point3(center[0], center[1], center[2])
-    n_faces = triangles.shape[0]
-    side = 0
-    for item in range(n_faces):
+def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
+    """Return the side, 1 or -1, of every face on which the centre lies; 0 where there is none."""
+    o, side = Point3(center[0], center[1], center[2]), 0
+    for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)
         found = orient3d(a, b, c, o)
         if (found != 1 and found != -1) or (side != 0 and found != side):
             return 0
         side = found
-    if not _is_locally_convex(vertices, triangles, side) or not _is_crossed_once(vertices, triangles, o, side):
-        return 0
     return side
 
 
-@allocating
-def _is_locally_convex(vertices: FloatArray, triangles: IntArray, side: int) -> bool:
-    """Tell whether across each edge the next triangle's far corner is on the centre's side of the plane, or on it."""
-    n_faces = triangles.shape[0]
-    size = 8
-    while size < 6 * n_faces:  # bound: doubles
-        size *= 2
-    table = np.full(size, _FREE, np.int64)  # place of a directed edge: 3 * triangle + corner that it starts from
-    for corner in range(3 * n_faces):
-        start, end = triangles[corner // 3, corner % 3], triangles[corner // 3, (corner + 1) % 3]
-        place = _place(table, triangles, start, end)
-        if table[place] != _FREE:
-            return False
-        table[place] = corner
-    for corner in range(3 * n_faces):
-        item = corner // 3
-        start, end = triangles[item, corner % 3], triangles[item, (corner + 1) % 3]
-        other = table[_place(table, triangles, end, start)]
-        if other == _FREE:
-            return False
-        if other < corner:
-            continue  # the same four points
-        a, b, c = corners_of(vertices, triangles, item)
-        found = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3]))
+@kernel
+def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, center: FloatArray, side: int) -> bool:
+    """Tell whether across each edge the next triangle's far corner is on the centre's side of the plane, or on it, and
+    some half-line from the centre crosses one triangle.
+
+    others: of the edge that starts at corner k of triangle i, 3 i + k, the edge that runs the other way.
+    """
+    for corner in range(others.shape[0]):
+        other = others[corner]
+        a, b, c = corners_of(vertices, triangles, corner // 3)
+        found = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > corner else 0
         if found != 0 and found != side:
             return False
-    return True
-
-
-@inline
-def _place(table: IntArray, triangles: IntArray, start: int, end: int) -> int:
-    """Return where in the table the edge stands, or where it would. The table is at most half full."""
-    mask = table.shape[0] - 1
-    place = (start * 73856093 ^ end * 19349663) & mask
-    for _ in range(table.shape[0]):
-        corner = table[place]
-        if corner == _FREE:
-            break
-        if triangles[corner // 3, corner % 3] == start and triangles[corner // 3, (corner + 1) % 3] == end:
-            break
-        place = (place + 1) & mask
-    return place
+    return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
 
 
 @inline
