@@ -93,7 +93,7 @@ def _plan_of(solid: Solid, n_points: int) -> Plan | None:
         choice = choose_for_rings(solid, n_points)
         return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polygon_by(solid, choice, UNLIMITED))
     if isinstance(solid, Polyhedron):
-        choice = choose_for_mesh(solid, n_points, UNLIMITED)
+        choice = choose_for_mesh(solid, n_points)
         if choice == CELLS:
             return None
         return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polyhedron_by(solid, choice, UNLIMITED))

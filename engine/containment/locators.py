@@ -187,7 +187,7 @@ def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
 def polyhedron_locator(solid: Polyhedron) -> Locator:
     """Return the locator by rays through the faces."""
     return _by_choice(
-        "ray_parity", lambda n_points, budget: polyhedron_by(solid, choose_for_mesh(solid, n_points, budget), budget)
+        "ray_parity", lambda n_points, budget: polyhedron_by(solid, choose_for_mesh(solid, n_points), budget)
     )
 
 

@@ -11,10 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from engine.containment.cells.lattice import can_have_cells, lattice_of
+from engine.containment.cells.lattice import can_have_cells
 from engine.containment.prepared.rings import edges_met
 from engine.containment.prepared.triangle_tree import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, faces_over
-from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 
@@ -33,11 +32,7 @@ _TREE: Final = 40_000.0
 _TREE_A_FACE: Final = 280.0
 _SOON: Final = 1.0 / 16.0
 """Share of the tree's cost that earlier passes may have taken: in general the second question builds it."""
-_CELLS_FROM, _CELLS_PER_FACE = 1 << 14, 3
-"""Points from which cells are built on ordinary meshes, where a tree has taken half as long by then."""
-_CELLS, _CELLS_A_FACE = 2_500_000.0, 1_500.0
-_ENTRIES_A_FACE, _CELLS_AN_ENTRY = 3.0, 900.0
-"""And what more of them cost."""
+_CELLS, _CELLS_A_FACE = 2_500_000.0, 500.0
 
 _IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
 _SLABS, _SLABS_AN_EDGE = 40_000.0, 15.0
@@ -45,25 +40,12 @@ _RING_CELLS, _RING_CELLS_AN_EDGE = 100_000.0, 80.0
 _IN_SLABS: Final = 50.0
 
 
-def cost_of_cells(solid: Polyhedron, budget: Budget) -> float:
-    """Return what cells cost to build: by how many the faces reach into."""
-
-    def find() -> float:
-        _, entries = lattice_of(solid, budget)
-        beyond = max(entries - _ENTRIES_A_FACE * len(solid.triangles), 0.0)
-        return _CELLS + _CELLS_A_FACE * len(solid.triangles) + _CELLS_AN_ENTRY * beyond
-
-    return solid.prepared("cost_of_cells", find, budget.check)
-
-
-def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
+def choose_for_mesh(solid: Polyhedron, n_points: int) -> int:
     """Return PASS, LISTS (the tree) or CELLS."""
     seen, n_faces = _points_seen(solid, n_points), len(solid.triangles)
     if n_points * n_faces <= _FEW_RAYS:
         return PASS
-    if n_points > _FEW and solid.kept("cells") is not None:
-        return CELLS
-    if n_points > _FEW and _pay_cells(solid, seen, budget):
+    if n_points > _FEW and (solid.kept("cells") is not None or _pay_cells(solid, seen)):
         return CELLS
     if solid.kept("tree") is not None:
         return LISTS
@@ -79,16 +61,13 @@ def choose_for_mesh(solid: Polyhedron, n_points: int, budget: Budget) -> int:
     return PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else LISTS
 
 
-def _pay_cells(solid: Polyhedron, seen: int, budget: Budget) -> bool:
+def _pay_cells(solid: Polyhedron, seen: int) -> bool:
     """Tell whether so many points are worth cells: soon on bad shapes, where a point is dear in the tree."""
     n_faces = len(solid.triangles)
-    least, are_many = _CELLS + _CELLS_A_FACE * n_faces, seen >= _CELLS_FROM + _CELLS_PER_FACE * n_faces
-    if not are_many and seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least:
+    least = _CELLS + _CELLS_A_FACE * n_faces
+    if seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least or seen * cost_in_tree(solid) <= least:
         return False
-    by_tree = seen * cost_in_tree(solid)
-    if not (are_many or by_tree > least) or not solid.prepared("can_have_cells", lambda: can_have_cells(solid)):
-        return False
-    return (are_many and cost_in_tree(solid) < 2.0 * IN_TREE) or by_tree > cost_of_cells(solid, budget)
+    return solid.prepared("can_have_cells", lambda: can_have_cells(solid))
 
 
 def choose_for_rings(solid: Polygon, n_points: int) -> int:

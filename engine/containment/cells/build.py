@@ -77,7 +77,7 @@ def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     """Return the cells of `solid`. Raises what `Budget.check` raises."""
-    tree, (lattice, _) = tree_of(solid, budget.check), lattice_of(solid, budget)
+    tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
     counts = count_triangles(mesh, budget)
     ends = np.cumsum(counts)
@@ -114,7 +114,7 @@ def sides_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Sides
 
 def build_sides(solid: Polyhedron, budget: Budget) -> Sides:
     """Return the sides of the cells of `solid`. Raises what `Budget.check` raises."""
-    tree, (lattice, _) = tree_of(solid, budget.check), lattice_of(solid, budget)
+    tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget)
     statuses = _statuses(_sides_of(tree, lattice, counts, True, budget), counts)
     return Sides(np.array([*lattice.low, *lattice.scale]), (statuses.ctypes.data, *lattice.n), statuses)

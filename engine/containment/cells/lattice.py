@@ -114,23 +114,20 @@ def can_have_cells(solid: Polyhedron) -> bool:
     return bool(1.0 / _RANGE < extent < _RANGE and np.abs(solid.vertices).max() < _RANGE)
 
 
-def lattice_of(solid: Polyhedron, budget: Budget) -> tuple[Lattice, float]:
-    """Return the grid, and how long its lists are in all, as a sample of the triangles says; prepared once.
+def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
+    """Return the grid, prepared once: so coarse that needles and large faces are not listed in more than some cells."""
 
-    It is so coarse that long needles and large faces are not listed in more than some cells each.
-    """
-    return solid.prepared("lattice", lambda: _find_lattice(tree_of(solid, budget.check), budget), budget.check)
+    def find() -> Lattice:
+        tree, most = tree_of(solid, budget.check), _MOST_CELLS
+        some = tree.triangles[:: len(tree.triangles) // _SAMPLE + 1].copy()
+        while True:  # bound: halved each turn
+            lattice = _make_lattice(tree, most)
+            entries = count_triangles(Mesh(tree.vertices, some, lattice), budget).sum() / len(some)
+            if entries <= _MOST_ENTRIES + _FEW_ENTRIES / len(tree.triangles) or max(lattice.n) <= _FEWEST_CELLS:
+                return lattice
+            most = min(most, max(lattice.n)) / 2.0
 
-
-def _find_lattice(tree: TriangleTree, budget: Budget) -> tuple[Lattice, float]:
-    some, most = tree.triangles[:: len(tree.triangles) // _SAMPLE + 1].copy(), _MOST_CELLS
-    while True:  # bound: halved each turn
-        lattice = _make_lattice(tree, most)
-        counts = count_triangles(Mesh(tree.vertices, some, lattice), budget)
-        entries = float(counts.sum()) / len(some) * len(tree.triangles)
-        if entries <= _MOST_ENTRIES * len(tree.triangles) + _FEW_ENTRIES or max(lattice.n) <= _FEWEST_CELLS:
-            return lattice, entries
-        most = min(most, max(lattice.n)) / 2.0
+    return solid.prepared("lattice", find, budget.check)
 
 
 def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:

@@ -28,7 +28,7 @@ def test_cells_are_built_only_when_they_pay(monkeypatch: pytest.MonkeyPatch) -> 
         again, accuracy = locate(points, solid, report=True)
         assert (again == first).all()
     assert accuracy.method == "segment_parity"
-    monkeypatch.setattr(policy, "_CELLS_FROM", 0)
+    monkeypatch.setattr(policy, "_CELLS", -np.inf)
     huge = Polyhedron(np.array(box_mesh([0, 0, 0], [1, 1, 1])["vertices"]) * 1e300, box_mesh([0] * 3, [1] * 3)["faces"])
     assert locate(points * 1e300, huge, report=True)[1].method == "ray_parity"
     tree = Csg("union", [solid, made(box_mesh([1, 0, 0], [2, 1, 1]))])
@@ -36,7 +36,7 @@ def test_cells_are_built_only_when_they_pay(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_cancelled_build_keeps_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(policy, "_CELLS_FROM", 0)
+    monkeypatch.setattr(policy, "_CELLS", -np.inf)
     solid = made(box_mesh([0, 0, 0], [1, 1, 1]))
     cancel = Cancel()
     cancel.set()
