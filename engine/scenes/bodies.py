@@ -257,4 +257,4 @@ def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
     if n < _MANY:
         return _AS_GIVEN[:n]
     entry_of(put_keys)(segments, t, where.together, keys := np.empty(n, np.uint16))
-    return np.argsort(keys, kind="stable")
+    return read_only(np.argsort(keys, kind="stable"))

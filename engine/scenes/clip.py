@@ -84,6 +84,7 @@ def answer_few(segments: Any, standing: Standing, keep: str) -> ScenePieces | Bo
         return None
     if standing.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
         return None
+    segments = read_only(segments)  # of the one kind that kernels are compiled for: this may be their first call
     n, is_any, order = len(segments), keep == "any", order_of(segments, 0.5, None)
     if keep == "all":
         parts, left, is_plain = _cut_near(segments, order, 0, n, standing, UNLIMITED)
@@ -116,7 +117,7 @@ def clip_first(
     if not len(left):
         return sure
     more = Counts(len(left))
-    some = clip_all(segments[left], standing, more, budget, workers)
+    some = clip_all(read_only(segments[left]), standing, more, budget, workers)
     counts.take(left, more)
     first = np.flatnonzero(np.append(True, some.source[1:] != some.source[:-1])[: len(some)])
     some.ranks[:, 1] = some.ranks[:, 1] > some.ranks[:, 0]
@@ -134,7 +135,7 @@ def meets_any(
     meets: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)
     more = Counts(len(left))
-    for part in _parts(segments[left], standing, more, budget, workers) if len(left) else ():
+    for part in _parts(read_only(segments[left]), standing, more, budget, workers) if len(left) else ():
         meets[left[part.source]] = True
     counts.take(left, more)
     return meets

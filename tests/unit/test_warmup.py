@@ -67,11 +67,29 @@ engine.warm(done.append)
 assert len(done) == before
 """
 
+FIRST_CALLS = """
+import sys
+import numpy as np
+from engine import Aabb, Pose, Scene, Sphere
+from engine.compiling.caches import KernelCache
+
+compiled = []
+KernelCache.save_overload = lambda self, types, result: compiled.append(self._function.__name__)
+scene = Scene([Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0], 1)], [None, Pose(np.eye(3), [0.5, 0, 0])])
+segments = np.array([[[-1.0, 0.2, 0.3], [3, 0.4, 0.2]], [[0, 0, -2.0], [0.3, 0.3, 3]]])
+for keep in sys.argv[2:]:
+    scene.clip_segments(np.tile(segments, (int(sys.argv[1]), 1, 1)), keep=keep)
+assert not compiled, compiled
+"""
+
 
 @pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="nothing is compiled")
 def test_nothing_is_compiled_after_warm() -> None:
     found = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=600)
     assert found.returncode == 0, found.stderr[-3000:]
+    for asked in (["1", "all", "any"], ["1", "any", "all"], ["4000", "all"], ["4000", "first"]):  # in another process
+        found = subprocess.run([sys.executable, "-c", FIRST_CALLS, *asked], capture_output=True, text=True, timeout=600)
+        assert found.returncode == 0, (asked, found.stderr[-3000:])
 
 
 COUNT = """
