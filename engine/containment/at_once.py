@@ -14,13 +14,12 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array
 from engine.containment.locators import Locator, locator_of, polygon_by, polyhedron_by, rational_half, settle
 from engine.containment.methods.filters import NOT_FINITE
-from engine.containment.methods.rational_locate import combine, is_located, over_tree
+from engine.containment.methods.rational_locate import is_located
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
 from engine.direct import entry_of
 from engine.running.budget import UNLIMITED
 from engine.solids.base import Solid
 from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
-from engine.solids.csg import Csg
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 from engine.solids.registry import row_of
@@ -67,8 +66,6 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
         return None
     plan = solid.kept("plan")
     if plan is None:
-        if type(solid) is Csg:
-            return _in_tree(array, solid)
         plan = _plan_of(solid, n_points)
         if plan is None:
             return None
@@ -109,15 +106,3 @@ def _kept(solid: Solid, key: str, locator: Locator) -> Plan | None:
         return None
     plan: Plan = entry, tuple(prepared), locator.method
     return solid.prepared(key, lambda: plan)
-
-
-def _in_tree(array: FloatArray, solid: Csg) -> Located | None:
-    """Return what `csg_locator` finds, each leaf asked at once; None where one of them cannot be."""
-    leaves: dict[int, Located | None] = {}
-    over_tree(solid, lambda leaf: leaves.setdefault(id(leaf), located_at_once(array, leaf)), lambda *_: None)
-    found = [leaf for leaf in leaves.values() if leaf is not None]
-    if len(found) < len(leaves):
-        return None
-    locations = over_tree(solid, lambda leaf: leaves[id(leaf)][0], combine)  # type: ignore[index]
-    beyond, rational = sum(leaf[1] for leaf in found), sum(leaf[2] for leaf in found)
-    return locations, min(beyond, len(array)), min(rational, len(array)), "csg_tree"
