@@ -1,5 +1,4 @@
-"""Few points, asked without options: compiled code is entered directly, with what it reads kept with the solid; and few
-points in few bodies, each asked by itself, which is sooner done than tables of all of them are made.
+"""Fast path for small batches without options: compiled code is entered directly, with cached arguments.
 
 The general way costs some 15 us before the first decision: budget, chunks, the compiler's look at types. A plan names
 the compiled code and its arguments; it checks no types, so points become what it was compiled for before.
