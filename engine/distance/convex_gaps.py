@@ -105,8 +105,8 @@ def _with(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
 @merged
 def _start(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple[Corner, float]:
     """Return the corner of M furthest against v, and its v . at."""
-    i = farthest(pool.points, pool.graph, a, turned_back(a.place, negative(v)), -1)
-    j = farthest(pool.points, pool.graph, b, turned_back(b.place, v), -1)
+    i = farthest(pool.points, a, turned_back(a.place, negative(v)))
+    j = farthest(pool.points, b, turned_back(b.place, v))
     at = minus(placed(point_of(pool.points, i), a.place), placed(point_of(pool.points, j), b.place))
     return Corner(at, i, j), dot(v, at)
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray
 from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
+from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, set_frame
 from engine.distance.boxes import (
     CLOSER,
     DONE,
@@ -37,8 +37,6 @@ from engine.distance.boxes import (
     fix,
     keep_below,
     measure_blocks,
-    scaled,
-    set_line,
     size_of,
     way_of,
 )
@@ -48,8 +46,6 @@ from engine.lanes.boxes import EMPTY, FRAME_ROWS
 from engine.lanes.discs import inverse_ratio
 from engine.lanes.gaps import child_bounds
 from engine.lanes.tracing import LANES
-from engine.predicates.vectors import length, minus
-from engine.types import Point3
 
 BEYOND: Final = 4
 """How a search ended that was none: beyond `_LARGEST` sums of coordinates may overflow."""
@@ -153,24 +149,6 @@ def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
     return DONE, keep_below(s.room.found, n_found, limits[0])
 
 
-@inline
-def _middle(view: View) -> Point3:
-    """Return the middle of a body's tree in space."""
-    o = view.mesh.origin
-    return scaled(placed(Point3(o[0], o[1], o[2]), view.place), view.unit)
-
-
-@inline
-def _start_line(s: Search) -> None:
-    """Take the line of the middles of both trees to begin with."""
-    s.room.line[:] = 0.0
-    start, their_start = _middle(s.a), _middle(s.b)
-    middle = minus(their_start, start)
-    size = length(middle)
-    if 0.0 < size < np.inf:
-        set_line(s.room.line, s.a, s.b, Point3(middle.x / size, middle.y / size, middle.z / size))
-
-
 @kernel
 def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
@@ -202,7 +180,7 @@ def find_nearest(
         defect = defect_of(place) + defect_of(other)
         set_frame(room.frames[0], place, first.origin, first.scale, other, second.origin, second.scale, defect)
         set_frame(room.frames[1], other, second.origin, second.scale, place, first.origin, first.scale, defect)
-        _start_line(s)
+        room.line[:] = 0.0
         how, n = _search(s, limits, flag)
         if how == CLOSER or (how == DONE and n == 0):
             answers[item] = 0.0 if how == CLOSER else np.inf

@@ -15,7 +15,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
-from engine.jit import allocating_kernel, merged
+from engine.jit import kernel, merged
 from engine.predicates.vectors import cross, length, minus
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -40,28 +40,20 @@ WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
 _NO_CLAIM = np.inf
 
 
-ConvexArrays = namedtuple("ConvexArrays", "points graph normals anchors firsts numbers")
+ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers")
 """Several convex bodies, one after another; few arrays, because kernels count references to each.
 
-points: (3, n) their vertices. graph: (n + 1,) places in itself where the neighbours of each vertex begin, the
-vertices at the other end of its edges; then these; then for each body the vertex farthest along each of 8
-diagonals. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths. anchors: (n_faces,) a
-vertex of each face. firsts: (3, n_bodies + 1) first vertex and face of each body; where its 8 vertices stand.
-numbers: (n_bodies, N_NUMBERS).
+points: (3, n) their vertices. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths.
+anchors: (n_faces,) a vertex of each face. firsts: (2, n_bodies + 1) first vertex and face of each body. numbers:
+(n_bodies, N_NUMBERS).
 """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvexBody:
-    """One convex body, its vertices numbered from 0.
-
-    first_neighbor: (n + 1,) into `neighbors`; outermost: (8,) vertices; the other fields as in `ConvexArrays`.
-    """
+    """One convex body, its vertices numbered from 0; fields as in `ConvexArrays`."""
 
     points: FloatArray
-    first_neighbor: IntArray
-    neighbors: IntArray
-    outermost: IntArray
     normals: FloatArray
     anchors: IntArray
     numbers: FloatArray
@@ -95,21 +87,18 @@ def _ball(ball: Sphere) -> ConvexBody:
     with np.errstate(over="ignore"):
         numbers[RADIUS], numbers[ROUND] = ball.radius * (1.0 + 2.0**-40), ball.radius
         numbers[REACH] = np.abs(ball.center).max() + ball.radius
-    none, points = np.empty(0, np.int64), np.ascontiguousarray(ball.center[:, None])
-    return ConvexBody(points, np.zeros(2, np.int64), none, np.zeros(8, np.int64), np.empty((4, 0)), none, numbers)
+    points = np.ascontiguousarray(ball.center[:, None])
+    return ConvexBody(points, np.empty((4, 0)), np.empty(0, np.int64), numbers)
 
 
 def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> ConvexBody:
     """Return the body of checked arrays: all vertices used, triangles outward."""
-    n_points, n_faces = len(vertices), len(triangles)
-    first_neighbor, neighbors = np.zeros(n_points + 1, np.int64), np.empty(3 * n_faces, np.int64)
-    outermost, numbers = np.empty(8, np.int64), np.zeros(N_NUMBERS)
-    normals = np.empty((4, n_faces))
+    normals, numbers = np.empty((4, len(triangles))), np.zeros(N_NUMBERS)
     numbers[CENTER:ASIDE] = center
     points, triangles = np.ascontiguousarray(vertices.T), np.ascontiguousarray(triangles)
     with np.errstate(all="ignore"):  # an overflow makes a claim impossible, not wrong
-        _describe(points, triangles, first_neighbor, neighbors, outermost, normals, numbers)
-    return ConvexBody(points, first_neighbor, neighbors, outermost, normals, triangles[:, 0].copy(), numbers)
+        _describe(points, triangles, normals, numbers)
+    return ConvexBody(points, normals, triangles[:, 0].copy(), numbers)
 
 
 @merged
@@ -118,11 +107,8 @@ def point_of(points: FloatArray, point: int) -> Point3:
     return Point3(points[0, point], points[1, point], points[2, point])
 
 
-@allocating_kernel
-def _describe(
-    points: FloatArray, triangles: IntArray, first_neighbor: IntArray, neighbors: IntArray, outermost: IntArray,
-    normals: FloatArray, numbers: FloatArray,
-) -> None:  # fmt: skip
+@kernel
+def _describe(points: FloatArray, triangles: IntArray, normals: FloatArray, numbers: FloatArray) -> None:
     """Fill everything but points and the centre.
 
     A normal from rounded differences and products is off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v| |w|
@@ -130,39 +116,27 @@ def _describe(
     """
     n_points = points.shape[1]
     for item in range(triangles.shape[0]):
-        for k in range(3):
-            first_neighbor[triangles[item, k] + 1] += 1
-    for point in range(n_points):
-        first_neighbor[point + 1] += first_neighbor[point]
-    filled = first_neighbor[:-1].copy()
-    for item in range(triangles.shape[0]):
         a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
-        for k in range(3):
-            start = triangles[item, k]
-            neighbors[filled[start]] = triangles[item, (k + 1) % 3]
-            filled[start] += 1
         v, w = minus(point_of(points, b), point_of(points, a)), minus(point_of(points, c), point_of(points, a))
         n, sides = cross(v, w), length(v) * length(w)
         normals[:3, item], normals[3, item] = 0.0, _NO_CLAIM
         if length(n) > 2.0**-30 * sides and 2.0**-900 < length(n) < 2.0**900:
             normals[0, item], normals[1, item], normals[2, item] = n.x / length(n), n.y / length(n), n.z / length(n)
             normals[3, item] = 2.0**-48 * sides / length(n)
+    for axis in range(3):
+        numbers[ASIDE + axis] = numbers[CENTER + axis]
     for octant in range(8):
-        best = -np.inf
-        outermost[octant] = 0
+        best, outermost = -np.inf, 0
         for point in range(n_points):
             value = 0.0
             for axis in range(3):
                 value += points[axis, point] if octant >> axis & 1 else -points[axis, point]
             if value > best:
-                best = value
-                outermost[octant] = point
+                best, outermost = value, point
+        for axis in range(3):
+            numbers[ASIDE + axis] += WEIGHTS[octant] * (points[axis, outermost] - numbers[CENTER + axis])
     reach = 0.0
     for axis in range(3):
-        c = numbers[CENTER + axis]
-        numbers[ASIDE + axis] = c
-        for octant in range(8):
-            numbers[ASIDE + axis] += WEIGHTS[octant] * (points[axis, outermost[octant]] - c)
         for point in range(n_points):
             reach = max(reach, abs(points[axis, point]))
     radius = 0.0
@@ -180,21 +154,11 @@ def pooled(bodies: Sequence[ConvexBody]) -> ConvexArrays:
     """Return several bodies as the arrays that kernels take."""
     first_point = _starts([body.points.shape[1] for body in bodies])
     first_face = _starts([len(body.anchors) for body in bodies])
-    n_points = int(first_point[-1])
-    first_neighbor = _starts([len(body.neighbors) for body in bodies]) + n_points + 1
-    end = first_neighbor[-1:]
-    graph = [
-        *(body.first_neighbor[:-1] + start for body, start in zip(bodies, first_neighbor)),
-        end,
-        *(body.neighbors + start for body, start in zip(bodies, first_point)),
-        *(body.outermost + start for body, start in zip(bodies, first_point)),
-    ]
     return ConvexArrays(
         np.ascontiguousarray(np.concatenate([np.empty((3, 0)), *(body.points for body in bodies)], axis=1)),
-        np.concatenate(graph),
         np.ascontiguousarray(np.concatenate([np.empty((4, 0)), *(body.normals for body in bodies)], axis=1)),
         np.concatenate([np.empty(0, np.int64), *(body.anchors + start for body, start in zip(bodies, first_point))]),
-        np.stack([first_point, first_face, end + 8 * np.arange(len(bodies) + 1)]),
+        np.stack([first_point, first_face]),
         np.concatenate([np.empty(0), *(body.numbers for body in bodies)]).reshape(-1, N_NUMBERS),
     )
 

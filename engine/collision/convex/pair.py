@@ -67,7 +67,7 @@ def relate_convex(
         return DISJOINT
     if a.round > 0.0 and b.round > 0.0:
         return _relate_balls(np.sqrt(square), a.round, b.round, error, may_be_equal)
-    found = meet_or_apart(pool.points, pool.graph, a, b, start)
+    found = meet_or_apart(pool.points, a, b, start)
     if found == APART:
         return DISJOINT
     if found != MEETING:
@@ -189,7 +189,6 @@ def relate_convex_pairs(
 
 APART, MEETING = 0, 1
 
-_FEW = 24
 _TURNS = 48
 _GUARD = 2.0**-900
 
@@ -198,15 +197,13 @@ class PlacedBody(NamedTuple):
     """One body of a pool and where it stands, and what of the pool concerns it.
 
     place: its error is twice the bound of `placement.py`, so that it covers the rounding of a difference of two such
-    coordinates and of a ball's. round: radius of a ball, 0.0 for others. first, stop: its vertices. outermost: where
-    its 8 vertices on the diagonals stand in `graph`.
+    coordinates and of a ball's. round: radius of a ball, 0.0 for others. first, stop: its vertices.
     """
 
     place: Placement
     round: float
     first: int
     stop: int
-    outermost: int
 
 
 @merged
@@ -215,32 +212,17 @@ def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> 
     numbers, firsts, shift = pool.numbers, pool.firsts, as_point3(poses.translations, item)
     error = 2.0**-49 * (3.0 * numbers[body, REACH] + largest_of(shift)) + 2.0**-1060
     place = as_placement(poses, item, shift, error)
-    return PlacedBody(place, numbers[body, ROUND], firsts[0, body], firsts[0, body + 1], firsts[2, body])
+    return PlacedBody(place, numbers[body, ROUND], firsts[0, body], firsts[0, body + 1])
 
 
 @merged
-def farthest(points: FloatArray, graph: IntArray, f: PlacedBody, local: Point3, hint: int) -> int:
-    """Return a vertex about farthest along a local direction: all of few, else uphill from `hint`, -1 for none."""
-    if f.stop - f.first <= _FEW:
-        best, found = -np.inf, f.first
-        for point in range(f.first, f.stop):
-            value = dot(point_of(points, point), local)
-            if value > best:
-                best, found = value, point
-        return found
-    found = hint
-    if found < 0:
-        octant = (1 if local.x > 0.0 else 0) + (2 if local.y > 0.0 else 0) + (4 if local.z > 0.0 else 0)
-        found = graph[f.outermost + octant]
-    best = dot(point_of(points, found), local)
-    for _ in range(f.stop - f.first):  # bound: the value grows, so no vertex comes twice
-        start = found
-        for place in range(graph[start], graph[start + 1]):
-            value = dot(point_of(points, graph[place]), local)
-            if value > best:
-                best, found = value, graph[place]
-        if found == start:
-            break
+def farthest(points: FloatArray, f: PlacedBody, local: Point3) -> int:
+    """Return a vertex about farthest along a local direction."""
+    best, found = -np.inf, f.first
+    for point in range(f.first, f.stop):
+        value = dot(point_of(points, point), local)
+        if value > best:
+            best, found = value, point
     return found
 
 
@@ -288,7 +270,7 @@ def _size(a: Point3) -> float:
 
 
 @inline
-def meet_or_apart(points: FloatArray, graph: IntArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
+def meet_or_apart(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
     """Return APART, MEETING (the open interiors) or UNSETTLED. v0: a point of M, better not one of its symmetry.
 
     Stages: 0 and 1 find the first two corners, 2 the third, until the half-line from v0 to the origin passes between
@@ -296,11 +278,10 @@ def meet_or_apart(points: FloatArray, graph: IntArray, a: PlacedBody, b: PlacedB
     """
     error, rounding = a.place.error + b.place.error, a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0
-    i = j = -1
     stage = 0
     for _ in range(_TURNS):
-        i = farthest(points, graph, a, turned_back(a.place, d), i)
-        j = farthest(points, graph, b, turned_back(b.place, negative(d)), j)
+        i = farthest(points, a, turned_back(a.place, d))
+        j = farthest(points, b, turned_back(b.place, negative(d)))
         v = minus(placed(point_of(points, i), a.place), placed(point_of(points, j), b.place))
         if rounding > 0.0:
             scale = rounding / length(d)

@@ -22,7 +22,7 @@ def ask(pool: ConvexArrays, placed: PoseArrays, found: Any) -> None:
     for item in range(found.shape[0]):
         a, b = placed_body(pool, 0, placed, 0), placed_body(pool, 1, placed, item)
         start = minus(inner_point(pool.numbers, 0, a, CENTER), inner_point(pool.numbers, 1, b, ASIDE))
-        found[item] = meet_or_apart(pool.points, pool.graph, a, b, start)
+        found[item] = meet_or_apart(pool.points, a, b, start)
 
 
 def claims(second: Aabb, placed: list[Pose]) -> list[int]:
