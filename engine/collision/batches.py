@@ -47,8 +47,7 @@ class PairBatches:
         self.kept: tuple[Any, IntArray] | None = None
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
-        """Return the outlines of the plane or the convex bodies of space, and the place of each solid among them, -1
-        for others; each is looked at once."""
+        """Return the outlines or convex bodies in one pool, and the place of each solid in it, -1 for others."""
         if self.kept is None:
             self.kept = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
         return self.kept
@@ -221,8 +220,7 @@ def _placed(
 
 
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
-    """Return each solid once and which of them each body is; raise unless every solid is one that `collide` takes, all
-    of one dimension."""
+    """Return the distinct solids and which each body is; raise unless `collide` takes all, in one dimension."""
     distinct, kinds = distinct_of(bodies)
     for body in distinct:
         try:

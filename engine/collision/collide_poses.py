@@ -206,10 +206,7 @@ _SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in 
 
 
 def _ball_batch(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None]:
-    """Return the function that answers a range of poses of the second, UNSETTLED where floats do not prove it.
-
-    One of the two is a ball, the other a polyhedron or a surface.
-    """
+    """Return the kernel task for a ball and a mesh over a range of poses; what floats do not prove is UNSETTLED."""
     is_swapped = isinstance(first, Sphere)
     body, ball = (second, first) if is_swapped else (first, second)
     assert isinstance(ball, Sphere)

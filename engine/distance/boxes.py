@@ -63,8 +63,7 @@ def new_room(room: int) -> Room:
 
 
 class Search(NamedTuple):
-    """One question: both bodies, a bound on the distance of a point from its rounded one, both bodies together, and
-    work space."""
+    """One question: both bodies, a bound on the rounding of points of both together, and work space."""
 
     a: View
     b: View

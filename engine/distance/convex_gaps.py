@@ -124,8 +124,7 @@ def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: fl
 @merged
 def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, gap: float,
                   is_measured: bool) -> float:  # fmt: skip
-    """Return the distance of two bodies without a common point, infinity where it is surely at least the gap, NaN where
-    this is not sure; where it is not to be measured 0.0 for one that is surely below."""
+    """Return the distance, infinity if at least the gap, NaN if unsure; if not is_measured, 0.0 if nearer than it."""
     error = a.place.error + b.place.error
     v = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
     corner, along = _start(pool, a, b, v)
@@ -186,8 +185,7 @@ def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach:
 
 @inline
 def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
-    """Return three vertices, different ones first, and which feature of their triangle they are: of one vertex a
-    vertex, of two an edge."""
+    """Return three vertices, distinct ones first, and their feature: vertex, edge or FACE."""
     if i == j:
         j, k = k, j
     if i == j:

@@ -63,8 +63,7 @@ def _told(distance: float, least: float | None) -> Clearance | bool | None:
 
 
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of two boxes or balls, or whether it is at least so much; None for other bodies, boxes that
-    are turned, and where it is not sure."""
+    """Return the clearance of two forms, or whether it is at least `least`; None where that is not sure."""
     if first.type not in FORMS or second.type not in FORMS:
         return None
     form, other = form_of(first), form_of(second)

@@ -137,8 +137,7 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 @called
 def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
-    """Return the distance of two points of the triangles, and by how much the triangles may be nearer at most but for
-    rounding."""
+    """Return the distance of two nearly nearest points, and by how much the triangles may be nearer."""
     p, q, _, _ = ends_of(s, t, first, second)
     n = less3(q, p)
     square = dot3(n, n)

@@ -221,8 +221,7 @@ Outline = tuple[FloatArray, IntArray, float, "_Names"]
 
 
 def outline_of(solid: Solid) -> Outline:
-    """Return the vertices (n, d) of a ball or a body of the plane, for each edge the vertex at its end, the radius, and
-    by number the vertices and then the edges as the caller knows them."""
+    """Return vertices (n, d), the end vertex of each edge, the radius, and names of vertices, then edges."""
     kept: Outline | None = solid.kept("outline and names")
     return solid.prepared("outline and names", lambda: _outline(solid)) if kept is None else kept
 

@@ -269,8 +269,7 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
 
 @merged
 def keep_first(faces: Any, their_faces: Any, pairs: Any, kinds: Any, i: int, j: int, kind: int) -> tuple[int, int, int]:
-    """Put a pair among the last N_NAMED rows, in order, those not used -1; return the one that then has no place there,
-    -1 where all have."""
+    """Insert a pair into the sorted last N_NAMED rows; return the pair that drops out, -1 for none."""
     n = kinds.shape[0]
     for place in range(n - N_NAMED if _stands_before(faces, their_faces, i, j, pairs, n - 1) else n, n):
         if _stands_before(faces, their_faces, i, j, pairs, place):

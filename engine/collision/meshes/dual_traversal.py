@@ -148,8 +148,7 @@ def before_poses(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
 
 @inline
 def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
-    """Return a face of either body for exact signs, and an axis along which each has an area: placed, where that rounds
-    nothing, else before its pose."""
+    """Return two faces for exact signs, before their poses unless placing is exact, and an axis of each."""
     axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
     if s.place.error == 0.0:
         t, u = placed_triangle(triangle_of(s.first, i), s.place.a), placed_triangle(triangle_of(s.second, j), s.place.b)
@@ -283,8 +282,7 @@ def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int
 
 @merged
 def search(s: Search) -> tuple[int, int]:
-    """Write the pairs of faces not apart and their classes, one that settles to row 0; return how it ended, and how
-    many there are, more than the room holds maybe."""
+    """Write the pairs of faces not apart, a settling one to row 0; return how the search ended, and their number."""
     stack = s.descent.stack
     stack[0, 0], stack[0, 1] = 0, 0
     n_stack, n_pairs = 1, 0

@@ -40,8 +40,7 @@ WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
 
 
 class Sides(NamedTuple):
-    """Status of one body at a point of a face: inside just above, just below, the point itself inside and on no
-    face."""
+    """Status of a body at a point of a face: inside just above, just below, and at it (on no face)."""
 
     above: bool
     below: bool
@@ -122,8 +121,7 @@ def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Bud
 
 
 def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
-    """Yield a point within and the corners of each of convex cells that fill a face with area, between the traces of
-    the other faces of its body."""
+    """Yield a point within, and the corners, of each convex cell between the traces of its body's faces."""
     plane, axis = body.plane(face), body.axis(face)
     for (x, y), (x0, x1, low, high) in _samples(body, face, _traces(body, face, [body], budget), budget):
         corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))

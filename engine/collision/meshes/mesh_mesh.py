@@ -113,8 +113,7 @@ def told_by_kernel(
 
 @lru_cache(1 << 14)
 def answer_of(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
-    """Return what a row of `relate_poses` says, None where that is not all; made once: that takes longer than to find
-    a contact."""
+    """Return what a row of `relate_poses` says, None if incomplete; cached, as making it costs more than a search."""
     if relation == DISJOINT:
         return NO_CONTACT
     if UNSETTLED in (relation, kind):

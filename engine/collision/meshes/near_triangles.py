@@ -89,8 +89,7 @@ def _foot(p: Point3, t: Facet) -> tuple[bool, Point3]:
 
 
 class Across(NamedTuple):
-    """A lower bound on the distance of two triangles, the distance of the nearest points so far, the direction from one
-    to the other, and whether no nearer ones are wanted."""
+    """Bounds on the distance of two triangles from below and above, the direction, and whether that is enough."""
 
     low: float
     size: float
@@ -114,8 +113,7 @@ def _across(s: Facet, t: Facet, found: Nearest, before: Across, most: float) -> 
 
 @inline
 def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, Across]:
-    """Return nearly nearest points of two triangles that are apart, and bounds; any points of them where they prove to
-    be further apart than `most`."""
+    """Return nearly nearest points of two disjoint triangles and bounds; any points beyond `most`."""
     best, across = Nearest(s.p, t.p, 0, 0, np.inf), Across(-np.inf, np.inf, Point3(0.0, 0.0, 0.0), False)
     for i in range(3):
         for j in range(3):

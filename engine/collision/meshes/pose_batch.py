@@ -147,8 +147,7 @@ def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, int]:
 
 @inline
 def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
-    """Bring the first N_NAMED of n pairs of triangles to the front: flush ones first, then by the callers' faces, then
-    by their numbers."""
+    """Sort the first N_NAMED pairs to the front: coplanar ones, then by the callers' faces, then by numbers."""
     for item in range(1, n):
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
         key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item

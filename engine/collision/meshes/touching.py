@@ -62,8 +62,7 @@ _SAMPLED = 16
 
 
 class Vertices(NamedTuple):
-    """The vertices (n, 3) of a body for exact signs: how they are placed, and the pose, UNPOSED where placing rounds
-    nothing."""
+    """The vertices (n, 3) of a body for exact signs, its placement and pose (UNPOSED where placing is exact)."""
 
     points: Any
     place: Placement
@@ -81,8 +80,7 @@ def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
 
 @called
 def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
-    """Return the closed side (1, -1) of a plane on which about so many vertices lie, 0 if they lie on it; UNDECIDED if
-    they lie on both sides, or where a sign is open."""
+    """Return the closed side (1, -1) of a plane that holds about n_samples vertices, 0 on it; UNDECIDED otherwise."""
     found, n = 0, v.points.shape[0]
     for vertex in range(0, n, max(1, n // n_samples)):
         side = sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error)
@@ -190,8 +188,7 @@ def judge(s: Search, item: int) -> tuple[int, bool]:
 
 @allocating
 def relate_clean(s: Search, n: int) -> int:
-    """Return OVERLAPPING or TOUCHING where n contacts of two bodies with an inside, all there are and none a crossing,
-    tell it by clean faces; else UNSETTLED."""
+    """Return OVERLAPPING or TOUCHING where clean faces tell it of n contacts without a crossing; else UNSETTLED."""
     shares = np.zeros(n, np.bool_)
     for item in range(n):
         how, shares[item] = judge(s, item)

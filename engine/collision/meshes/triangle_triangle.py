@@ -104,8 +104,7 @@ def corner(t: Facet, index: int) -> Any:
 
 @inline
 def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
-    """Return two triangles with the lone vertices first, each above the plane of the other; sides: of the corners of
-    t1 of the plane of t2, and the other way."""
+    """Return both triangles, lone vertex first and above the plane of the other; sides: t1 of t2, then t2 of t1."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
     a, b = turned(t1, lone1), turned(t2, lone2)

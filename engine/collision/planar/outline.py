@@ -124,8 +124,7 @@ def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[
 
 
 def _down(outlines: list[Outline]) -> int:
-    """Return what coordinates are divided by where they are arranged: poses may take some beyond the largest double,
-    not as far as to four times that."""
+    """Return a divisor of coordinates that keeps posed ones, below four times the largest double, in range."""
     return 1 if all(np.isfinite(outline.floats).all() for outline in outlines) else 4
 
 
@@ -197,8 +196,7 @@ def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Wor
 
 
 class _Lying(NamedTuple):
-    """Of two outlines: the labels of the faces; whether the boundaries meet; of each body, of all pieces of edges off
-    the other's boundary and all points, whether they lie in the other's open interior."""
+    """Labels of faces; do boundaries meet; of each body, which pieces and points lie in the other's open interior."""
 
     labels: list[int]
     meet: bool

@@ -357,8 +357,7 @@ def _relate_two(
 
 
 def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, int, int]:
-    """Return what `relate_placed` does, UNSETTLED where that is not all: of bodies that meet and are not simple, or
-    large."""
+    """Return what `relate_placed` does; UNSETTLED for large bodies, and for those that meet and are not simple."""
     one, other = outline_arrays(first), outline_arrays(second)
     if max(len(one[1]), len(other[1])) > MOST_EDGES:
         return UNSETTLED, 0, -1, -1, APART

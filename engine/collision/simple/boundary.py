@@ -223,8 +223,7 @@ def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
 
 
 def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vector, ...]]:
-    """Yield the corners of triangles that together are what even-odd leaves of one face, in the body's own coordinates:
-    of a whole face its own."""
+    """Yield triangles, in own coordinates, that fill what even-odd leaves of a face; of a whole face its own."""
     if mesh.arrays.axis[face] == NO_AREA:
         return
     if state_at(mesh.arrays, face) != STATE_STACKED:

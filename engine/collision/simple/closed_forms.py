@@ -73,8 +73,7 @@ def _form(solid: Solid) -> FloatArray | None:
 
 
 def by_forms_or(otherwise: PairFunction) -> PairFunction:
-    """Return what decides boxes and balls by `relate_forms`, and by another function what that does not tell: flat
-    boxes, turned ones, witnesses in the plane and of a posed box on a ball, exponents beyond its range."""
+    """Return the function that asks `relate_forms` first, then another one for what that leaves open."""
 
     def collide_forms(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
         d = first.dimension

@@ -257,8 +257,7 @@ def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: fl
 
 @inline
 def _are_safe(a: Placed) -> bool:
-    """Tell whether all numbers of a form are of sizes for which expansions of degree four are exact, and that it is no
-    box that the pose turns otherwise than by the lattice."""
+    """Tell whether expansions of degree four are exact for a form, and that no box is turned off the lattice."""
     form, turn, move = a
     safe = is_safe(form[RADIUS])
     for axis in range(turn.shape[0]):
@@ -279,8 +278,7 @@ def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
 
 @called
 def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
-    """Return the sign of the square of the nearest (farthest) distance of a form from the centre of a ball, less the
-    square of the ball's radius plus factor times the form's."""
+    """Return the sign of (nearest or farthest distance from the ball's centre)^2 - (its radius + factor radius)^2."""
     total, n = workspace(_N_TOTAL), 0
     below, above, both = workspace(_N_COORDINATE), workspace(_N_COORDINATE), workspace(_N_COORDINATE)
     for axis in range(a.turn.shape[0]):
