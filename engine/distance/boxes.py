@@ -1,8 +1,7 @@
 """What a search for the nearest triangles sees and holds; of two blocks, which pairs of triangles may be the nearest.
 
 All numbers are those of the two bodies under poses that `place_pair` moved together, times a power of two that brings
-them near 1. Each body alone is looked at along a line: a direction d in its own axes and in space. `defect` bounds
-|R' R - I|: d is longer in one of them by less than twice it. Everything else is rounding: `margin`.
+them near 1.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from engine.arrays import Float32Array, FloatArray
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
-from engine.collision.meshes.placement import Placement, placed, turned_back
+from engine.collision.meshes.placement import Placement, placed
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.jit import inline, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
@@ -44,11 +43,10 @@ Heap = namedtuple("Heap", "bounds lanes")
 Candidates = namedtuple("Candidates", "pairs bounds")
 """Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
 
-Room = namedtuple("Room", "heap found limits line points frames work fixed")
+Room = namedtuple("Room", "heap found limits points frames work fixed")
 """Work space of searches, one at a time.
 
-limits (2,): of a search (traversal.py). line (6,): the direction of the nearest pair so far, not longer than 1, in the
-axes of both bodies. points (2, 3): the nearest. frames, work, fixed: of `lanes/gaps.py`.
+limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, work, fixed: of `lanes/gaps.py`.
 """
 
 
@@ -56,7 +54,7 @@ def new_room(room: int) -> Room:
     """Return work space for so many pairs."""
     heap, found = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
-        heap, Candidates(found, np.empty(room)), np.empty(2), np.zeros(6),
+        heap, Candidates(found, np.empty(room)), np.empty(2),
         np.empty((2, 3)), np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((GAP_ROWS, LANES), np.float32),
         np.empty((FIXED_ROWS, LANES), np.float32),
     )  # fmt: skip
@@ -96,21 +94,6 @@ def size_of(view: View) -> float:
     return float(view.mesh.scale * view.unit)
 
 
-@merged
-def way_of(line: FloatArray, row: int, sign: float) -> tuple[float, float, float]:
-    """Return the direction of the line, or against it, in the axes of a body."""
-    return sign * line[3 * row], sign * line[3 * row + 1], sign * line[3 * row + 2]
-
-
-@inline
-def set_line(line: FloatArray, a: View, b: View, d: Point3) -> None:
-    """Keep a direction, not longer than 1, in the axes of either body."""
-    d = Point3(_BELOW_ONE * d.x, _BELOW_ONE * d.y, _BELOW_ONE * d.z)
-    e, f = turned_back(a.place, d), turned_back(b.place, d)
-    line[0], line[1], line[2] = e.x, e.y, e.z
-    line[3], line[4], line[5] = f.x, f.y, f.z
-
-
 DONE: Final = 0
 FULL: Final = 1
 CLOSER: Final = 2
@@ -128,9 +111,9 @@ def _triangle(view: View, item: int) -> Facet:
 
 
 @inline
-def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, Point3, tuple[int, int]]:
-    """Return bounds on the distance of two triangles, from below and above, and direction and features of nearly
-    nearest points; of any where the lower bound is above `most`.
+def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, tuple[int, int]]:
+    """Return bounds on the distance of two triangles, from below and above, and the features of nearly nearest
+    points; of any where the lower bound is above `most`.
 
     error: bound on the distance of a point from its rounded one, both bodies together.
     """
@@ -138,7 +121,7 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
     s, t = seen_from(origin, s), seen_from(origin, t)
     slack = rounding_of(s, t) + error
     best, across = nearest_points(s, t, most + slack)
-    return max(across.low - slack, 0.0), across.size + slack, across.way, (best.first, best.second)
+    return max(across.low - slack, 0.0), across.size + slack, (best.first, best.second)
 
 
 @inline
@@ -160,26 +143,24 @@ def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: FloatArray) 
 
     limits: as in `find_nearest`; the first falls.
     """
-    line, frames, work, found = s.room.line, s.room.frames, s.room.work, s.room.found
-    way, per_size = way_of(line, 0, 1.0), _ABOVE_ONE / size_of(s.a)
-    place_triangles(s.b.mesh.blocks, j, frames, way, work)
+    frames, work, found, per_size = s.room.frames, s.room.work, s.room.found, _ABOVE_ONE / size_of(s.a)
+    place_triangles(s.b.mesh.blocks, j, frames, work)
     for k in range(LANES):
         own = int(s.a.mesh.child[i, k])
         if own == EMPTY:
             break
-        bits = near_triangle(s.a.mesh.blocks, i, k, frames, way, limits[0] * per_size, work)
+        bits = near_triangle(s.a.mesh.blocks, i, k, frames, limits[0] * per_size, work)
         t = _triangle(s.a, -1 - own)
         while bits != 0:  # bound: each turn takes a bit
             their = int(s.b.mesh.child[j, lowest_bit(bits)])
             bits &= bits - 1
             if their == EMPTY:
                 break
-            low, high, d, features = _measure(t, _triangle(s.b, -1 - their), s.error, limits[0])
+            low, high, features = _measure(t, _triangle(s.b, -1 - their), s.error, limits[0])
             if high < limits[1]:
                 return CLOSER, 0
             if high < limits[0]:
                 limits[0] = high
-                set_line(line, s.a, s.b, d)
             if low > limits[0]:
                 continue
             if n_found == len(found.bounds):

@@ -1,11 +1,10 @@
 """The pairs of triangles of two placed bodies that may be the nearest, by a best-first descent of both trees.
 
-A pair of boxes, each with the disc of what it holds, is bounded from below by `lanes/gaps.py`, along the line of the
-nearest pair so far too. Pairs wait in a heap, the least bound first; the larger box of a pair is opened, its eight
-children are bounded at once. Of two blocks the pairs of triangles that may be near are told eight at once and bounded
-from both sides (near_triangles.py); the least upper bound so far ends the search once no pair that waits is below it.
-What is returned are all pairs of triangles whose lower bound does not exceed the least upper bound: the distance of the
-bodies is that of one of them.
+A pair of boxes, each with the disc of what it holds, is bounded from below by `lanes/gaps.py`. Pairs wait in a heap,
+the least bound first; the larger box of a pair is opened, its eight children are bounded at once. Of two blocks the
+pairs of triangles that may be near are told eight at once and bounded from both sides (near_triangles.py); the least
+upper bound so far ends the search once no pair that waits is below it. What is returned are all pairs of triangles
+whose lower bound does not exceed the least upper bound: the distance of the bodies is that of one of them.
 
 limits (2,) of a search: pairs above the first are not looked for (it falls to the least upper bound found); a pair
 below the second ends it as CLOSER.
@@ -38,7 +37,6 @@ from engine.distance.boxes import (
     keep_below,
     measure_blocks,
     size_of,
-    way_of,
 )
 from engine.distance.refined import certify, refine
 from engine.jit import inline, kernel, merged
@@ -105,7 +103,7 @@ def _open(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
     fix(fixed, other, s.room.fixed)
     child_bounds(
         view.mesh.boxes, view.mesh.discs, node, s.room.fixed, s.room.frames, own * FRAME_ROWS, (1 - own) * FRAME_ROWS,
-        their_unit / unit, inverse_ratio(their_unit, unit), way_of(s.room.line, own, 1.0 - 2.0 * own), s.room.work,
+        their_unit / unit, inverse_ratio(their_unit, unit), s.room.work,
     )  # fmt: skip
     for lane in range(LANES):
         bound, at = unit * float(s.room.work[0, lane]), node * LANES + lane
@@ -180,7 +178,6 @@ def find_nearest(
         defect = defect_of(place) + defect_of(other)
         set_frame(room.frames[0], place, first.origin, first.scale, other, second.origin, second.scale, defect)
         set_frame(room.frames[1], other, second.origin, second.scale, place, first.origin, first.scale, defect)
-        room.line[:] = 0.0
         how, n = _search(s, limits, flag)
         if how == CLOSER or (how == DONE and n == 0):
             answers[item] = 0.0 if how == CLOSER else np.inf

@@ -6,8 +6,8 @@ Distances are counted in the units of a tree: that of the eight children, for tr
 
 **Directions.** Along any direction the gap between two bodies, over the direction's length, is below their distance.
 Boxes: the axes of either tree, whose gaps are put together. Discs, which hold a patch of surface far closer: the line
-of their middles, either normal, and a direction of the caller's; along d a disc reaches |g| t + sqrt(1 - g^2) r from
-its middle, g the product of d and its normal. Triangles: the line of their middles, and a direction of the caller's.
+of their middles and either normal; along d a disc reaches |g| t + sqrt(1 - g^2) r from its middle, g the product of d
+and its normal. Triangles: the line of their middles.
 
 **margin.** Triangles: as derived in `faces.py`, margin |w|_1 along a direction w. Boxes are enlarged by the margin
 where they are taken to the other tree, as in `boxes.py`. Discs: both sides of a comparison along a normal are off by
@@ -24,13 +24,13 @@ from typing import Final
 from engine.lanes.boxes import BOX_ROWS, MARGIN_ROW, SHIFT_ROW
 from engine.lanes.discs import DISC_ROWS, ROUND
 from engine.lanes.lanes import bits_of, dot, greater, lesser, load, load_lane, root, store
-from engine.lanes.tracing import Lanes, Number, Rows, Triple, traced
+from engine.lanes.tracing import Lanes, Number, Rows, traced
 from engine.lanes.triangles import CORNER_ROWS
 
 FIXED_ROWS: Final = BOX_ROWS + DISC_ROWS
-GAP_ROWS: Final = 13
-"""Of work space: the corners of eight triangles, three times their middles, and how near each comes along a way."""
-_MIDDLES, _NEAREST = 9, 12
+GAP_ROWS: Final = 12
+"""Of work space: the corners of eight triangles, and three times their middles."""
+_MIDDLES: Final = 9
 _TINY: Final = 2.0**-120
 _BELOW_ONE: Final = 1.0 - 2.0**-18
 _MOST: Final = 2.0**60
@@ -57,13 +57,13 @@ def _width(disc: Sequence[Lanes], cosine: Lanes) -> Lanes:
 @traced
 def child_bounds(
     boxes: Rows, discs: Rows, node: int, fixed: Rows, frames: Rows, own: int, theirs: int, ratio: Number,
-    inverse: Number, way: Triple, work: Rows,
+    inverse: Number, work: Rows,
 ) -> None:  # fmt: skip
     """Write lower bounds on the distances of the eight children of a node and what is fixed to the first row of work.
 
     fixed (FIXED_ROWS, 8): in its first column a box and a disc, in the tree of the other body. own, theirs: the rows of
     frames where the maps begin to the tree of the node and from it; ratio: the other tree's scale over this one's, and
-    its inverse. way: a direction from the children to what is fixed, not longer than 1, in the tree of the node.
+    its inverse.
     """
     box, disc = (
         [load(rows, n * node + row) for row in range(n)] for rows, n in ((boxes, BOX_ROWS), (discs, DISC_ROWS))
@@ -88,7 +88,6 @@ def child_bounds(
     bound = greater(root(_gaps(v, reach)), ratio * lesser(root(_gaps(w, their_reach)), _MOST))
     for level, cosine, their_cosine in (
         (size, on_own / greater(size, _TINY), on_their / greater(size, _TINY)),
-        (dot(way, d), dot(way, disc[3:6]), dot(way, normal)),
         (abs(on_own) - flat[1], None, g),
         (abs(on_their) - their_flat[1], g, None),
     ):
@@ -105,9 +104,8 @@ def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]
 
 
 @traced
-def place_triangles(blocks: Rows, node: int, frames: Rows, way: Triple, work: Rows) -> None:
-    """Write the triangles of a block of the second body, in the tree of the first, to work, and how near they come
-    along a direction of that tree."""
+def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
+    """Write the triangles of a block of the second body, in the tree of the first, to work."""
     own, corners = [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)], []
     for corner in range(3):
         for k in range(3):
@@ -116,18 +114,15 @@ def place_triangles(blocks: Rows, node: int, frames: Rows, way: Triple, work: Ro
             store(work, 3 * corner + k, corners[-1])
     for k in range(3):
         store(work, _MIDDLES + k, corners[k] + corners[3 + k] + corners[6 + k])
-    store(work, _NEAREST, _ends(way, corners)[0])
 
 
 @traced
-def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, way: Triple, most: Number, work: Rows) -> int:
+def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number, work: Rows) -> int:
     """Return the triangles in work, a bit each, that may be as near as `most` to one in a lane of a block; lanes that
-    are not used count as near. way: as for `place_triangles`."""
+    are not used count as near."""
     own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
     theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
     d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]
     x, y, z = _sizes(d)
     gap = _ends(d, theirs)[0] - _ends(d, own)[1] - margin * (x + y + z)
-    is_apart = gap * _BELOW_ONE > most * root(dot(d, d)) + _TINY
-    along = load(work, _NEAREST) - _ends(way, own)[1] - margin * 2.0
-    return bits_of(~(is_apart | (along * _BELOW_ONE > most)))
+    return bits_of(~(gap * _BELOW_ONE > most * root(dot(d, d)) + _TINY))

@@ -26,7 +26,6 @@ from engine.collision.meshes.triangle_triangle import (
     corner,
     is_same,
     is_straddling,
-    lone_first,
     separation,
     sides_of,
     sign_of_four,
@@ -177,22 +176,6 @@ def lone_zero(sides: Signs) -> int:
     return -1
 
 
-@inline
-def _is_edge_across(poses: FloatArray, t: Facet, u: Facet, sides: Signs, their_sides: Signs, error: float) -> bool:
-    """Tell whether an edge of one of two faces that straddle surely passes through the other, strictly within it.
-
-    Each cuts the line of the two planes in an interval. Where these share a length and two ends differ, one of them
-    lies within the other interval; the edges there lie in one plane where the ends are one point.
-    """
-    a, b = lone_first(t, u, sides, their_sides)
-    if sign_of_four(poses, a.q, b.p, a.p, b.q, error) != -1 or sign_of_four(poses, a.p, b.p, a.r, b.r, error) != -1:
-        return False
-    side = sign_of_four(poses, a.q, b.p, a.p, b.r, error)
-    if side == 0 or side == UNDECIDED:
-        side = sign_of_four(poses, a.p, b.p, a.r, b.q, error)
-    return side != 0 and side != UNDECIDED
-
-
 @called
 def kind_of(
     poses: FloatArray, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Int8Array
@@ -211,8 +194,6 @@ def kind_of(
             their >= 0 and is_same(corner(u, their), corner(t, k))
         ):
             return VERTEX_VERTEX, 0
-    if work[FLUSH] == 0 and _is_edge_across(poses, t, u, sides, their_sides, error):
-        return EDGE_FACE, BOTH
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
         how = separation(poses, t, u, axis, error)
         if how == UNDECIDED or how < 0:

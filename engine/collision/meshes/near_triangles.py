@@ -89,11 +89,10 @@ def _foot(p: Point3, t: Facet) -> tuple[bool, Point3]:
 
 
 class Across(NamedTuple):
-    """Bounds on the distance of two triangles from below and above, the direction, and whether that is enough."""
+    """Bounds on the distance of two triangles from below and above, and whether these are enough."""
 
     low: float
     size: float
-    way: Point3
     is_done: bool
 
 
@@ -103,18 +102,17 @@ def _across(s: Facet, t: Facet, found: Nearest, before: Across, most: float) -> 
     gap = minus(found.q, found.p)
     largest = largest_of(gap)
     if not largest > 0.0:
-        return Across(0.0, 0.0, Point3(0.0, 0.0, 0.0), True)
+        return Across(0.0, 0.0, True)
     d = Point3(gap.x / largest, gap.y / largest, gap.z / largest)  # order: squares of small numbers are none
     size, furthest = np.sqrt(dot(d, d)), max(dot(d, s.p), dot(d, s.q), dot(d, s.r))
     low = max(before.low, (min(dot(d, t.p), dot(d, t.q), dot(d, t.r)) - furthest) / size)
-    way = Point3(d.x / size, d.y / size, d.z / size)
-    return Across(low, largest * size, way, low > most or low >= _AS_GOOD * largest * size)
+    return Across(low, largest * size, low > most or low >= _AS_GOOD * largest * size)
 
 
 @inline
 def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, Across]:
     """Return nearly nearest points of two disjoint triangles and bounds; any points beyond `most`."""
-    best, across = Nearest(s.p, t.p, 0, 0, np.inf), Across(-np.inf, np.inf, Point3(0.0, 0.0, 0.0), False)
+    best, across = Nearest(s.p, t.p, 0, 0, np.inf), Across(-np.inf, np.inf, False)
     for i in range(3):
         for j in range(3):
             found = _edges(best, s, i, t, j)

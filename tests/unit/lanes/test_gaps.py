@@ -63,14 +63,12 @@ def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
     fixed, defect = np.zeros((FIXED_ROWS, LANES), np.float32), defect_of(place) + defect_of(other)
     set_frame(frames[0], place, a.origin, a.scale, other, b.origin, b.scale, defect)
     set_frame(frames[1], other, b.origin, b.scale, place, a.origin, a.scale, defect)
-    d = draw.normal(size=3)
-    way = tuple(d / np.linalg.norm(d) * 0.999)
     for node in _children(a, are_blocks=False):
         for their_node in _children(b, are_blocks=False):
             fixed[:BOX_ROWS, 0], fixed[BOX_ROWS:, 0] = b.boxes[their_node, :, 0], b.discs[their_node, :, 0]
             child_bounds(
                 a.boxes, a.discs, node, fixed, frames, 0, FRAME_ROWS, b.scale / a.scale,
-                inverse_ratio(b.scale, a.scale), way, work,
+                inverse_ratio(b.scale, a.scale), work,
             )  # fmt: skip
             theirs = _placed(_below(b, their_node, 0), other)
             for lane in range(LANES):
@@ -81,7 +79,7 @@ def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
     assert fixed.shape[0] == BOX_ROWS + DISC_ROWS
     for node in _children(a, are_blocks=True):
         for their_node in _children(b, are_blocks=True):
-            place_triangles(b.blocks, their_node, frames, way, work)
+            place_triangles(b.blocks, their_node, frames, work)
             for lane in range(LANES):
                 if a.child[node, lane] == EMPTY:
                     continue
@@ -90,4 +88,4 @@ def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
                     if b.child[their_node, k] != EMPTY:
                         gap = ours[:, None] - _placed(_below(b, their_node, k), other)[None]
                         most = np.linalg.norm(gap, axis=2).min() / a.scale * (1.0 + 2.0**-22)
-                        assert near_triangle(a.blocks, node, lane, frames, way, most, work) >> k & 1
+                        assert near_triangle(a.blocks, node, lane, frames, most, work) >> k & 1
