@@ -112,7 +112,7 @@ def run_blocks(
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
             n_most = int(most * n_vertices)
-            reduced = entry_of(reduce_pair)(first, second, size, n_most, kept, budget.flag, scratch.words)
+            reduced = entry_of(reduce_pair)(first, second, size, n_most, budget.flag, scratch.words)
             if reduced.n == 0:
                 budget.check()
                 keep(scratch)

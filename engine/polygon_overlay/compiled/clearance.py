@@ -54,7 +54,6 @@ from engine.polygon_overlay.compiled.edge_tree import (
     RUN,
     BoxTree,
     begin_pairs,
-    boxes_meet,
     build_tree,
     next_pairs,
 )
@@ -177,7 +176,7 @@ def certify(
             n_edges += 1
     if n_edges > FEW:
         build_tree(tree, n_edges, stop)
-    depth = begin_pairs(tree, n_edges, stop)
+    depth = begin_pairs(tree)
     while depth > 0:  # bound: the walk through the tree
         if stop[0]:
             return False
@@ -185,10 +184,6 @@ def certify(
         for k in range(found):
             i, j = pairs[k, 0], pairs[k, 1]
             a, b, c, d = tails[i], heads[i], tails[j], heads[j]
-            if (
-                (moved[a] | moved[b] | moved[c] | moved[d])
-                and boxes_meet(boxes, i, boxes, j)
-                and not _is_apart(rings.point, x, y, a, b, c, d, square)
-            ):
+            if (moved[a] | moved[b] | moved[c] | moved[d]) and not _is_apart(rings.point, x, y, a, b, c, d, square):
                 return False
     return True

@@ -26,7 +26,7 @@ from engine.arrangement.union_find import root_of, unite
 from engine.arrays import FlagArray, FloatArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
-from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, BoxTree, begin_pairs, boxes_meet, next_pairs
+from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, BoxTree, begin_pairs, next_pairs
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 
@@ -240,10 +240,10 @@ def find_contacts(
     for ring in range(n_rings):
         unions.rings[ring] = ring
     room = min(events.edge.shape[0] - 4, 2 * (events.first.shape[0] - 1))
-    x, y, after, boxes, pairs = edges.x, edges.y, edges.after, tree.boxes, tree.pairs
+    x, y, after, pairs = edges.x, edges.y, edges.after, tree.pairs
     n_events = n_crossings = n_exact = 0
     are_far = True
-    depth = begin_pairs(tree, n, stop)
+    depth = begin_pairs(tree)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
         found, depth = next_pairs(tree, n, depth)
         for k in range(found):
@@ -254,8 +254,6 @@ def find_contacts(
             to_j = turns(x, y, i, b, j, d)
             nearest = smaller_of(to_j)
             if agree(to_j) and nearest > margin * to_j.length and nearest > to_j.bound:
-                continue
-            if not boxes_meet(boxes, i, boxes, j):
                 continue
             if n_events > room:
                 return Contacts(-1, 0, 0, False)

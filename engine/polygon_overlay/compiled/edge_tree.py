@@ -5,10 +5,6 @@ boxes of a level are found from the one below. Only where one edge lies far from
 first put in the order of a space-filling curve. The tree is walked against itself. Each box is
 ``(x_min, x_max, y_min, y_max)``.
 
-Boxes of leaves are looked at in codes: four whole numbers in one, so that one subtraction compares all four sides of
-two boxes. Each coordinate is the number of its strip, of some 16,000 across the whole. Boxes that meet have codes that
-do, since a coordinate that is no larger has no later strip; those of boxes that do not may meet as well.
-
 A mark is a sum of bits: among them the quadrants' sides that the edge heads for. Edges one after another that all head
 for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself, nor two that
 follow each other and are one such run together.
@@ -50,19 +46,13 @@ RUN: Final = 64
 """Mark of an edge that stands for many, which meet nothing; see reducing.py."""
 DOUBTFUL: Final = 128
 """Mark of an edge that something is so near to that rounding may change how they lie; see clearance.py."""
-_BITS: Final = 15
-"""Of a side in a code, the highest for a borrow."""
-_LAST: Final = (1 << (_BITS - 1)) - 1
-"""The largest number of a side; no strip has it, so that of a box that meets nothing it can be."""
-_BORROWS: Final = sum(1 << (_BITS * side + _BITS - 1) for side in range(4))
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 
-BoxTree = namedtuple("BoxTree", "boxes marks nodes node_marks places lows highs stack pairs")
+BoxTree = namedtuple("BoxTree", "boxes marks nodes node_marks places stack pairs")
 """Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark.
 
-places: the boxes in the order of the leaves; lows, highs: their codes in that order, int64: what must not be above the
-other box's, and what must not be below. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
+places: the boxes in the order of the leaves. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
 """
 
 
@@ -196,34 +186,9 @@ def push_children(tree: BoxTree, node: int, depth: int) -> int:
 
 
 @inline
-def encode_boxes(tree: BoxTree, n: int, stop: FlagArray) -> None:
-    """Fill the codes of the first n boxes; those with y_max < y_min meet none. Caller guarantees a built tree."""
-    boxes, nodes, lows, highs = tree.boxes, tree.nodes, tree.lows, tree.highs
-    x_min, y_min = nodes[1, 0], nodes[1, 2]
-    wide, high = nodes[1, 1] - x_min, nodes[1, 3] - y_min
-    by_x, by_y = (_LAST - 1) / wide if wide > 0.0 else 0.0, (_LAST - 1) / high if high > 0.0 else 0.0
-    for place in range(n):
-        if place & POLL == 0 and stop[0]:
-            return
-        k = tree.places[place]
-        if boxes[k, 3] < boxes[k, 2]:
-            lows[place], highs[place] = _BORROWS - (_BORROWS >> (_BITS - 1)), _BORROWS
-            continue
-        left, right = int((boxes[k, 0] - x_min) * by_x), int((boxes[k, 1] - x_min) * by_x)
-        lower, upper = int((boxes[k, 2] - y_min) * by_y), int((boxes[k, 3] - y_min) * by_y)
-        lows[place] = _code(left, _LAST - right, lower, _LAST - upper)
-        highs[place] = _code(right, _LAST - left, upper, _LAST - lower) | _BORROWS
-
-
-@merged
-def _code(a: int, b: int, c: int, d: int) -> int:
-    return a | b << _BITS | c << 2 * _BITS | d << 3 * _BITS
-
-
-@inline
 def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Go on with the walk: write pairs whose codes meet, each once; return how many, and the depth of the stack."""
-    nodes, node_marks, places, lows, highs = tree.nodes, tree.node_marks, tree.places, tree.lows, tree.highs
+    """Go on with the walk: write pairs of boxes that meet, each once; return how many, and the depth of the stack."""
+    boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     stack, pairs = tree.stack, tree.pairs
     n_leaves, found, steps = leaves_of(n), 0, 0
     while depth > 0 and found <= PORTION - LEAF * LEAF and steps < _STEPS:
@@ -240,10 +205,11 @@ def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
             continue
         first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
         for p in range(first, min(first + LEAF, n)):
-            e, low = places[np.uint64(p)], lows[np.uint64(p)]  # unsigned: no look at whether it counts from the end
+            e = places[np.uint64(p)]  # unsigned: no look at whether it counts from the end
             for q in range(p + 1 if i == j else second, min(second + LEAF, n)):
-                pairs[found, 0], pairs[found, 1] = e, places[np.uint64(q)]
-                found += (highs[np.uint64(q)] - low) & _BORROWS == _BORROWS
+                f = places[np.uint64(q)]
+                pairs[found, 0], pairs[found, 1] = e, f
+                found += boxes_meet(boxes, np.uint64(e), boxes, np.uint64(f))
     return found, depth
 
 
@@ -260,17 +226,15 @@ def _all_pairs(tree: BoxTree, n: int) -> int:
 
 
 @inline
-def begin_pairs(tree: BoxTree, n: int, stop: FlagArray) -> int:
-    """Make ready to look for the pairs among the first n boxes; return the depth for `next_pairs`."""
-    if n > FEW:
-        encode_boxes(tree, n, stop)
+def begin_pairs(tree: BoxTree) -> int:
+    """Make ready to look for pairs; return the depth for `next_pairs`."""
     tree.stack[0, 0], tree.stack[0, 1] = 1, 1
     return 1
 
 
 @inline
 def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Write the next portion of pairs, each once, of boxes that may meet; return how many, and the depth, 0 at the end.
+    """Write the next portion of pairs, each once, of boxes that meet; return how many, and the depth, 0 at the end.
 
     Caller guarantees a built tree, unless boxes are few.
     """

@@ -150,7 +150,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
     if not is_clear:
         mark_short(edges, n, margin, w.tree.marks)
     if n > FEW:
-        build_edge_tree(edges, n, n_rings, w.components.highest, w.tree, stop)
+        build_edge_tree(edges, n, n_rings, w.components, w.tree, stop)
     contacts = find_contacts(edges, n, n_rings, margin, w.events, w.unions, w.tree, stop)
     room = w.along.order.shape[0] - 9
     if stop[0] or contacts.n_events < 0:

@@ -209,13 +209,13 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArr
 
 
 @inline
-def build_edge_tree(edges: Edges, n: int, n_rings: int, order: IntArray, tree: BoxTree, stop: FlagArray) -> None:
-    """Build the tree over the boxes of the edges, those of small rings ring by ring. order: scratch by ring."""
-    boxes, places, at = tree.boxes, tree.places, 0
+def build_edge_tree(edges: Edges, n: int, n_rings: int, scratch: Any, tree: BoxTree, stop: FlagArray) -> None:
+    """Build the tree over the boxes of the edges, those of small rings ring by ring. scratch: `Components`."""
+    boxes, places, order, starts, at = tree.boxes, tree.places, scratch.highest, scratch.first, 0
     if n > _SMALL_RING * n_rings:
         build_tree(tree, n, stop)
         return
-    starts, corners = tree.lows, boxes[n:]
+    corners = boxes[n:]
     for ring in range(n_rings):
         last = edges.before[at]
         starts[ring] = at

@@ -22,7 +22,6 @@ from engine.jit import inline, kernel
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
 from engine.polygon_overlay.compiled.loading import (
-    EVERYTHING,
     LEFT_OUT,
     Given,
     Loaded,
@@ -34,12 +33,10 @@ from engine.polygon_overlay.compiled.loading import (
     magnitude,
 )
 from engine.polygon_overlay.compiled.ring_blocks import (
-    CHORD,
     EVERYWHERE,
     Blocks,
     box_of_blocks,
     count_active,
-    cut_beyond,
     load_blocks,
     mark_blocks,
     wake_above,
@@ -59,7 +56,7 @@ def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
     for i in range(begin, end):
         if blocks.boxes[i, 1] == x_max:
             a = blocks.first[i]
-            for k in range(a, a + 1 if blocks.marks[i] & CHORD else blocks.last[i]):
+            for k in range(a, blocks.last[i]):
                 if top < 0 or is_before(vertices, top, k):
                     top = k
     return top
@@ -124,11 +121,11 @@ def _load_ring(
             return n, n_runs, False
         a = blocks.first[i]
         if blocks.is_active[i]:
-            for k in range(a, a + 1 if blocks.marks[i] & CHORD else blocks.last[i]):
+            for k in range(a, blocks.last[i]):
                 px, py = vertices[k, 0], vertices[k, 1]
                 safe &= is_safe(px) & is_safe(py)
                 if n > start and x[n - 1] == px and y[n - 1] == py:
-                    origins[n - 1] = base + k  # case: a chord that ends where it begins; the next edge begins here
+                    origins[n - 1] = base + k  # the next edge begins here
                     continue
                 x[n], y[n], origins[n] = px, py, base + k
                 n += 1
@@ -195,11 +192,11 @@ def _wake(
 
 @kernel
 def reduce_pair(
-    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, kept: FlagArray, stop: FlagArray, words: IntArray
+    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, words: IntArray
 ) -> Loaded:
     """Load the edges of two polygons into the scratch of overlay_pairs, those that meet nothing as runs.
 
-    size: edges of a block. n_most: edges that are too many to be looked at one by one. kept: as of overlay_pairs.
+    size: edges of a block. n_most: edges that are too many to be looked at one by one.
     There is scratch for a thousand contacts at least. Returns no vertices if it is not worth while.
     """
     w = rows_of(words)
@@ -213,12 +210,8 @@ def reduce_pair(
         return Loaded(0, 0, 0, 0.0)
     subject_box, clip_box = box_of_blocks(blocks.boxes, 0, end_subject), box_of_blocks(blocks.boxes, end_subject, end)
     largest = max(magnitude(subject_box), magnitude(clip_box))
-    common = common_box(subject_box, clip_box)
-    if largest > LARGEST or is_empty(common):
+    if largest > LARGEST or is_empty(common_box(subject_box, clip_box)):
         return Loaded(0, 0, 0, largest)
-    begin = end_subject
-    end_subject = cut_beyond(subjects, EVERYTHING if kept[1] else common, blocks, 0, 0, 0)
-    end = cut_beyond(clips, EVERYTHING if kept[2] else common, blocks, n_subject, begin, end_subject)
     margin = CLEARANCE * largest
     x, y = w.rounded.x, w.rounded.y
     mark_blocks(subjects, margin, blocks, 0, x, y, stop)

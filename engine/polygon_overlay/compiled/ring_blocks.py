@@ -3,9 +3,7 @@
     ring  o--o--o--o--o--o--o--o--o--o      a block is so many consecutive edges, with their box, and which way
           |  block  |  block  |  block      all of them head: right, left, up or down by more than the margin
 
-Edges of blocks that head one way together, one after another, have only their common vertices in common. A block that
-lies beyond one side of a box outside of which nothing counts becomes a chord, one straight edge, and so do such blocks
-one after another: that moves the boundary beyond that side only.
+Edges of blocks that head one way together, one after another, have only their common vertices in common.
 
 To be looked at edge by edge, or active, are blocks near another one, and those above a ring's top, found by the walk of
 edge_tree.py. All others meet nothing, by the margin of clearance.py: their boxes are further from all others than that,
@@ -34,8 +32,6 @@ NOT_UP: Final = 8
 NOT_DOWN: Final = 16
 EVERYWHERE: Final = NOT_RIGHT | NOT_LEFT | NOT_UP | NOT_DOWN
 """Marks of a block some edge of which does not head that way, and of one whose edges head no way together."""
-CHORD: Final = 32
-"""Mark of a block that stands for one edge, from its first vertex to its last."""
 _AT_ONCE: Final = 512
 """Edges whose directions are computed at once: they stay in the nearest cache."""
 _TURN_BOUND: Final = 4.0 * BOUND_2D
@@ -64,7 +60,7 @@ def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int,
             x_min, x_max, y_min, y_max = box_of(part, 0, b - a)
             boxes[n, 0], boxes[n, 1] = min(x_min, vertices[closing, 0]), max(x_max, vertices[closing, 0])
             boxes[n, 2], boxes[n, 3] = min(y_min, vertices[closing, 1]), max(y_max, vertices[closing, 1])
-            first[n], last[n], blocks.marks[n] = a, b, 0
+            first[n], last[n] = a, b
             n += 1
     blocks.firsts[ring + n_rings] = n
     return n
@@ -82,50 +78,13 @@ def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
 
 
 @inline
-def cut_beyond(rings: RingArrays, box: Box, blocks: Blocks, ring: int, begin: int, at: int) -> int:
-    """Put chords in the place of blocks beyond one side of a box, of rings from ``ring`` and blocks from ``begin`` on.
-
-    Moves all down to ``at`` and on; returns their end.
-    """
-    vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
-    x_min, x_max, y_min, y_max = box
-    first, last, boxes, marks = blocks.first, blocks.last, blocks.boxes, blocks.marks
-    i = begin
-    for i_ring in range(n_rings):
-        start, end = offsets[i_ring], offsets[i_ring + 1]
-        after = blocks.firsts[ring + i_ring + 1]
-        blocks.firsts[ring + i_ring] = at
-        sides = 0  # which sides of the box the chord before is beyond
-        while i < after:  # bound: each turn passes one block
-            beyond = 1 * (boxes[i, 1] < x_min) + 2 * (boxes[i, 0] > x_max)
-            beyond += 4 * (boxes[i, 3] < y_min) + 8 * (boxes[i, 2] > y_max)
-            if beyond & sides:
-                sides &= beyond
-                last[at - 1] = last[i]
-            else:
-                sides = beyond
-                first[at], last[at], marks[at] = first[i], last[i], CHORD if beyond else 0
-                for k in range(4):
-                    boxes[at, k] = boxes[i, k]
-                at += 1
-            if sides:
-                a, b = first[at - 1], last[at - 1] if last[at - 1] < end else start
-                for k in range(2):
-                    p, q = vertices[a, k], vertices[b, k]
-                    boxes[at - 1, 2 * k], boxes[at - 1, 2 * k + 1] = min(p, q), max(p, q)
-            i += 1
-    blocks.firsts[ring + n_rings] = at
-    return at
-
-
-@inline
 def mark_blocks(
     rings: RingArrays, margin: float, blocks: Blocks, ring: int, dx: FloatArray, dy: FloatArray, stop: FlagArray
 ) -> None:
     """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be.
 
-    Active are chords, blocks that head no way, and those that may have a vertex where their ring does not turn, or one
-    that the vertex before repeats. dx, dy: float64, scratch for `_AT_ONCE` edges and one.
+    Active are blocks that head no way, and those that may have a vertex where their ring does not turn, or one that the
+    vertex before repeats. dx, dy: float64, scratch for `_AT_ONCE` edges and one.
     """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, marks = blocks.first, blocks.last, blocks.marks
@@ -138,17 +97,10 @@ def mark_blocks(
             if stop[0]:
                 return
             a, j = first[i], i + 1
-            is_chord = marks[i] == CHORD
-            while not is_chord and j < after and marks[j] != CHORD and last[j] - a <= _AT_ONCE:  # bound: as above
+            while j < after and last[j] - a <= _AT_ONCE:  # bound: as above
                 j += 1
             b = last[j - 1]
             before, closing = a - 1 if a > start else end - 1, b if b < end else start
-            if is_chord:
-                ux, uy = vertices[closing, 0] - vertices[a, 0], vertices[closing, 1] - vertices[a, 1]
-                marks[i] = CHORD | _way(ux > margin, ux < -margin, uy > margin, uy < -margin)
-                blocks.is_active[i], blocks.following[i] = 1, i + 1
-                i = j
-                continue
             # direction 0 is that of the edge before, direction k + 1 that of edge a + k
             dx[0], dy[0] = vertices[a, 0] - vertices[before, 0], vertices[a, 1] - vertices[before, 1]
             part, ahead = vertices[a : b - 1], vertices[a + 1 : b]
@@ -199,10 +151,10 @@ def _are_near(boxes: FloatArray, i: int, others: FloatArray, j: int, gap: float)
 
 @inline
 def count_active(blocks: Blocks, n: int) -> int:
-    """Return the number of edges of active blocks, without chords."""
+    """Return the number of edges of active blocks."""
     n_active = 0
     for i in range(n):
-        if blocks.is_active[i] and not blocks.marks[i] & CHORD:
+        if blocks.is_active[i]:
             n_active += blocks.last[i] - blocks.first[i]
     return n_active
 

@@ -24,7 +24,7 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, boxes_meet, build_tree, next_pairs
+from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, is_before, load_rings
 from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.orientation import BOUND_2D, orient2d
@@ -172,13 +172,11 @@ def snap(
     if n > FEW:
         build_tree(tree, n, stop)
     meets, shares, are_apart = False, False, True
-    m, depth = 0, begin_pairs(tree, n, stop)
+    m, depth = 0, begin_pairs(tree)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
         found, depth = next_pairs(tree, n, depth)
         for k in range(found):
             e, f = tree.pairs[k, 0], tree.pairs[k, 1]
-            if not boxes_meet(tree.boxes, e, tree.boxes, f):
-                continue
             for _ in range(2):
                 px, py, b = pixels[f, 0], pixels[f, 1], after[e]
                 at_begin = (px == pixels[e, 0]) & (py == pixels[e, 1])

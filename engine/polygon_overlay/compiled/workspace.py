@@ -40,12 +40,12 @@ _MANY_CONTACTS: Final = 2**15
 Buffers = namedtuple(
     "Buffers",
     "vertex_floats vertex_integers ring_integers contact_floats contact_integers half_integers half_labels "
-    "half_octets point_floats point_integers point_codes point_octets boxes tree tree_marks stack pairs ends",
+    "half_octets point_floats point_integers point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
 _VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 8, 5, 17
 _HALF_INTEGERS, _HALF_LABELS, _HALF_OCTETS = 11, 2, 4
-_POINT_FLOATS, _POINT_INTEGERS, _POINT_CODES, _POINT_OCTETS = 2, 6, 2, 4
+_POINT_FLOATS, _POINT_INTEGERS, _POINT_OCTETS = 2, 6, 4
 """How many rows there are of each."""
 _N_SIZES: Final = 7
 _N_BUFFERS: Final = len(Buffers._fields)
@@ -187,7 +187,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
         half_integers=np.empty((_HALF_INTEGERS, 2 * k + 1), np.int32),
         half_labels=np.empty((_HALF_LABELS, 2 * k + 1), np.int64),
         half_octets=np.empty((_HALF_OCTETS, 2 * k + 1), np.uint8), point_floats=np.empty((_POINT_FLOATS, m)),
-        point_integers=np.empty((_POINT_INTEGERS, m), np.int32), point_codes=np.empty((_POINT_CODES, m), np.int64),
+        point_integers=np.empty((_POINT_INTEGERS, m), np.int32),
         point_octets=np.empty((_POINT_OCTETS, m), np.uint8), boxes=np.empty((m, 4)),
         tree=np.empty((2 * n_leaves, 4)), tree_marks=np.empty(2 * n_leaves, np.uint8),
         stack=np.empty((DEEPEST, 2), np.int64), pairs=np.empty((PORTION, 2), np.int32),
@@ -225,14 +225,14 @@ def rows_of(words: IntArray) -> Workspace:
     c, h = array_at(at[4], (_CONTACT_INTEGERS, k + 1), np.int32), array_at(at[5], (_HALF_INTEGERS, 2 * k + 1), np.int32)
     hl, hb = array_at(at[6], (_HALF_LABELS, 2 * k + 1), np.int64), array_at(at[7], (_HALF_OCTETS, 2 * k + 1), np.uint8)
     px, p = array_at(at[8], (_POINT_FLOATS, m), np.float64), array_at(at[9], (_POINT_INTEGERS, m), np.int32)
-    codes, pb = array_at(at[10], (_POINT_CODES, m), np.int64), array_at(at[11], (_POINT_OCTETS, m), np.uint8)
-    boxes, nodes = array_at(at[12], (m, 4), np.float64), array_at(at[13], (n_nodes, 4), np.float64)
-    node_marks, stack = array_at(at[14], (n_nodes,), np.uint8), array_at(at[15], (DEEPEST, 2), np.int64)
-    pairs, ends = array_at(at[16], (PORTION, 2), np.int32), array_at(at[17], (k + 1, 4), np.int32)
+    pb, ends = array_at(at[10], (_POINT_OCTETS, m), np.uint8), array_at(at[16], (k + 1, 4), np.int32)
+    boxes, nodes = array_at(at[11], (m, 4), np.float64), array_at(at[12], (n_nodes, 4), np.float64)
+    node_marks, stack = array_at(at[13], (n_nodes,), np.uint8), array_at(at[14], (DEEPEST, 2), np.int64)
+    pairs = array_at(at[15], (PORTION, 2), np.int32)
     crossing_x, crossing_y, error = cx[3], cx[4], cx[1]
     return Workspace(
         given=Given(Edges(vx[0], vx[1], v[0], v[1], v[2]), v[3], r[0], r[1]),
-        tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], codes[0], codes[1], stack, pairs),
+        tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], stack, pairs),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
         along=Along(v[4], c[12], crossing_x, px[0], crossing_y, c[13], c[14]),

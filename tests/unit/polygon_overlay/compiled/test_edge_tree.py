@@ -16,7 +16,7 @@ def pairs_of(tree, found):  # type: ignore[no-untyped-def]
     """Return how many pairs there are, written to `found`."""
     n = len(tree.boxes)
     edge_tree.build_tree(tree, n, np.zeros(1, np.uint8))
-    depth, total = edge_tree.begin_pairs(tree, n, np.zeros(1, np.uint8)), 0
+    depth, total = edge_tree.begin_pairs(tree), 0
     while depth > 0:
         count, depth = edge_tree.next_pairs(tree, n, depth)
         found[total : total + count] = tree.pairs[:count]
