@@ -12,22 +12,13 @@ Then any two stretches between nodes are apart, or meet in a node and the far en
 whole way to their rounded places: no stretch touches, passes or folds onto another. This holds for all edges, so for
 those of any result.
 
-For the stretches of two edges no more is needed than what is said of these two. So where it fails both get the mark
-DOUBTFUL, and `certify` looks at what is left of edges with that mark in the rounded rings of the result:
-
-- of two edges that are near each other, or whose contact floating point is not sure of, whatever it is, both;
-- of nodes near each other on an edge, or near an end of it, that edge and all that cross it in one of them;
-- of two edges in whose corner a node is near the other, both;
-- an edge shorter than the margin, the one before it, and the one after it: others of a run that heads for one quadrant
-  are not looked at pair by pair (edge_tree.py), and two of them are as far apart as each edge between them is long.
-
-A vertex on an edge is a node whose distance from others is sure: the edges that meet there are in doubt by their
-contact, and its reach is the slack of its parameter.
+No edge may be shorter than the margin either: those of a run that heads for one quadrant are not looked at pair by pair
+(edge_tree.py), and two of them are as far apart as each edge between them is long.
 
 Where that leaves doubt, the rounded rings of the result are looked at themselves. Every vertex moves by less than the
 unit u of the largest coordinate, on a straight way. Two edges that have no vertex in common cannot touch on that way if
 they end more than 2 u apart; nor can two edges fold that have one in common, if the far end of each ends more than 2 u
-away from the other. If that holds for every pair with a vertex that moves, and edges in doubt, the rings after rounding
+away from the other. If that holds for every pair with a vertex that moves, the rings after rounding
 are the exact ones deformed without a touch: valid, with the same pieces, holes and turns.
 
 Distances are computed in floating point. Differences of rounded coordinates are off by u each, so the distance from a
@@ -48,7 +39,6 @@ from engine.polygon_overlay.compiled.edge_contacts import is_far, segments_are_f
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
-    DOUBTFUL,
     FEW,
     POLL,
     RUN,
@@ -82,13 +72,12 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 
 @inline
-def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: FlagArray, stop: FlagArray) -> bool:
+def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: FlagArray) -> bool:
     """Tell whether the first and the last event of every edge are far enough from the edge that begins or ends there.
 
-    along: by sort_events. Edges of corners where that is not so get the mark DOUBTFUL.
+    along: by sort_events.
     """
     starts, keys = along.starts, along.keys
-    are_clear = True
     for e in range(n):
         if e & POLL == 0 and stop[0]:
             return False
@@ -102,14 +91,10 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, marks: 
         if starts[after] < starts[after + 1]:
             share_after = keys[starts[after]]
         if not _corner_is_clear(edges, e, share_before, keys[first], margin):
-            are_clear = False
-            marks[before] |= DOUBTFUL
-            marks[e] |= DOUBTFUL
+            return False
         if not _corner_is_clear(edges, after, 1.0 - keys[last - 1], share_after, margin):
-            are_clear = False
-            marks[e] |= DOUBTFUL
-            marks[after] |= DOUBTFUL
-    return are_clear
+            return False
+    return True
 
 
 @merged
@@ -152,8 +137,7 @@ def certify(
 ) -> bool:  # fmt: skip
     """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
 
-    n: points of ``rings``. tree, tails, heads: scratch for as many. Only edges with the mark DOUBTFUL are looked at.
-    What is left out (RUN) is away from all that moves.
+    n: points of ``rings``. tree, tails, heads: scratch for as many. What is left out (RUN) is away from all that moves.
     """
     x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0
@@ -167,7 +151,7 @@ def certify(
         for k in range(first, last):
             if k & POLL == 0 and stop[0]:
                 return False
-            if rings.meets[k] & (DOUBTFUL | RUN) != DOUBTFUL:
+            if rings.meets[k] & RUN:
                 continue
             j = k + 1 if k + 1 < last else first
             tails[n_edges], heads[n_edges], tree.marks[n_edges] = k, j, ANYWHERE

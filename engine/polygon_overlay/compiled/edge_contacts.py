@@ -26,7 +26,7 @@ from engine.arrangement.union_find import root_of, unite
 from engine.arrays import FlagArray, FloatArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
-from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, BoxTree, begin_pairs, next_pairs
+from engine.polygon_overlay.compiled.edge_tree import BENT, BoxTree, begin_pairs, next_pairs
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 
@@ -90,7 +90,7 @@ or the crossing is not alone."""
 Events = namedtuple("Events", "edge point other t slack reach first second turn")
 """Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex; t,
 slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer than the
-margin of clearance.py, where that is not in doubt already, and the slack. By crossing: first and second, its edges;
+margin of clearance.py, where that is sure, and the slack. By crossing: first and second, its edges;
 turn: LEFT or RIGHT as the second leaves to that side of the first, or NOT_SIMPLE."""
 
 Unions = namedtuple("Unions", "points is_node rings")
@@ -230,7 +230,7 @@ def agree(found: Turns) -> bool:
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: FlagArray
 ) -> Contacts:
-    """Enter all contacts; the edges of pairs of which `Contacts.are_far` does not hold get the mark DOUBTFUL.
+    """Enter all contacts.
 
     tree: over the boxes of the edges, with the margin around them. unions: filled.
     """
@@ -265,9 +265,7 @@ def find_contacts(
                 is_beside = agree(to_i) and nearest_i > to_i.bound
                 if is_beside or (agree(to_j) and nearest > to_j.bound):  # no contact
                     is_far = is_beside and nearest_i > margin * to_i.length
-                    if not is_far and not segments_are_far(x, y, i, b, j, d, margin * margin):
-                        _put_in_doubt(tree.marks, i, j)
-                        are_far = False
+                    are_far = are_far and (is_far or segments_are_far(x, y, i, b, j, d, margin * margin))
                     continue
                 if nearest > to_j.bound and nearest_i > to_i.bound:
                     unite(unions.rings, edges.ring[i], edges.ring[j])
@@ -280,15 +278,8 @@ def find_contacts(
                     continue
             n_events, n_crossings = _enter_contact(edges, events, unions, n, n_events, n_crossings, i, j)
             n_exact += 1
-            _put_in_doubt(tree.marks, i, j)
             are_far = are_far and (b == j or d == i) and not unions.is_node[b if b == j else i]  # else they fold
     return Contacts(n_events, n_crossings, n_exact, are_far)
-
-
-@merged
-def _put_in_doubt(marks: FlagArray, e: int, f: int) -> None:
-    marks[e] |= DOUBTFUL
-    marks[f] |= DOUBTFUL
 
 
 @merged

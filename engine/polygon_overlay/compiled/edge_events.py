@@ -15,7 +15,7 @@ from engine.arrays import FlagArray
 from engine.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
 from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, Events, Unions
-from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL, POLL
+from engine.polygon_overlay.compiled.edge_tree import POLL
 
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""
@@ -122,32 +122,6 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
         width *= 2
 
 
-@called
-def _mark_near(edges: Edges, events: Events, along: Along, marks: FlagArray, e: int) -> None:
-    """Put in doubt edge e, and those whose crossings with it are within reach of another event, or of an end of e.
-
-    Then also the edge that begins or ends there.
-    """
-    order, keys, first, last = along.order, along.keys, along.starts[e], along.starts[e + 1]
-    marks[e] |= DOUBTFUL
-    reached = 0.0
-    for k in range(first, last):
-        i = order[k]
-        if not keys[k] - events.reach[i] > reached and events.other[i] >= 0:
-            marks[events.other[i]] |= DOUBTFUL
-        reached = max(reached, keys[k] + events.reach[i])
-        if keys[k] <= events.reach[i]:
-            marks[edges.before[e]] |= DOUBTFUL
-        if 1.0 - keys[k] <= events.reach[i]:
-            marks[edges.after[e]] |= DOUBTFUL
-    reached = 1.0
-    for k in range(last - 1, first - 1, -1):
-        i = order[k]
-        if not keys[k] + events.reach[i] < reached and events.other[i] >= 0:
-            marks[events.other[i]] |= DOUBTFUL
-        reached = min(reached, keys[k] - events.reach[i])
-
-
 @inline
 def _group_events(events: Events, along: Along, n: int, n_events: int, stop: FlagArray) -> bool:
     """Put the events of each edge together, in any order; return False where the call is to end."""
@@ -201,12 +175,12 @@ def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n:
 
 @inline
 def sort_events(
-    edges: Edges, events: Events, along: Along, unions: Unions, marks: FlagArray, n: int, n_events: int, stop: FlagArray
+    edges: Edges, events: Events, along: Along, unions: Unions, n: int, n_events: int, stop: FlagArray
 ) -> bool:
     """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE.
 
     Returns whether the events of every edge are further apart than their reaches, and each is further from the ends
-    than its own; other edges, and those that cross there, get the mark DOUBTFUL.
+    than its own.
     """
     if not _group_events(events, along, n, n_events, stop):
         return False
@@ -235,9 +209,7 @@ def sort_events(
             gap = keys[k] - keys[k - 1]
             is_sorted &= gap > slack + slack_before
             is_clear &= gap > reach + reach_before
-        if not (is_clear and 1.0 - keys[last - 1] > reach):
-            _mark_near(edges, events, along, marks, e)
-            are_clear = False
+        are_clear = are_clear and is_clear and 1.0 - keys[last - 1] > reach
         if not is_sorted:
             _sort_exactly(edges, events, along, unions, n, e)
     return are_clear

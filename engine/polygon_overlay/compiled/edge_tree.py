@@ -44,8 +44,6 @@ BENT: Final = 32
 """Mark of an edge at whose first vertex the ring surely turns."""
 RUN: Final = 64
 """Mark of an edge that stands for many, which meet nothing; see reducing.py."""
-DOUBTFUL: Final = 128
-"""Mark of an edge that something is so near to that rounding may change how they lie; see clearance.py."""
 DEEPEST: Final = 256
 """Places on the stack: a walk through 60 levels holds at most three pairs a level."""
 

@@ -57,7 +57,6 @@ from engine.polygon_overlay.compiled.loading import (
     load_rings,
     magnitude,
     mark_runs,
-    mark_short,
 )
 from engine.polygon_overlay.compiled.reducing import count_left_out
 from engine.polygon_overlay.compiled.ring_order import (
@@ -147,8 +146,6 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
     margin = CLEARANCE * loaded.largest
     is_clear = fill_boxes(edges, n, margin, w.tree, stop) > margin
     mark_runs(edges, w.tree.places, loaded.n_runs, w.tree)
-    if not is_clear:
-        mark_short(edges, n, margin, w.tree.marks)
     if n > FEW:
         build_edge_tree(edges, n, n_rings, w.components, w.tree, stop)
     contacts = find_contacts(edges, n, n_rings, margin, w.events, w.unions, w.tree, stop)
@@ -162,10 +159,9 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
         n_contacts += int(w.unions.is_node[i] != 0)
     if n_contacts > room:
         return _Arranged(0, 0, 0, 0, False, n_contacts)
-    are_clear = sort_events(edges, w.events, w.along, w.unions, w.tree.marks, n, contacts.n_events, stop)
+    are_clear = sort_events(edges, w.events, w.along, w.unions, n, contacts.n_events, stop)
     if stop[0]:
         return _NONE
-    corners_clear = corners_are_clear(edges, n, w.along, margin, w.tree.marks, stop)
     if nesting.rule == PAIR and do_nothing_but_cross(w.given, w.events, contacts, n_rings, kept):
         n_found, n_points = walk_crossings(
             w.given, w.events, w.along, w.chains.at, w.tree.marks, kept, contacts.n_crossings, w.found, stop
@@ -174,7 +170,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
         n_found, n_points = _arrange_chains(w, loaded, kept, nesting, contacts, stop)
     if n_found == NO_ROOM:
         return _Arranged(0, 0, 0, 0, False, room + 1)
-    is_clear = is_clear and contacts.are_far and are_clear and corners_clear
+    is_clear = is_clear and contacts.are_far and are_clear and corners_are_clear(edges, n, w.along, margin, stop)
     return _Arranged(n_found, n_points, contacts.n_crossings, contacts.n_exact, is_clear, n_contacts)
 
 

@@ -16,7 +16,6 @@ from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
     BENT,
-    DOUBTFUL,
     POLL,
     RUN,
     BoxTree,
@@ -241,18 +240,6 @@ def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> Non
         tree.marks[e] = ANYWHERE | BENT | RUN
         tree.marks[edges.after[e]] |= BENT
         tree.boxes[e, 3] = -np.inf
-
-
-@inline
-def mark_short(edges: Edges, n: int, margin: float, marks: FlagArray) -> None:
-    """Put in doubt edges no longer than ``margin``, their length as `fill_boxes` has it, and those next to them."""
-    x, y = edges.x, edges.y
-    for e in range(n):
-        after = edges.after[e]
-        if max(abs(x[after] - x[e]), abs(y[after] - y[e])) <= margin:
-            marks[edges.before[e]] |= DOUBTFUL
-            marks[e] |= DOUBTFUL
-            marks[after] |= DOUBTFUL
 
 
 @kernel

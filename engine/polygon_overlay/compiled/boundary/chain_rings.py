@@ -25,7 +25,7 @@ from engine.polygon_overlay.compiled.boundary.chains import (
 )
 from engine.polygon_overlay.compiled.boundary.ring_nesting import Holders, enter_beyond
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient, turn_of_edges
-from engine.polygon_overlay.compiled.edge_tree import BENT, DOUBTFUL, POLL, RUN
+from engine.polygon_overlay.compiled.edge_tree import BENT, POLL, RUN
 
 BOUNDS: Final = 1
 INSIDE: Final = 2
@@ -36,7 +36,7 @@ meet where it begins."""
 MEETS: Final = 1
 Rings = namedtuple("Rings", "point edge meets offset region")
 """point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
-RUN where those up to the next point are left out, DOUBTFUL where an edge up to there has that mark; offset: where each
+RUN where those up to the next point are left out; offset: where each
 ring begins; region: a number of the region it bounds."""
 
 Walk = namedtuple("Walk", "path place")
@@ -110,27 +110,19 @@ def _go_on(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, 
 
 
 @merged
-def pass_point(
-    rings: Rings, start: int, at: int, point: int, edge: int, turns: bool, meets: int, doubt: int
-) -> tuple[int, int]:
-    """Write a point where the boundary turns, else only the doubt about what follows; return how many points, and the
-    doubt about what the ring begins with, which goes on from its last point."""
-    if turns:
-        rings.point[at], rings.edge[at], rings.meets[at] = point, edge, meets
-        return at + 1, doubt
-    if at > start:
-        rings.meets[at - 1] |= meets & DOUBTFUL
-        return at, doubt
-    return at, doubt | meets & DOUBTFUL
+def pass_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets: int) -> int:
+    """Write a point where the boundary turns; return how many points there are then."""
+    if not turns:
+        return at
+    rings.point[at], rings.edge[at], rings.meets[at] = point, edge, meets
+    return at + 1
 
 
 @merged
-def pass_vertex(
-    edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, start: int, at: int, doubt: int
-) -> tuple[int, int]:
+def pass_vertex(edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, at: int) -> int:
     """Pass an input vertex, from which the boundary goes on along ``edge``; returns as `pass_point`."""
     turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
-    return pass_point(rings, start, at, v, edge, turns, marks[edge] & (RUN | DOUBTFUL), doubt)
+    return pass_point(rings, at, v, edge, turns, marks[edge] & RUN)
 
 
 @inline
@@ -140,7 +132,7 @@ def _emit(
 ) -> int:  # fmt: skip
     """Write the points of the ring of the half-chains ``path[first:last]``, straight ones left out; return how many."""
     _, _, n, n_simple = sizes
-    start, doubt, edge = n_points, 0, leaving_edge(chains, path[last - 1] ^ 1)
+    edge = leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
         if k & POLL == 0 and stop[0]:
             return n_points
@@ -149,15 +141,14 @@ def _emit(
         is_simple, meets = node < n_simple, MEETS * (state[half] & FORKED != 0)
         turns = meets != 0 or (edge != before and (is_simple or turn_of_edges(edges, before, edge) != 0))
         point = n + node if is_simple else points[node]
-        n_points, doubt = pass_point(rings, start, n_points, point, edge, turns, meets | marks[edge] & DOUBTFUL, doubt)
+        n_points = pass_point(rings, n_points, point, edge, turns, meets)
         is_back, end = half & 1, leaving_edge(chains, half ^ 1)
         while edge != end:  # bound: the vertices of the chain
             if edge & POLL == 0 and stop[0]:
                 return n_points
             v = edge if is_back else edges.after[edge]
             edge = edges.before[v] if is_back else v
-            n_points, doubt = pass_vertex(edges, marks, v, edge, rings, start, n_points, doubt)
-    rings.meets[n_points - 1] |= doubt
+            n_points = pass_vertex(edges, marks, v, edge, rings, n_points)
     return n_points
 
 
@@ -168,8 +159,8 @@ def walk_rings(
 ) -> tuple[int, int]:  # fmt: skip
     """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
 
-    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many,
-    DOUBTFUL as clearance.py says. sizes: the numbers of chains, nodes, vertices and simple nodes.
+    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many.
+    sizes: the numbers of chains, nodes, vertices and simple nodes.
     """
     n_chains, n_nodes, _, _ = sizes
     state, path, place = faces.state, walk.path, walk.place

@@ -16,7 +16,7 @@ from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, pass_poi
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
 from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Contacts, Events
 from engine.polygon_overlay.compiled.edge_events import Along
-from engine.polygon_overlay.compiled.edge_tree import DOUBTFUL, POLL
+from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 
 
@@ -40,12 +40,12 @@ def _turns_left(given: Given, ring: int) -> bool:
 @inline
 def _follow(
     edges: Edges, events: Events, along: Along, place: Int32Array, marks: FlagArray, event: int, is_forward: bool,
-    rings: Rings, start: int, n: int, stop: FlagArray,
+    rings: Rings, n: int, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Write the crossing of an event, and the vertices from there to the next of its ring; return that, and how many
     points there are then."""
     edge, at = events.edge[event], place[event]
-    n, _ = pass_point(rings, start, n, events.point[event], edge, True, marks[edge] & DOUBTFUL, 0)
+    n = pass_point(rings, n, events.point[event], edge, True, 0)
     step = 1 if is_forward else -1
     at += step
     while at == along.starts[edge + 1] if is_forward else at < along.starts[edge]:  # bound: the vertices of the ring
@@ -53,7 +53,7 @@ def _follow(
             break
         v = edges.after[edge] if is_forward else edge
         edge = v if is_forward else edges.before[v]
-        n, _ = pass_vertex(edges, marks, v, edge, rings, start, n, 0)
+        n = pass_vertex(edges, marks, v, edge, rings, n)
         at = along.starts[edge] if is_forward else along.starts[edge + 1] - 1
     return along.order[at], n
 
@@ -82,16 +82,14 @@ def walk_crossings(
         enters = (goes_right != is_other_left) == is_forward
         if events.turn[c] == NOT_SIMPLE or enters != is_within:
             continue
-        start, event = n_points, 2 * c + is_second
+        event = 2 * c + is_second
         while events.turn[event >> 1] != NOT_SIMPLE:  # bound: each turn passes one crossing
             if stop[0]:
                 return n_rings, n_points
             events.turn[event >> 1] = NOT_SIMPLE
+            event, n_points = _follow(edges, events, along, place, marks, event, is_forward, rings, n_points, stop)
             event, n_points = _follow(
-                edges, events, along, place, marks, event, is_forward, rings, start, n_points, stop
-            )
-            event, n_points = _follow(
-                edges, events, along, place, marks, event ^ 1, is_other_forward, rings, start, n_points, stop
+                edges, events, along, place, marks, event ^ 1, is_other_forward, rings, n_points, stop
             )
             event ^= 1
         rings.region[n_rings] = 0 if kept[1] & kept[2] else n_rings
