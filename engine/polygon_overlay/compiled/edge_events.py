@@ -20,9 +20,9 @@ from engine.polygon_overlay.compiled.edge_tree import POLL
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""
 
-Along = namedtuple("Along", "starts order keys reaches spare_keys spare counts")
+Along = namedtuple("Along", "starts order keys spare_keys spare counts")
 """The events along each edge in their order: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64 in
-that order; reaches: by edge the largest reach. spare_keys, spare, counts: scratch as large as keys and order."""
+that order; spare_keys, spare, counts: scratch as large as keys and order."""
 
 
 @called
@@ -125,9 +125,8 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
 @inline
 def _group_events(events: Events, along: Along, n: int, n_events: int, stop: FlagArray) -> bool:
     """Put the events of each edge together, in any order; return False where the call is to end."""
-    starts, reaches = along.starts, along.reaches
+    starts = along.starts
     starts[: n + 1] = 0
-    reaches[:n] = 0.0
     for i in range(n_events):
         if i & POLL == 0 and stop[0]:
             return False
@@ -141,7 +140,6 @@ def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Fla
         starts[e + 1] -= 1
         along.order[starts[e + 1]] = i
         along.keys[starts[e + 1]] = events.t[i]
-        reaches[e] = max(reaches[e], events.reach[i])
     for e in range(n):  # starts[e + 1] has come down to where the part of e begins
         starts[e] = starts[e + 1]
     starts[n] = n_events
@@ -194,12 +192,6 @@ def sort_events(
             return False
         if last - first > 1:
             _sort_by_key(along, first, last)
-        reach = along.reaches[e]
-        is_sorted = keys[first] > reach and 1.0 - keys[last - 1] > reach
-        for k in range(first + 1, last):
-            is_sorted &= keys[k] - keys[k - 1] > 2.0 * reach
-        if is_sorted:  # no slack is above its reach
-            continue
         is_sorted = True
         slack, reach = events.slack[order[first]], events.reach[order[first]]
         is_clear = keys[first] > reach

@@ -129,12 +129,12 @@ def _load_pair(
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, safe = load_rings(
-        subjects, span.first, span.first_end, 1, is_named, -first, EVERYTHING if kept[1] else common, w.given, w.tree,
+        subjects, span.first, span.first_end, 1, is_named, -first, EVERYTHING if kept[1] else common, w.given,
         0, 0, stop,
     )  # fmt: skip
     n, n_rings, also_safe = load_rings(
         clips, span.second, span.second_end, 2, False, n_subject - second, EVERYTHING if kept[2] else common, w.given,
-        w.tree, n, n_rings, stop,
+        n, n_rings, stop,
     )  # fmt: skip
     return n, n_rings, safe and also_safe
 
@@ -195,7 +195,7 @@ def _arrange_chains(
     n_cycles = number_cycles(w.chains, w.stars, w.faces.cycle, n_chains, stop)
     if stop[0]:
         return 0, 0
-    join_faces(w, w.found.point, (n, n_rings, n_cycles, loaded.n_runs), stop)
+    join_faces(w, w.found.point, (n, n_cycles, loaded.n_runs), stop)
     if stop[0]:
         return 0, 0
     tells = nesting.rule == AGAIN

@@ -32,7 +32,6 @@ Box = tuple[float, float, float, float]
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
 
-_MANY_RINGS: Final = 256
 _SMALL_RING: Final = 64
 """Edges of a ring, on average, up to which rings are put in order, not edges."""
 LEFT_OUT: Final = -2
@@ -94,29 +93,19 @@ def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple
 @inline
 def load_rings(
     rings: RingArrays, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int, box: Box, given: Given,
-    tree: BoxTree, n: int, n_rings: int, stop: FlagArray,
+    n: int, n_rings: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
     is_named: the mask of each ring is its number instead, from ``first_ring`` on. base: what is added to the number of
     a vertex in ``origins``. box: of vertices beyond one of its sides, one after another, the first and the last count.
-    tree: scratch. Many rings that are not named are taken in the order of a space-filling curve: whatever looks at
-    neighbours then finds them in the cache.
     """
-    vertices, offsets, order = rings.vertices, rings.offsets, tree.places
-    if is_named or last_ring - first_ring < _MANY_RINGS:
-        for k in range(last_ring - first_ring):
-            order[k] = k
-    else:
-        for k in range(last_ring - first_ring):
-            first = offsets[first_ring + k]
-            tree.boxes[k, 0], tree.boxes[k, 2] = vertices[first, 0], vertices[first, 1]
-        order_boxes(tree.boxes, last_ring - first_ring, order)
+    vertices, offsets = rings.vertices, rings.offsets
     x_min, x_max, y_min, y_max = box
     x, y, origins = given.edges.x, given.edges.y, given.origins
     safe = True
-    for place in range(last_ring - first_ring):
-        start, ring = n, first_ring + order[place]
+    for ring in range(first_ring, last_ring):
+        start = n
         qx = qy = np.nan  # the last vertex
         sides = sides_before = 0  # of the last vertex and of the one before it: which sides of the box it is beyond
         for k in range(offsets[ring], offsets[ring + 1]):
@@ -210,7 +199,7 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArr
 @inline
 def build_edge_tree(edges: Edges, n: int, n_rings: int, scratch: Any, tree: BoxTree, stop: FlagArray) -> None:
     """Build the tree over the boxes of the edges, those of small rings ring by ring. scratch: `Components`."""
-    boxes, places, order, starts, at = tree.boxes, tree.places, scratch.highest, scratch.first, 0
+    boxes, places, order, starts, at = tree.boxes, tree.places, scratch.highest, scratch.number, 0
     if n > _SMALL_RING * n_rings:
         build_tree(tree, n, stop)
         return

@@ -161,7 +161,7 @@ def snap(
     w = rows_of(words)
     edges, tree = w.given.edges, w.tree
     rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
-    n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, tree, 0, 0, stop)
+    n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, 0, 0, stop)
     fill_boxes(edges, n, 0.5, tree, stop)
     n_corners = _find_corners(pixels, offsets, pieces, corners, starts, stop)
     x, y, after = edges.x, edges.y, edges.after

@@ -43,7 +43,7 @@ Buffers = namedtuple(
     "half_octets point_floats point_integers point_octets boxes tree tree_marks stack pairs ends",
 )
 """Scratch by size: a row for each purpose, by vertex, ring, contact, half-chain and point of a boundary ring."""
-_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 8, 5, 17
+_VERTEX_FLOATS, _VERTEX_INTEGERS, _RING_INTEGERS, _CONTACT_FLOATS, _CONTACT_INTEGERS = 2, 5, 7, 5, 17
 _HALF_INTEGERS, _HALF_LABELS, _HALF_OCTETS = 11, 2, 4
 _POINT_FLOATS, _POINT_INTEGERS, _POINT_OCTETS = 2, 6, 4
 """How many rows there are of each."""
@@ -164,19 +164,10 @@ def release() -> None:
     spare.clear()
 
 
-def _spread(length: int) -> int:
-    """Return a length of rows, no smaller, whose beginnings do not fall together in the cache.
-
-    A cache finds lines by the last bits of their address: rows a whole number of pages apart, or nearly, would share
-    few places, and small pairs, which use the beginnings only, wait for memory. Rows of a page or less stay close.
-    """
-    return length if length <= 1024 else length + (56 - length) % 1024
-
-
 def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     """Return scratch for pairs of up to so many vertices, rings and contacts."""
-    n, k = n_vertices + 1, _spread(n_contacts + 8)
-    m = _spread(n + 2 * k)  # points of all boundary rings: every vertex once, every end of a chain on two sides
+    n, k = n_vertices + 1, n_contacts + 8
+    m = n + 2 * k  # points of all boundary rings: every vertex once, every end of a chain on two sides
     n_leaves = 1
     while n_leaves * LEAF < m:  # bound: 60 doublings
         n_leaves *= 2
@@ -235,12 +226,12 @@ def rows_of(words: IntArray) -> Workspace:
         tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], stack, pairs),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
-        along=Along(v[4], c[12], crossing_x, px[0], crossing_y, c[13], c[14]),
+        along=Along(v[4], c[12], crossing_x, crossing_y, c[13], c[14]),
         chains=Chains(ends[:, 0], ends[:, 1], ends[:, 2], ends[:, 3], hl[1], c[5], c[6], p[1], c[7]),
         stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[4], h[5], hb[1], hb[2], c[16]),
-        components=Components(r[3], r[4], r[5], r[6], r[7]),
+        components=Components(r[3], r[4], r[5]),
         holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[9]),
         walk=Walk(h[6], c[8]),
         found=Rings(p[0], p[5], pb[0], c[10], c[11]),

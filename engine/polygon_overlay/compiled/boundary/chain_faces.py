@@ -29,7 +29,6 @@ from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import LEAF, POLL, BoxTree, leaves_of, push_children
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import add_scaled, sign
-from engine.predicates.orientation import BOUND_2D, GUARD_2D
 
 NOTHING: Final = -1
 
@@ -74,21 +73,9 @@ def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int
 @inline
 def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
     """Tell whether edge e is nearer to v than f, straight up and a step to the right; both are above v there."""
-    x, y = edges.x, edges.y
+    x = edges.x
     a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
     c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
-    # The height of ab above v is -orient(a, b, v) / (x_b - x_a).
-    wide_e, wide_f = x[b] - x[a], x[d] - x[c]
-    left, right = (x[a] - x[v]) * (y[b] - y[v]), (y[a] - y[v]) * (x[b] - x[v])
-    high_e, bound_e = right - left, BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
-    left, right = (x[c] - x[v]) * (y[d] - y[v]), (y[c] - y[v]) * (x[d] - x[v])
-    high_f, bound_f = right - left, BOUND_2D * (abs(left) + abs(right)) + GUARD_2D
-    p, q = high_e * wide_f, high_f * wide_e
-    bound = 2.0 * (bound_e * wide_f + bound_f * wide_e) + BOUND_2D * (abs(p) + abs(q))
-    if p - q > bound:
-        return False
-    if q - p > bound:
-        return True
     side = _compare_heights(edges, v, a, b, c, d)
     if side != 0:
         return side < 0
@@ -98,6 +85,7 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
 
 @inline
 def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
+    """Return the sign of the height of ab above v less that of cd; that of ab is -orient(a, b, v) / (x_b - x_a)."""
     x = edges.x
     first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
     n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)

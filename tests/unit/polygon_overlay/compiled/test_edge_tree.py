@@ -43,8 +43,6 @@ def test_every_pair_once(n: int, share: float, wanders: bool) -> None:
         np.empty((2 * n_leaves, 4)),
         np.empty(2 * n_leaves, np.uint8),
         np.empty(n, np.int64),
-        np.empty(n, np.int64),
-        np.empty(n, np.int64),
         np.empty((edge_tree.DEEPEST, 2), np.int64),
         np.empty((edge_tree.PORTION, 2), np.int64),
     )

@@ -9,7 +9,6 @@ import numpy as np
 
 from engine.polygon_overlay.compiled import workspace
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_tree import BoxTree
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
     Box,
@@ -29,9 +28,8 @@ def loaded(rings: list[list[tuple[float, float]]], box: Box) -> tuple[list[list[
     n, whole = len(vertices), np.zeros(len(vertices), np.int64)
     given = Given(Edges(np.zeros(n), np.zeros(n), *(whole.copy() for _ in range(3))), *(whole.copy() for _ in range(3)))
     stop = np.zeros(1, np.uint8)
-    tree = BoxTree(np.zeros((len(rings), 4)), *(np.zeros(len(rings), np.int64) for _ in range(8)))
     arrays = RingArrays(vertices, offsets)
-    n, n_rings, safe = load_rings(arrays, 0, len(rings), 1, False, 0, box, given, tree, 0, 0, stop)
+    n, n_rings, safe = load_rings(arrays, 0, len(rings), 1, False, 0, box, given, 0, 0, stop)
     assert safe
     found: list[list[int]] = []
     for ring in range(n_rings):
