@@ -213,9 +213,8 @@ def reduce_pair(
     if largest > LARGEST or is_empty(common_box(subject_box, clip_box)):
         return Loaded(0, 0, 0, largest)
     margin = CLEARANCE * largest
-    x, y = w.rounded.x, w.rounded.y
-    mark_blocks(subjects, margin, blocks, 0, x, y, stop)
-    mark_blocks(clips, margin, blocks, n_subject, x, y, stop)
+    mark_blocks(subjects, margin, blocks, 0, stop)
+    mark_blocks(clips, margin, blocks, n_subject, stop)
     if stop[0] or count_active(blocks, end) >= n_most:
         return Loaded(0, 0, 0, largest)
     if not _wake(subjects, clips, blocks, end, margin, n_most, w.tree, w.components.highest, stop):

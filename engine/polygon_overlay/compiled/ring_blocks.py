@@ -9,8 +9,6 @@ To be looked at edge by edge, or active, are blocks near another one, and those 
 edge_tree.py. All others meet nothing, by the margin of clearance.py: their boxes are further from all others than that,
 but for the blocks before and after that head the same way, whose edges advance by more than the margin each. So are
 edges of the same block.
-
-Every step by vertex is one that the compiler does four at a time, over vertices that are in the nearest cache.
 """
 
 from __future__ import annotations
@@ -32,8 +30,6 @@ NOT_UP: Final = 8
 NOT_DOWN: Final = 16
 EVERYWHERE: Final = NOT_RIGHT | NOT_LEFT | NOT_UP | NOT_DOWN
 """Marks of a block some edge of which does not head that way, and of one whose edges head no way together."""
-_AT_ONCE: Final = 512
-"""Edges whose directions are computed at once: they stay in the nearest cache."""
 _TURN_BOUND: Final = 4.0 * BOUND_2D
 """Bound of a turn by the larger half of its two products: |r| <= |l| + |l - r|, so BOUND_2D (|l| + |r|) is less."""
 
@@ -78,50 +74,39 @@ def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
 
 
 @inline
-def mark_blocks(
-    rings: RingArrays, margin: float, blocks: Blocks, ring: int, dx: FloatArray, dy: FloatArray, stop: FlagArray
-) -> None:
+def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, stop: FlagArray) -> None:
     """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be.
 
     Active are blocks that head no way, and those that may have a vertex where their ring does not turn, or one that the
-    vertex before repeats. dx, dy: float64, scratch for `_AT_ONCE` edges and one.
+    vertex before repeats.
     """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
-    first, last, marks = blocks.first, blocks.last, blocks.marks
-    ex, ey = dx[1:], dy[1:]
     for i_ring in range(n_rings):
         start, end = offsets[i_ring], offsets[i_ring + 1]
-        i, after = blocks.firsts[ring + i_ring], blocks.firsts[ring + i_ring + 1]
-        begin = i
-        while i < after:  # bound: each turn passes one block at least
+        begin, after = blocks.firsts[ring + i_ring], blocks.firsts[ring + i_ring + 1]
+        for block in range(begin, after):
             if stop[0]:
                 return
-            a, j = first[i], i + 1
-            while j < after and last[j] - a <= _AT_ONCE:  # bound: as above
-                j += 1
-            b = last[j - 1]
-            before, closing = a - 1 if a > start else end - 1, b if b < end else start
-            # direction 0 is that of the edge before, direction k + 1 that of edge a + k
-            dx[0], dy[0] = vertices[a, 0] - vertices[before, 0], vertices[a, 1] - vertices[before, 1]
-            part, ahead = vertices[a : b - 1], vertices[a + 1 : b]
-            for k in range(b - 1 - a):
-                ex[k], ey[k] = ahead[k, 0] - part[k, 0], ahead[k, 1] - part[k, 1]
-            dx[b - a], dy[b - a] = vertices[closing, 0] - vertices[b - 1, 0], vertices[closing, 1] - vertices[b - 1, 1]
-            for block in range(i, j):
-                low, size = first[block] - a, last[block] - first[block]
-                vx, vy, ux, uy = dx[low : low + size], dy[low : low + size], ex[low : low + size], ey[low : low + size]
-                n_right = n_left = n_up = n_down = n_bent = 0
-                for k in range(size):
-                    n_right += ux[k] > margin
-                    n_left += ux[k] < -margin
-                    n_up += uy[k] > margin
-                    n_down += uy[k] < -margin
-                    left, right = vx[k] * uy[k], vy[k] * ux[k]
-                    n_bent += abs(left - right) > _TURN_BOUND * abs(left) + GUARD_2D
-                marks[block] = _way(n_right == size, n_left == size, n_up == size, n_down == size)
-                blocks.is_active[block] = marks[block] == EVERYWHERE or n_bent < size
-                blocks.following[block] = block + 1
-            i = j
+            a, b = blocks.first[block], blocks.last[block]
+            before = (a if a > start else end) - 1
+            px, py = vertices[a, 0], vertices[a, 1]
+            vx, vy = px - vertices[before, 0], py - vertices[before, 1]
+            n_right = n_left = n_up = n_down = n_bent = 0
+            for k in range(a, b):
+                j = k + 1 if k + 1 < end else start
+                qx, qy = vertices[j, 0], vertices[j, 1]
+                ux, uy = qx - px, qy - py
+                n_right += ux > margin
+                n_left += ux < -margin
+                n_up += uy > margin
+                n_down += uy < -margin
+                left, right = vx * uy, vy * ux
+                n_bent += abs(left - right) > _TURN_BOUND * abs(left) + GUARD_2D
+                px, py, vx, vy = qx, qy, ux, uy
+            size = b - a
+            blocks.marks[block] = _way(n_right == size, n_left == size, n_up == size, n_down == size)
+            blocks.is_active[block] = blocks.marks[block] == EVERYWHERE or n_bent < size
+            blocks.following[block] = block + 1
         if after > begin:
             blocks.following[after - 1] = begin
 
