@@ -1,4 +1,4 @@
-"""Exact decisions on crossings of edges, each a sign: a double-double with a bound first, then an expansion.
+"""Exact decisions on crossings of edges, each the sign of an expansion.
 
 The crossing of an edge ab with the line through c and d divides ab by the two weights
 
@@ -8,9 +8,8 @@ All decisions are polynomials of degree four at most in the coordinates of the i
 Preconditions: every coordinate is zero or within 2^-120 .. 2^120, so that expansions are exact (multiples of 2^-172, of
 2^-688 after a product of four) and double-doubles keep their bounds.
 
-Bounds. A weight as a double-double carries 32 u^2 (|p| + |q|) for its two products p and q: differences are exact,
-products 14 u^2, their sum 4 u^2. The product of two weights carries the errors of both and 5 u^2, its difference 4 u^2:
-the sums below take 16 u^2 of each product for these.
+A weight as a double-double carries 32 u^2 (|p| + |q|) for its two products p and q: differences are exact, products
+14 u^2, their sum 4 u^2.
 
 Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.
 """
@@ -26,10 +25,9 @@ from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_product, grow, sign
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact
 from engine.predicates.parameters import minor
-from engine.types import UNDECIDED, Point2
+from engine.types import Point2
 
 WEIGHT_BOUND: Final = 32.0 * U2
-PRODUCT_BOUND: Final = 16.0 * U2
 WEIGHT_ROOM: Final = 16
 """Components of a weight: the product of two differences of two components each, twice."""
 
@@ -102,13 +100,6 @@ def exact_cross(first: Ends, second: Ends, e: Components) -> int:
     return minor(e, ux, ux_tail, uy, uy_tail, vx, vx_tail, vy, vy_tail)
 
 
-@merged
-def weight(edges: Edges, c: int, d: int, p: int) -> tuple[float, float, float]:
-    """Return orient(c, d, p) as a double-double, and its bound."""
-    x, y = edges.x, edges.y
-    return weight_of(x[c], y[c], x[d], y[d], x[p], y[p])
-
-
 @inline
 def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
     ux, ux_tail = two_diff(dx, cx)
@@ -128,49 +119,18 @@ def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
     return exact_cross((x[c], y[c], x[d], y[d]), (x[c], y[c], x[p], y[p]), e)
 
 
-@inline
-def difference_of_products(
-    ph: float, pl: float, pe: float, qh: float, ql: float, qe: float,
-    rh: float, rl: float, re: float, sh: float, sl: float, se: float,
-) -> int:  # fmt: skip
-    """Return the sign of p q - r s for double-doubles with bounds, UNDECIDED where the bounds leave it open."""
-    ah, al = dd_mul(ph, pl, qh, ql)
-    bh, bl = dd_mul(rh, rl, sh, sl)
-    h, _ = dd_sub(ah, al, bh, bl)
-    bound = 1.001 * (abs(ph) * qe + abs(qh) * pe + abs(rh) * se + abs(sh) * re) + 2.0 * (pe * qe + re * se)
-    bound += PRODUCT_BOUND * (abs(ah) + abs(bh))
-    if h > bound:
-        return 1
-    if -h > bound:
-        return -1
-    return UNDECIDED
-
-
 @called
 def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
     """Return -1, 0 or 1 as the crossing of edge e with f comes before, with or after that with g, along e.
 
     Caller guarantees that f and g each cross e in a point inside both.
     """
-    a, b = e, edges.after[e]
-    fb, gb = edges.after[f], edges.after[g]
-    # With t_f = w_a / (w_a - w_b) the difference t_f - t_g has the sign of w_a(g) w_b(f) - w_a(f) w_b(g), times the
-    # signs of w_a(f) and w_a(g).
-    fah, fal, fae = weight(edges, f, fb, a)
-    fbh, fbl, fbe = weight(edges, f, fb, b)
-    gah, gal, gae = weight(edges, g, gb, a)
-    gbh, gbl, gbe = weight(edges, g, gb, b)
-    side = difference_of_products(gah, gal, gae, fbh, fbl, fbe, fah, fal, fae, gbh, gbl, gbe)
-    if side == UNDECIDED or abs(fah) <= fae or abs(gah) <= gae:
-        return _exact_order(edges, a, b, f, fb, g, gb)
-    return side if (fah > 0.0) == (gah > 0.0) else -side
-
-
-@called
-def _exact_order(edges: Edges, a: int, b: int, f: int, fb: int, g: int, gb: int) -> int:
+    a, b, fb, gb = e, edges.after[e], edges.after[f], edges.after[g]
     wfa, wfb, wga, wgb = workspace(16), workspace(16), workspace(16), workspace(16)
     nfa, nfb = exact_weight(edges, f, fb, a, wfa), exact_weight(edges, f, fb, b, wfb)
     nga, ngb = exact_weight(edges, g, gb, a, wga), exact_weight(edges, g, gb, b, wgb)
+    # With t_f = w_a / (w_a - w_b) the difference t_f - t_g has the sign of w_a(g) w_b(f) - w_a(f) w_b(g), times the
+    # signs of w_a(f) and w_a(g).
     total = workspace(1024)  # 2 * 16 * 16 components for each of two products
     n = add_product(total, 0, wga, nga, wfb, nfb)
     for k in range(nfa):

@@ -1,8 +1,6 @@
 """The events of each edge in their order along it: floating point where intervals are apart, else exactly.
 
-Events that turn out to be one point are united, so that lines through one point meet in one node. Many events of one
-edge are first put where the parameter says, as if they lay evenly: that leaves little to sort (E. J. Isaac and
-R. C. Singleton, Sorting by address calculation, 1956).
+Events that turn out to be one point are united, so that lines through one point meet in one node.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ from typing import Final
 
 from engine.arrangement.union_find import unite
 from engine.arrays import FlagArray
-from engine.jit import called, inline, merged
+from engine.jit import called, inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
 from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, Events, Unions
 from engine.polygon_overlay.compiled.edge_tree import POLL
@@ -20,9 +18,9 @@ from engine.polygon_overlay.compiled.edge_tree import POLL
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""
 
-Along = namedtuple("Along", "starts order keys spare_keys spare counts")
+Along = namedtuple("Along", "starts order keys spare_keys spare")
 """The events along each edge in their order: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64 in
-that order; spare_keys, spare, counts: scratch as large as keys and order."""
+that order; spare_keys, spare: scratch as large as keys and order."""
 
 
 @called
@@ -64,45 +62,15 @@ def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
     return 0
 
 
-@merged
-def _part(key: float, n: int) -> int:
-    """Return in which of n equal parts of an edge a parameter is; a larger one is in no earlier part."""
-    return min(int(key * n), n - 1)
-
-
-@inline
-def _spread_by_key(along: Along, first: int, last: int) -> bool:
-    """Put ``keys[first:last]`` and ``order`` with them in the order of their parts; tell whether all parts hold few."""
-    order, keys, spare_keys, spare, counts = along.order, along.keys, along.spare_keys, along.spare, along.counts
-    n, most = last - first, 0
-    for k in range(first, last):
-        counts[k] = 0
-    for k in range(first, last):
-        spare_keys[k], spare[k] = keys[k], order[k]
-        counts[first + _part(keys[k], n)] += 1
-    at = first
-    for k in range(first, last):
-        size = counts[k]
-        counts[k], at, most = at, at + size, max(most, size)
-    for k in range(first, last):
-        part = first + _part(spare_keys[k], n)
-        at = counts[part]
-        keys[at], order[at], counts[part] = spare_keys[k], spare[k], at + 1
-    return most <= _RUN
-
-
 @inline
 def _sort_by_key(along: Along, first: int, last: int) -> None:
-    """Sort ``keys[first:last]`` and ``order`` with them, equal ones as they are: by insertion, in runs to be merged
-    where it might be far."""
+    """Sort ``keys[first:last]`` and ``order`` with them, equal ones as they are: runs by insertion, then merged."""
     order, keys, spare_keys, spare = along.order, along.keys, along.spare_keys, along.spare
     width = _RUN
-    if last - first > _RUN and _spread_by_key(along, first, last):
-        width = last - first
     for low in range(first, last, width):
         for k in range(low + 1, min(low + width, last)):
             key, moving, at = keys[k], order[k], k
-            while at > low and keys[at - 1] > key:  # bound: the run, or the part of the edge, that is sorted so far
+            while at > low and keys[at - 1] > key:  # bound: the run
                 keys[at], order[at] = keys[at - 1], order[at - 1]
                 at -= 1
             keys[at], order[at] = key, moving

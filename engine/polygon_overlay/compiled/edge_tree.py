@@ -1,8 +1,8 @@
 """Pairs of boxes that meet, by an implicit tree over boxes in the order of the rings they come from.
 
 Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and the
-boxes of a level are found from the one below. Only where one edge lies far from the next, or one small ring, are they
-first put in the order of a space-filling curve. The tree is walked against itself. Each box is
+boxes of a level are found from the one below. Only where one edge lies far from the next are they first
+put in the order of a space-filling curve. The tree is walked against itself. Each box is
 ``(x_min, x_max, y_min, y_max)``.
 
 A mark is a sum of bits: among them the quadrants' sides that the edge heads for. Edges one after another that all head

@@ -43,14 +43,13 @@ from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corner
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
 from engine.polygon_overlay.compiled.edge_contacts import Contacts, find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
-from engine.polygon_overlay.compiled.edge_tree import FEW
+from engine.polygon_overlay.compiled.edge_tree import FEW, build_tree
 from engine.polygon_overlay.compiled.loading import (
     EVERYTHING,
     Box,
     Loaded,
     RingArrays,
     box_of,
-    build_edge_tree,
     common_box,
     fill_boxes,
     is_empty,
@@ -147,7 +146,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
     is_clear = fill_boxes(edges, n, margin, w.tree, stop) > margin
     mark_runs(edges, w.tree.places, loaded.n_runs, w.tree)
     if n > FEW:
-        build_edge_tree(edges, n, n_rings, w.components, w.tree, stop)
+        build_tree(w.tree, n, stop)
     contacts = find_contacts(edges, n, n_rings, margin, w.events, w.unions, w.tree, stop)
     room = w.along.order.shape[0] - 9
     if stop[0] or contacts.n_events < 0:

@@ -19,10 +19,7 @@ from engine.polygon_overlay.compiled.edge_tree import (
     POLL,
     RUN,
     BoxTree,
-    build_tree,
-    fill_nodes,
     heading,
-    order_boxes,
 )
 from engine.predicates.expansion import SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -32,8 +29,6 @@ Box = tuple[float, float, float, float]
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
 
-_SMALL_RING: Final = 64
-"""Edges of a ring, on average, up to which rings are put in order, not edges."""
 LEFT_OUT: Final = -2
 """Second source of a vertex after which those up to the next one are left out."""
 
@@ -194,31 +189,6 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArr
             vx, vy = ux, uy
         first = last + 1
     return shortest
-
-
-@inline
-def build_edge_tree(edges: Edges, n: int, n_rings: int, scratch: Any, tree: BoxTree, stop: FlagArray) -> None:
-    """Build the tree over the boxes of the edges, those of small rings ring by ring. scratch: `Components`."""
-    boxes, places, order, starts, at = tree.boxes, tree.places, scratch.highest, scratch.number, 0
-    if n > _SMALL_RING * n_rings:
-        build_tree(tree, n, stop)
-        return
-    corners = boxes[n:]
-    for ring in range(n_rings):
-        last = edges.before[at]
-        starts[ring] = at
-        corners[ring, 0], corners[ring, 2] = boxes[at, 0], boxes[at, 2]
-        for e in range(at + 1, last + 1):
-            corners[ring, 0] = min(corners[ring, 0], boxes[e, 0])
-            corners[ring, 2] = min(corners[ring, 2], boxes[e, 2])
-        at = last + 1
-    order_boxes(corners, n_rings, order)
-    at = 0
-    for k in range(n_rings):
-        for e in range(starts[order[k]], edges.before[starts[order[k]]] + 1):
-            places[at] = e
-            at += 1
-    fill_nodes(tree, n, 0, stop)  # order: the last edge of a ring has all marks, so no run goes on in the next
 
 
 @inline

@@ -226,7 +226,7 @@ def rows_of(words: IntArray) -> Workspace:
         tree=BoxTree(boxes, pb[2], nodes, node_marks, p[2], stack, pairs),
         events=Events(c[0], c[1], c[2], cx[0], cx[1], cx[2], c[3], c[4], hb[0]),
         unions=Unions(p[3], pb[1], r[2]),
-        along=Along(v[4], c[12], crossing_x, crossing_y, c[13], c[14]),
+        along=Along(v[4], c[12], crossing_x, crossing_y, c[13]),
         chains=Chains(ends[:, 0], ends[:, 1], ends[:, 2], ends[:, 3], hl[1], c[5], c[6], p[1], c[7]),
         stars=Stars(p[4], c[13], c[14], c[15], h[0], h[1]),
         loose=Loose(h[3], hl[0], px[0], px[1]),
