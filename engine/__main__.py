@@ -28,12 +28,12 @@ from typing import Any, Final
 import numpy as np
 
 from engine.collision.collide_poses import collide_poses
+from engine.compiling.kernel_cache import cache_folder, check_owner, seal
 from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
 from engine.errors import EngineError, InvalidInputError
 from engine.files.solids import read_features, read_solid, read_solids
 from engine.files.tables import read_rows, write_geojson, write_table
-from engine.kernel_cache import cache_folder, check_owner, seal
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons

@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from engine.cold_start import fill_cache, note_full
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.triangles import collide_triangles
+from engine.compiling.cold_start import fill_cache, note_full
 from engine.containment.locate import locate
 from engine.containment.methods.rational_locate import rational_location
 from engine.containment.posed_locators import posed_locator

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.cold_start import fill_cache
+from engine.compiling.cold_start import fill_cache
 from engine.warmup import SHARES
 
 ROOT = Path(__file__).resolve().parents[1]

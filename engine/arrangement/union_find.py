@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.jit import merged
+from engine.compiling.jit import merged
 
 
 class UnionFind:

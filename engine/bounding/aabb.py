@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 
 
 def box_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray]:

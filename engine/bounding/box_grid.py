@@ -28,8 +28,8 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.direct import entry_of
-from engine.jit import allocating_kernel, inline, kernel
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import allocating_kernel, inline, kernel
 from engine.running.budget import Budget
 
 BLOCK: Final = 1 << 18

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray
-from engine.jit import allocating_kernel, inline
+from engine.compiling.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import as_point3, cross, dot, length, minus

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from engine.jit import inline
+from engine.compiling.jit import inline
 
 _FASTEST: Final = 1e300
 """Most cells per unit: keeps the product finite where all values of an axis lie within some subnormals."""

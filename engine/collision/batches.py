@@ -23,7 +23,7 @@ from engine.collision.detail import details_of_boxes, details_where_proven
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_pool, relate_outline_pairs
 from engine.collision.simple.form_relations import relate_box_pairs
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks

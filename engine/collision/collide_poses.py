@@ -25,7 +25,7 @@ from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Coll
 from engine.collision.simple.against_ball import centers_in_frame, named
 from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.closed_forms import told_by_forms
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks

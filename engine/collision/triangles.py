@@ -21,8 +21,8 @@ from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
 from engine.collision.meshes.triangle_triangle import APART, Facet, classify, classify_near, facet_at, with_pose
 from engine.collision.planar.outline import collide_outline_outline
 from engine.collision.result import Work
+from engine.compiling.jit import allocating_kernel, inline, kernel, merged
 from engine.errors import InvalidArrayError, WrongDimensionError
-from engine.jit import allocating_kernel, inline, kernel, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import scaled_integers
 from engine.predicates.vectors import as_point2

@@ -17,7 +17,7 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from engine.compiling import require
-from engine.kernel_cache import COMPLETE, cache_folder, is_of_its_source, keep, kept, source_digest
+from engine.compiling.kernel_cache import COMPLETE, cache_folder, is_of_its_source, keep, kept, source_digest
 
 require(
     {

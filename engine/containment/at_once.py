@@ -11,11 +11,11 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
+from engine.compiling.direct import entry_of
 from engine.containment.locators import Locator, locator_of, polygon_by, polyhedron_by, rational_half, settle
 from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.rational_locate import is_located
 from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
-from engine.direct import entry_of
 from engine.running.budget import UNLIMITED
 from engine.solids.base import Solid
 from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats

@@ -16,7 +16,7 @@ from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.placement import Placement, placed
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
 from engine.lanes.discs import DISC_ROWS
 from engine.lanes.gaps import FIXED_ROWS, GAP_ROWS, near_triangle, place_triangles

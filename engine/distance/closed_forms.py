@@ -16,8 +16,8 @@ from typing import Any, Final
 
 from engine.arrays import FloatArray
 from engine.collision.simple.form_relations import IS_BALL, RADIUS
+from engine.compiling.jit import inline, kernel
 from engine.distance.wide import Wide, less, over, plus, product, root, times
-from engine.jit import inline, kernel
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace
 

@@ -19,7 +19,7 @@ from engine.collision.exact_images import Vector, image_half_space, image_point,
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.collision.simple.closed_forms import FORMS, form_of
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.distance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
 from engine.distance.exact import Gap, Rational, ScaledGap
 from engine.distance.outlines import nearest_under_poses

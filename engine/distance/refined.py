@@ -32,9 +32,9 @@ from engine.collision.meshes.mesh_arrays import triangle_of
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import Placement
 from engine.collision.meshes.triangle_triangle import Facet, corner
+from engine.compiling.jit import called, inline
 from engine.distance.boxes import Search, View, keep_below, scaled
 from engine.distance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
-from engine.jit import called, inline
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
 from engine.types import Point3

@@ -30,7 +30,7 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_arrays
 from engine.collision.result import Clearance, Feature, Poses
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.distance.boxes import DONE, Room, new_room
 from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
 from engine.distance.traversal import BEYOND, TOLD, Asked, find_nearest

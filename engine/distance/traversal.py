@@ -23,6 +23,7 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, set_frame
+from engine.compiling.jit import inline, kernel, merged
 from engine.distance.boxes import (
     CLOSER,
     DONE,
@@ -39,7 +40,6 @@ from engine.distance.boxes import (
     size_of,
 )
 from engine.distance.refined import certify, refine
-from engine.jit import inline, kernel, merged
 from engine.lanes.boxes import EMPTY, FRAME_ROWS
 from engine.lanes.discs import inverse_ratio
 from engine.lanes.gaps import child_bounds

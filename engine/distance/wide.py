@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.double_double import dd_add, dd_div, dd_mul, dd_sub
 from engine.predicates.error_free import fast_two_sum, two_prod
 

@@ -31,7 +31,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import Float32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.lanes.lanes import aligned, any_of, bits_of, count_bits, dot, greater, lesser, load, prefetch
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
 from engine.types import UNDECIDED

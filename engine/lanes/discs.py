@@ -25,7 +25,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import Float32Array
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.lanes.boxes import MARGIN_ROW, SHIFT_ROW
 from engine.lanes.lanes import any_above, bits_of, dot, greater, load, load_lane, root, sift, store
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced

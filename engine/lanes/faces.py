@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import Final
 
 from engine.arrays import Float32Array
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.lanes.boxes import FRAME_ROWS, MARGIN_ROW, SHIFT_ROW, Bounds, are_parted
 from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, greater, lane_of, lesser, load, load_lane, sift, store
 from engine.lanes.tracing import LANES, Lanes, Rows, traced

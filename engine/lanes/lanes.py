@@ -17,7 +17,7 @@ import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
 
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.lanes.tracing import (
     LANES,
     VECTOR,

@@ -34,7 +34,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.lanes import bits_of, greater, lesser, load
 from engine.lanes.tracing import Number, Rows, Triple, traced

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
 from engine.polygon_clipping.in_integers import Row, clip_polygon
 from engine.polygon_clipping.planes import KernelScene, kernel_scene, planes_of

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Final, NamedTuple
 
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
 from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND, point_along
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, surely_rounded

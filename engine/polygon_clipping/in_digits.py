@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.jit import allocating, called, inline
+from engine.compiling.jit import allocating, called, inline
 from engine.polygon_clipping.cut_vertices import VALUE_BOUND
 from engine.polygon_clipping.rings import (
     EXACT,

@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
-from engine.jit import allocating, called, merged
+from engine.compiling.jit import allocating, called, merged
 from engine.lanes.lanes import move
 from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
 from engine.polygon_clipping.rings import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
-from engine.jit import merged
+from engine.compiling.jit import merged
 
 CLIPPED: Final = 0
 EXACT: Final = 1

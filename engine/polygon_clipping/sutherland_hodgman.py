@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import Any
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
-from engine.jit import allocating_kernel, inline
+from engine.compiling.jit import allocating_kernel, inline
 from engine.polygon_clipping.in_digits import clip_exactly, exact_scratch
 from engine.polygon_clipping.in_doubles import DOUBT, clip_plainly, scratch_for
 from engine.polygon_clipping.rings import NO_ROOM, Clipped, PlaneTables, Polygons

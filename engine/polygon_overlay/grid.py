@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.snapping import FOLDS, scale, snap

@@ -18,7 +18,7 @@ from engine.arrangement.arrange import crossing, line_through
 from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
 from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.ring_area import sum_areas

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, cast, overload
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import RingTooShortError
 from engine.polygon_overlay.compiled.loading import find_most
 from engine.polygon_overlay.found import chained, places_of

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal, cast
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.polygon_overlay.compiled.boundary.ring_nesting import AGAIN, PAIR, Nesting
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays

@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.predicates.double_double import U2, dd_add, dd_div, even_of, surely_rounded
 
 BITS: Final = 28

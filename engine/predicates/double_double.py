@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.predicates.error_free import fast_two_sum, fma, two_prod, two_sum
 
 U2: Final = 2.0**-106

@@ -23,7 +23,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from engine.jit import inline
+from engine.compiling.jit import inline
 
 
 def plain_fma(a: float, b: float, c: float) -> float:

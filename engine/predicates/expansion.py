@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.error_free import fast_two_sum, two_prod, two_sum
 
 Components = Any  # a float64 array, or a list of floats when the compiler is disabled

@@ -32,7 +32,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 
 from engine.arrays import FloatArray, Int8Array
-from engine.jit import called, inline, kernel, merged
+from engine.compiling.jit import called, inline, kernel, merged
 from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_scaled, sign

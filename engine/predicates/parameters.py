@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.error_free import two_diff, two_prod
 from engine.predicates.expansion import Components, add_scaled, grow_product, sign
 from engine.types import UNDECIDED

@@ -18,7 +18,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, scale, sign
 from engine.predicates.side import NO_TERM

@@ -23,7 +23,7 @@ from math import frexp, ldexp
 from typing import NamedTuple
 
 from engine.arrays import FloatArray
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, add_scaled, compress, grow_product, sign
 from engine.predicates.orientation import (

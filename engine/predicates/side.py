@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from math import frexp, ldexp
 
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.double_double import U2
 from engine.predicates.error_free import two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, grow, grow_product, sign

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.types import Point2, Point3
 
 

@@ -18,11 +18,11 @@ from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
+from engine.compiling.direct import entry_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.methods.frames import frames_of
 from engine.containment.methods.rational_locate import Check, is_located, over_tree
 from engine.containment.posed_locators import posed_locator
-from engine.direct import entry_of
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.running.budget import Budget

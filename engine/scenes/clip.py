@@ -13,8 +13,8 @@ from typing import Any, Final, cast
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray, read_only
+from engine.compiling.direct import entry_of
 from engine.containment.locators import locator_of
-from engine.direct import entry_of
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import run_chunks
 from engine.scenes.bodies import order_of

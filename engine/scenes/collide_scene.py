@@ -25,7 +25,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Witness, Work
 from engine.collision.simple.closed_forms import form_of
 from engine.collision.simple.form_relations import N_NUMBERS
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.distance.clearance import checked_distance, has_plane
 from engine.distance.convex_gaps import gaps_of_pairs
 from engine.distance.forms import are_small, gap_of_planes, told_under_poses

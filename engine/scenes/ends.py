@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
-from engine.direct import entry_of
-from engine.jit import inline, kernel
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import inline, kernel
 from engine.running.budget import UNLIMITED, Budget, concatenated
 from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
 from engine.types import UNDECIDED

@@ -12,13 +12,13 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import kernel
 from engine.containment.at_once import located_at_once
 from engine.containment.cells.build import MOST_FACES, sides_if_they_pay
 from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
 from engine.containment.prepared.triangle_tree import tree_of
-from engine.direct import entry_of
-from engine.jit import kernel
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.scenes.located import MESH, LocateTables, locate_in_body

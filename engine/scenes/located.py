@@ -12,6 +12,7 @@ import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.aabb import place_boxes
+from engine.compiling.jit import merged
 from engine.containment.cells.locate import side_in_cell
 from engine.containment.methods.ball import located
 from engine.containment.methods.filters import in_space, side_of_box, side_of_rows
@@ -22,7 +23,6 @@ from engine.containment.posed_locators import posed_locator
 from engine.containment.prepared.rings import closed_rings
 from engine.containment.prepared.triangle_tree import tree_at, tree_line
 from engine.errors import EngineError
-from engine.jit import merged
 from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

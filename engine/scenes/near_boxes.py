@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
 from engine.bounding.bvh import WIDTH, Bvh
-from engine.jit import inline, kernel, merged
+from engine.compiling.jit import inline, kernel, merged
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import lowest_bit

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.lanes.addresses import array_at
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub
 from engine.predicates.error_free import two_diff

@@ -14,9 +14,9 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import WIDTH
+from engine.compiling.jit import inline
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.prepared.triangle_tree import tree_at
-from engine.jit import inline
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.tracing import LANES

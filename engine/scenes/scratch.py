@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.arrays import IntArray
 from engine.bounding.bvh import STACK, WIDTH
-from engine.jit import merged
+from engine.compiling.jit import merged
 from engine.lanes.addresses import array_at
 from engine.segment_clipping.on_boundary.touching_cut import Crossings
 from engine.segment_clipping.pieces import Pieces

@@ -14,9 +14,9 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import inline, kernel
 from engine.containment.locators import Locator
-from engine.direct import entry_of
-from engine.jit import inline, kernel
 from engine.running.budget import UNLIMITED, Budget
 from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, body_tree, words_of
 from engine.scenes.located import LocateTables, both

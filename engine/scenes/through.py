@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.jit import inline, kernel
+from engine.compiling.jit import inline, kernel
 from engine.lanes.addresses import array_at
 from engine.lanes.lanes import prefetch
 from engine.lanes.triangles import longest_axis

@@ -21,7 +21,7 @@ import math
 from typing import Final, NamedTuple
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import called, inline, kernel
+from engine.compiling.jit import called, inline, kernel
 from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub
 from engine.predicates.error_free import fma, two_diff, two_prod
 from engine.segment_clipping.on_boundary.crossing_values import Vector

@@ -36,7 +36,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import kernel, merged
+from engine.compiling.jit import kernel, merged
 from engine.predicates.double_double import U2
 from engine.predicates.error_free import fma, two_diff, two_prod, workspace
 from engine.segment_clipping.cyrus_beck import coordinate_limit, decide_alone

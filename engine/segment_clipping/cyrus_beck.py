@@ -22,7 +22,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import allocating_kernel, called, inline, merged
+from engine.compiling.jit import allocating_kernel, called, inline, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter

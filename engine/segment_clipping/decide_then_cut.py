@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int32Array, IntArray
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.predicates.scaling import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks

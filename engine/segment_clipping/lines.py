@@ -14,8 +14,8 @@ from typing import Any, ClassVar, Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.direct import entry_of
-from engine.jit import inline, kernel
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import inline, kernel
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
 from engine.running.budget import concatenated
 

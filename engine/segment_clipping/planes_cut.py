@@ -9,7 +9,7 @@ block of pieces are made at once, cut or not, without branches. In the plane z i
 from __future__ import annotations
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import called, kernel, merged
+from engine.compiling.jit import called, kernel, merged
 from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.double_double import dd_add, dd_div
 from engine.predicates.error_free import workspace

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray, read_only
-from engine.jit import inline, kernel
+from engine.compiling.jit import inline, kernel
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
 from engine.solids.polyhedron import Polyhedron

@@ -32,9 +32,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import inline, kernel
 from engine.errors import FaceNotSimpleError
-from engine.jit import inline, kernel
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import orient2d_rational, scaled_integers
 from engine.running.budget import Budget

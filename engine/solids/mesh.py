@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.errors import (
     InconsistentOrientationError,
     IndexOutOfRangeError,

@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, read_only
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import kernel
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
-from engine.jit import kernel
 from engine.predicates.rational import cross, determinant, scaled_integers
 from engine.solids.base import Immutable
 from engine.solids.checks import (

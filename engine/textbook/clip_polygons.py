@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.jit import allocating_kernel
+from engine.compiling.jit import allocating_kernel
 from engine.textbook.solids import signed_distance
 
 

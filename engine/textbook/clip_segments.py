@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import allocating, allocating_kernel, inline, merged
+from engine.compiling.jit import allocating, allocating_kernel, inline, merged
 from engine.textbook.solids import signed_distance
 
 REJECTED, ACCEPTED, UNFINISHED = 0, 1, 2

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import allocating, allocating_kernel, inline
+from engine.compiling.jit import allocating, allocating_kernel, inline
 
 
 @allocating_kernel

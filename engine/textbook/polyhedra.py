@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import allocating_kernel, inline
+from engine.compiling.jit import allocating_kernel, inline
 from engine.predicates.vectors import as_point3, cross, dot, minus
 from engine.types import Point3
 

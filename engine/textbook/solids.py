@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, IntArray
-from engine.jit import allocating_kernel, inline
+from engine.compiling.jit import allocating_kernel, inline
 
 Leaf = Callable[[FloatArray], BoolArray]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray
-from engine.jit import allocating_kernel, inline
+from engine.compiling.jit import allocating_kernel, inline
 from engine.predicates.vectors import as_point3, cross, dot, minus
 from engine.types import Point2, Point3
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from engine import errors
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import kernel
 from engine.errors import CancelledError, InvalidInputError
-from engine.jit import kernel
 from engine.running import budget
 from engine.running.budget import Budget, Cancel, concatenated, polled
 

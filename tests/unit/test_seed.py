@@ -13,7 +13,7 @@ import pytest
 from numba import config as numba_config
 
 import engine
-from engine import jit, kernel_cache
+from engine.compiling import jit, kernel_cache
 
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 

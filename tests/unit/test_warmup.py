@@ -15,7 +15,7 @@ PROBE = """
 import importlib, pkgutil
 import numpy as np
 import engine
-from engine.jit import KERNELS
+from engine.compiling.jit import KERNELS
 
 for module in pkgutil.walk_packages(engine.__path__, "engine."):
     importlib.import_module(module.name)

@@ -15,7 +15,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
-from engine.jit import kernel, merged
+from engine.compiling.jit import kernel, merged
 from engine.predicates.vectors import cross, length, minus
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -42,7 +42,7 @@ from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned, turned_back
-from engine.jit import inline, kernel, merged
+from engine.compiling.jit import inline, kernel, merged
 from engine.predicates.vectors import as_point3, cross, dot, largest_of, length, minus, negative
 from engine.types import UNDECIDED, Point3
 

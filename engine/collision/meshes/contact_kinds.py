@@ -32,7 +32,7 @@ from engine.collision.meshes.triangle_triangle import (
     turn_in_plane,
 )
 from engine.collision.result import Kind
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.predicates.posed import UNPOSED, PosedPoint3, surely_same
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import UNDECIDED, Point3

@@ -21,7 +21,7 @@ from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
 from engine.collision.meshes.triangle_triangle import APART, CORNER, CROSSING, Facet, classify, classify_near, with_pose
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.lanes.boxes import FRAME_ROWS, meeting
 from engine.lanes.discs import discs_meeting
 from engine.lanes.faces import WORK_ROWS, faces_meeting

@@ -27,8 +27,8 @@ from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_sh
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind, Poses
-from engine.direct import entry_of
-from engine.jit import allocating_kernel, inline
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import allocating_kernel, inline
 from engine.lanes.boxes import EMPTY
 from engine.predicates.rational import cross, dot, largest_axis, minus, sign_of
 from engine.solids.pose import Pose

@@ -40,8 +40,8 @@ from engine.collision.meshes.triangle_triangle import (
     separation,
     with_pose,
 )
-from engine.direct import entry_of
-from engine.jit import allocating, allocating_kernel, called, inline
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import allocating, allocating_kernel, called, inline
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import largest_of
 from engine.types import UNDECIDED, Point3

@@ -19,8 +19,8 @@ from engine.bounding.bvh import WIDTH, build_bvh
 from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Facet, facet_at, projected
+from engine.compiling.jit import allocating_kernel, inline, kernel
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
-from engine.jit import allocating_kernel, inline, kernel
 from engine.lanes.boxes import EMPTY
 from engine.lanes.discs import DISC_ROWS
 from engine.lanes.faces import NOWHERE

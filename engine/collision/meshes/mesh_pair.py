@@ -33,7 +33,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import BESIDE, KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, COPLANAR, CROSSING
 from engine.collision.result import Poses, Witness, Work
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.types import UNDECIDED
 
 _BLOCK = 64

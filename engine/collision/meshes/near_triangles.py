@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.collision.meshes.triangle_triangle import Facet, corner
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import Point3
 

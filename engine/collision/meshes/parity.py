@@ -26,7 +26,7 @@ from engine.collision.meshes.placement import (
     turned_back,
 )
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.jit import allocating, inline, kernel, merged
+from engine.compiling.jit import allocating, inline, kernel, merged
 from engine.lanes.boxes import inside_box
 from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient3d

@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.arrays import Float32Array, FloatArray
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3

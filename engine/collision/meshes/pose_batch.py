@@ -34,7 +34,7 @@ from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.touching import JUDGED, flush, relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
-from engine.jit import called, inline, kernel, merged
+from engine.compiling.jit import called, inline, kernel, merged
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED
 

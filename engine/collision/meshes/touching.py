@@ -50,7 +50,7 @@ from engine.collision.meshes.triangle_triangle import (
     sides_of,
     sign_of_four,
 )
-from engine.jit import allocating, called, inline
+from engine.compiling.jit import allocating, called, inline
 from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.predicates.vectors import as_point3, largest_of, minus
 from engine.types import UNDECIDED

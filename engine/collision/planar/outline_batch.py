@@ -34,8 +34,8 @@ from engine.collision.result import (
     Work,
     has_faces,
 )
-from engine.direct import entry_of
-from engine.jit import allocating_kernel, inline, kernel
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import allocating_kernel, inline, kernel
 from engine.predicates.error_free import two_sum
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2

@@ -7,7 +7,7 @@ which of them sticks out of the other.
 from __future__ import annotations
 
 from engine.arrays import FloatArray, IntArray
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
 from engine.types import Point2

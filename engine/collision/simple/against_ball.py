@@ -21,8 +21,8 @@ from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_bo
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
+from engine.compiling.direct import entry_of
 from engine.containment.methods.rational_locate import rational_location
-from engine.direct import entry_of
 from engine.predicates.rational import minus, squared_length
 from engine.solids.base import Solid
 from engine.solids.pose import Pose

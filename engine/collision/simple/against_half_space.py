@@ -14,8 +14,8 @@ from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, mesh_body_of
 from engine.collision.result import NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of, first_triangle_at, pulled_back
-from engine.direct import entry_of
-from engine.jit import inline, kernel
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import inline, kernel
 from engine.predicates.rational import sign_of
 from engine.predicates.vectors import as_point3, dot
 from engine.solids.base import Solid

@@ -18,7 +18,7 @@ from engine.collision.meshes.mesh_arrays import MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, SLACK, OwnPoint, box_between, locate_point, next_face
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.jit import allocating, inline, kernel
+from engine.compiling.jit import allocating, inline, kernel
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import Point3
 

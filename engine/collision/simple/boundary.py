@@ -24,9 +24,9 @@ from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import kernel
 from engine.containment.methods.rational_locate import rational_location
-from engine.direct import entry_of
-from engine.jit import kernel
 from engine.predicates.rational import common_integers, cross, dot, minus, sign_of, squared_length
 from engine.running.budget import Budget
 from engine.solids.base import Solid

@@ -41,7 +41,7 @@ from engine.collision.simple.form_relations import (
     THEIR_FACE_AT,
     relate_forms,
 )
-from engine.direct import entry_of
+from engine.compiling.direct import entry_of
 from engine.predicates.rational import largest_axis, squared_length
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
+from engine.compiling.jit import inline, kernel
 from engine.containment.cells.lattice import (
     PLACE,
     Lattice,
@@ -26,7 +27,6 @@ from engine.containment.cells.lattice import (
 )
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.prepared.triangle_tree import TriangleTree, cost_in_tree, tree_of
-from engine.jit import inline, kernel
 from engine.lanes.cells import ROWS, groups_of, set_entry, set_nothing
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import corners_of

@@ -13,9 +13,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
+from engine.compiling.jit import inline, kernel
 from engine.containment.cells.reach import layer_reached, row_reached, walls_of
 from engine.containment.prepared.triangle_tree import TriangleTree, tree_of
-from engine.jit import inline, kernel
 from engine.predicates.vectors import corners_of
 from engine.running.budget import Budget
 from engine.solids.polyhedron import Polyhedron

@@ -24,7 +24,7 @@ from __future__ import annotations
 from math import ceil, floor
 from typing import Any, Final, NamedTuple
 
-from engine.jit import inline
+from engine.compiling.jit import inline
 
 _MARGIN: Final = 0.5 + 2.0**-20
 _ROUNDING: Final = 32.0 * 2.0**-53

@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrays import FlagArray, FloatArray, Int8Array
+from engine.compiling.jit import called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
-from engine.jit import called, inline, kernel, merged
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import grow_product, sign
 from engine.types import UNDECIDED

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.jit import inline, kernel
+from engine.compiling.jit import inline, kernel
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
 from engine.types import UNDECIDED, Point2

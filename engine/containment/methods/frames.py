@@ -18,8 +18,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import BoolArray, FloatArray, Int32Array
+from engine.compiling.jit import inline, kernel
 from engine.containment.methods.filters import in_space
-from engine.jit import inline, kernel
 from engine.predicates.error_free import two_diff
 from engine.solids.pose import Pose
 

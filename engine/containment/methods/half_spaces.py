@@ -25,8 +25,8 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array
+from engine.compiling.jit import allocating_kernel, inline, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite, in_space
-from engine.jit import allocating_kernel, inline, merged
 from engine.predicates.side import side_of_plane, side_of_plane_filter
 from engine.types import UNDECIDED, HalfSpace3, Point3
 

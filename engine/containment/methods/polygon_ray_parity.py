@@ -25,8 +25,8 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of
+from engine.compiling.jit import called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
-from engine.jit import called, inline, kernel, merged
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact, orient2d_filter
 from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, Point2

@@ -13,9 +13,9 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of
+from engine.compiling.jit import allocating_kernel, inline
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
-from engine.jit import allocating_kernel, inline
 from engine.predicates.vectors import as_point3, corners_of
 from engine.types import UNDECIDED
 

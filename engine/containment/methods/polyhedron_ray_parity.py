@@ -30,8 +30,8 @@ import numpy as np
 
 from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import LEAST, STACK, WIDTH, Bvh
+from engine.compiling.jit import allocating_kernel, called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite, orient2d_blurred
-from engine.jit import allocating_kernel, called, inline, kernel, merged
 from engine.lanes.boxes import EMPTY, inside_box
 from engine.lanes.lanes import count_bits, lowest_bit
 from engine.lanes.triangles import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead

@@ -21,10 +21,10 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.grid import Axis, cell_of, make_axis
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
 from engine.containment.methods.rational_locate import Check, no_check
-from engine.direct import entry_of
-from engine.jit import inline, kernel
 from engine.solids.polygon import Polygon
 from engine.solids.triangle import Triangle
 

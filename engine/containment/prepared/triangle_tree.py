@@ -10,9 +10,9 @@ import numpy as np
 
 from engine.arrays import BoolArray, Float32Array, FloatArray, Int32Array, read_only
 from engine.bounding.bvh import WIDTH, build_bvh, on_lines
+from engine.compiling.jit import inline
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
 from engine.containment.methods.rational_locate import Check, no_check, prism_walls
-from engine.jit import inline
 from engine.lanes.addresses import array_at
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.triangles import OVERHEAD_ROWS

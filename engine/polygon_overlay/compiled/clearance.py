@@ -32,7 +32,7 @@ from __future__ import annotations
 from typing import Final
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import MEETS, Rings
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import is_far, segments_are_far

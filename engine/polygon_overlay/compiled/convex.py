@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import agree, smaller_of, turns
 from engine.polygon_overlay.compiled.edge_tree import POLL

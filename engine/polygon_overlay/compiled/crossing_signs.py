@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Final
 
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.predicates.double_double import U2, dd_mul, dd_sub
 from engine.predicates.error_free import two_diff, workspace
 from engine.predicates.expansion import Components, add_product, grow, sign

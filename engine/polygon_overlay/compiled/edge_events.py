@@ -10,7 +10,7 @@ from typing import Final
 
 from engine.arrangement.union_find import unite
 from engine.arrays import FlagArray
-from engine.jit import called, inline
+from engine.compiling.jit import called, inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
 from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, Events, Unions
 from engine.polygon_overlay.compiled.edge_tree import POLL

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray
-from engine.jit import allocating, inline, merged
+from engine.compiling.jit import allocating, inline, merged
 
 POLL: Final = 0x3FFF
 """Steps of some 10 to 100 ns between two looks at the flag that ends a call, as a mask of their number."""

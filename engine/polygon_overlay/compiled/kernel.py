@@ -25,7 +25,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from engine.arrays import FlagArray, IntArray
-from engine.jit import kernel, merged
+from engine.compiling.jit import kernel, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import number_cycles
 from engine.polygon_overlay.compiled.boundary.chain_rings import join_regions, mark_boundary, walk_rings
 from engine.polygon_overlay.compiled.boundary.chains import build_chains, build_stars

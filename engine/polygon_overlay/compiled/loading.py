@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import inline, kernel, merged
+from engine.compiling.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,

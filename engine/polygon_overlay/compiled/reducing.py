@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import inline, kernel
+from engine.compiling.jit import inline, kernel
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
 from engine.polygon_overlay.compiled.loading import (

@@ -21,7 +21,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import inline, kernel, merged
+from engine.compiling.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Ends
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.rounded_crossings import common_places, weights_of

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.edge_tree import LEAF, BoxTree, leaves_of, push_children
 from engine.polygon_overlay.compiled.loading import Box, RingArrays, box_of
 from engine.predicates.orientation import BOUND_2D, GUARD_2D

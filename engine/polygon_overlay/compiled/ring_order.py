@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings
 from engine.polygon_overlay.compiled.boundary.ring_nesting import NO_ROOM, write_evidence
 from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges

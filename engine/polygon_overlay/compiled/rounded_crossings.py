@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, Int32Array
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import (
     Edges,
     Ends,

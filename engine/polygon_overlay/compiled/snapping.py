@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import called, inline, kernel, merged
+from engine.compiling.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, is_before, load_rings

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import IntArray
-from engine.jit import merged
+from engine.compiling.jit import merged
 from engine.lanes.addresses import array_at
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, Walk

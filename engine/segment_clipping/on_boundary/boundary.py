@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
+from engine.compiling.direct import entry_of
 from engine.containment.at_once import located_at_once
 from engine.containment.locators import Locator, locator_of
-from engine.direct import entry_of
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.decide_then_cut import Clipped

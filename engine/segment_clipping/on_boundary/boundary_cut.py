@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.jit import allocating_kernel, called, inline
+from engine.compiling.jit import allocating_kernel, called, inline
 from engine.segment_clipping.on_boundary.contacts import GROUP, Kind, edge_contacts_for, gather_edges
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import gather_triangles, mesh_contacts_for

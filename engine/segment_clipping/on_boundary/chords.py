@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
+from engine.compiling.direct import entry_of
+from engine.compiling.jit import kernel
 from engine.containment.locators import Locator
-from engine.direct import entry_of
-from engine.jit import kernel
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
 from engine.running.budget import Budget

@@ -32,7 +32,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray
-from engine.jit import allocating, allocating_kernel, called, inline, merged
+from engine.compiling.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, Point2

@@ -22,7 +22,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from engine.arrays import FloatArray
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, point_at
 from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace

@@ -26,7 +26,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK, WIDTH
-from engine.jit import allocating, allocating_kernel, called, inline, merged
+from engine.compiling.jit import allocating, allocating_kernel, called, inline, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array
-from engine.jit import allocating, called, inline
+from engine.compiling.jit import allocating, called, inline
 from engine.segment_clipping.on_boundary.chords import INSIDE_BEFORE
 from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_one, axis_of, code_of, place_of
 from engine.segment_clipping.on_boundary.crossing_values import cross_exactly, cut_at, is_item_safe, parameter_exactly

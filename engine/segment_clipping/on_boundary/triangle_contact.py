@@ -24,7 +24,7 @@ from __future__ import annotations
 from typing import Final
 
 from engine.arrays import FloatArray
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.lanes.triangles import AXES_BEFORE, longest_axis
 from engine.predicates.error_free import workspace
 from engine.predicates.orientation import orient3d

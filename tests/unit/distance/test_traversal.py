@@ -12,9 +12,9 @@ import engine.distance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
 from engine.collision.meshes.near_triangles import FACE, nearest_points, rounding_of, seen_from
 from engine.collision.meshes.triangle_triangle import Facet
+from engine.compiling.jit import kernel
 from engine.distance.exact import nearest_of_triangles
 from engine.distance.spreads import SpreadPair, _ExactPair, spread_pair
-from engine.jit import kernel
 from engine.running.budget import Budget
 from engine.types import Point3
 from tests.reference.distance import squared_distance

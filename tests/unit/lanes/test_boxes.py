@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.lanes.boxes import FRAME_ROWS, exchange, fill, inside_box, join, meeting
 from engine.lanes.lanes import lowest_bit
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.lanes.cells import BAND, group_parity, groups_of, prefetch_group, set_entry, set_nothing
 from engine.lanes.tracing import LANES
 from engine.types import UNDECIDED

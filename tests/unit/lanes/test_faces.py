@@ -11,7 +11,7 @@ from engine import Surface, collide_triangles
 from engine.collision.meshes.dual_traversal import new_descent, place_bodies
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.lanes.faces import (
     CORNER_ROWS,
     WORK_ROWS,

@@ -11,7 +11,7 @@ import pytest
 from numba import config as numba_config
 from numba.core.errors import TypingError
 
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.lanes.addresses import array_at, plain_array_at
 from engine.lanes.lanes import (
     any_above,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from engine.jit import _OPTIONS
+from engine.compiling.jit import _OPTIONS
 from engine.predicates.orientation import orient2d, orient2d_filter, orient3d_filter
 from engine.predicates.polynomial import sign_of_polynomial_exact, sign_of_polynomial_filter
 from engine.predicates.side import side_of_plane

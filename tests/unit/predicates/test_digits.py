@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.predicates.digits import (
     BITS,
     MOST_OF_ROW,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.predicates.double_double import (
     U2,
     dd_add,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import grow
 from engine.predicates.parameters import (

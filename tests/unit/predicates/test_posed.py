@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from engine.jit import inline, kernel
+from engine.compiling.jit import inline, kernel
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, orient3d_posed_exact, posed_error
 from engine.predicates.rational import orient3d_rational
 from engine.types import UNDECIDED

@@ -29,8 +29,8 @@ from engine import (
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
+from engine.compiling.jit import KERNELS
 from engine.errors import InvalidInputError
-from engine.jit import KERNELS
 from engine.scenes.collide_scene import collide_scene
 from tests.reference.shapes import box
 

@@ -13,7 +13,7 @@ from typing import Final
 
 from engine.arrangement.union_find import root_of
 from engine.arrays import FlagArray, Int32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chains import (
     Chains,
     Stars,

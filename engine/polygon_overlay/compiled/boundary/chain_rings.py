@@ -11,7 +11,7 @@ from typing import Final
 
 from engine.arrangement.union_find import root_of, unite
 from engine.arrays import FlagArray, Int32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chains import (
     Chains,

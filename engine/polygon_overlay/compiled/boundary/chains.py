@@ -22,7 +22,7 @@ from typing import Final
 
 from engine.arrangement.union_find import root_of
 from engine.arrays import FlagArray, Int32Array, IntArray
-from engine.jit import called, inline, merged
+from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along

@@ -21,7 +21,7 @@ import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
 from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
-from engine.jit import inline
+from engine.compiling.jit import inline
 from engine.polygon_overlay.compiled.boundary.chain_faces import NOTHING, edge_above, half_below
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import LEAF, OFTEN, POLL, RUN, BoxTree, box_holds, build_tree, leaves_of

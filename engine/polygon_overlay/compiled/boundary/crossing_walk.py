@@ -11,7 +11,7 @@ the rest of it hangs together. Their union is one part, whose boundary all rings
 from __future__ import annotations
 
 from engine.arrays import FlagArray, Int32Array
-from engine.jit import inline, merged
+from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, pass_point, pass_vertex
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
 from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Contacts, Events

@@ -26,7 +26,7 @@ from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of
 from engine.arrays import FlagArray, Int32Array, IntArray
-from engine.jit import called, merged
+from engine.compiling.jit import called, merged
 from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
 from engine.polygon_overlay.compiled.boundary.chains import Chains, is_live
 from engine.polygon_overlay.compiled.edge_tree import POLL

@@ -12,7 +12,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.convex.body import ASIDE, CENTER, ConvexArrays, convex_body_of, pooled
 from engine.collision.convex.pair import APART, MEETING, inner_point, meet_or_apart, placed_body
 from engine.collision.meshes.placement import PoseArrays
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.predicates.vectors import minus
 from tests.unit.collision.convex.test_pair import poses
 

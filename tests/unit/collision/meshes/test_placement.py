@@ -13,7 +13,7 @@ from engine.collision.exact_images import image_point
 from engine.collision.meshes.dual_traversal import new_descent, place_bodies
 from engine.collision.meshes.mesh_arrays import NO_AREA, lattice_shift, mesh_body_of
 from engine.collision.meshes.placement import NEVER_APART, place_pair, placed
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 from engine.predicates.rational import dot
 from engine.predicates.vectors import as_point3
 from tests.unit.collision.meshes.bodies import TURN, brick, mesh

@@ -12,7 +12,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.exact_body import classify_exact, kind_of_contact
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING, Facet, classify, with_pose
 from engine.collision.triangles import relate_triangles_3d
-from engine.jit import allocating_kernel, kernel
+from engine.compiling.jit import allocating_kernel, kernel
 from engine.predicates.posed import orient3d_rounded
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED

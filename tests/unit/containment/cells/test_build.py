@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
+from engine.compiling.jit import kernel
 from engine.containment import policy
 from engine.containment.cells.build import Sides, build_cells, build_sides, label_empty
 from engine.containment.cells.lattice import can_have_cells
 from engine.containment.cells.locate import side_in_cell
-from engine.jit import kernel
 from engine.lanes.addresses import array_at, plain_array_at
 from engine.running.budget import Budget
 from engine.types import UNDECIDED

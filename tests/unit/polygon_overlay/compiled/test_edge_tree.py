@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.jit import allocating_kernel
+from engine.compiling.jit import allocating_kernel
 from engine.polygon_overlay.compiled import edge_tree
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.compiled.test_kernel import agree

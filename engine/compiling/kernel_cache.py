@@ -46,8 +46,8 @@ log = logging.getLogger(__name__)
 COMPLETE = "complete"
 """How the name of the empty file begins that says that nothing is left to compile for a CPU (cold_start.py)."""
 
-_ROOT = Path(__file__).resolve().parent
-_PREFIX = __name__.removesuffix("engine.kernel_cache")
+_ROOT = Path(__file__).resolve().parents[1]
+_PREFIX = __name__.removesuffix("engine.compiling.kernel_cache")
 """What stands before the names of our modules: nothing, or ``exact_geometry.`` where `engine` is another's."""
 _MADE_BY = "MADE_BY"
 """The file of a seed that says what `tools` made it."""
@@ -71,7 +71,7 @@ def _stamp(path: str) -> tuple[int, ...]:
 def _stamps() -> dict[str, tuple[int, ...]]:
     """Return what tells of each file of the engine whether it changes from now on."""
     archive = getattr(__spec__.loader, "archive", None)  # a zip file
-    folders = os.walk(os.path.dirname(__file__))
+    folders = os.walk(os.path.dirname(os.path.dirname(__file__)))
     paths = (os.path.join(folder, name) for folder, _, names in folders for name in names if name.endswith(".py"))
     return {path: _stamp(path) for path in ([archive] if archive else paths)}
 
@@ -158,7 +158,7 @@ def _reached(module: str) -> dict[str, bytes] | None:
     """Return the hash of each module that the kernels of one are made of; None where one cannot be read, or changed
     since the engine was imported."""
     reached: dict[str, bytes] = {}
-    waiting = {module, "engine.jit"}  # the compiler too
+    waiting = {module, "engine.compiling.jit"}  # the compiler too
     while waiting:
         name = waiting.pop()
         spec, source = _spec(name), read_source(name)
@@ -169,7 +169,7 @@ def _reached(module: str) -> dict[str, bytes] | None:
             _uncached("a source has changed since it was imported", name)
             return None
         reached[name] = source[0]
-        waiting |= source[1] - reached.keys() - {"engine.kernel_cache"}  # how code is stored changes no code
+        waiting |= source[1] - reached.keys() - {"engine.compiling.kernel_cache"}  # how code is stored changes no code
     return reached
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from numba import config as numba_config
 
-from engine import kernel_cache
+from engine.compiling import kernel_cache
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
 WORK = """
@@ -24,7 +24,7 @@ def say(step):
 
 STEPS = [lambda: say(0), lambda: say(1), lambda: {third}]
 """
-FILL = "from engine.cold_start import fill_cache; fill_cache('engine.work', (1, 1, 1), 2)"
+FILL = "from engine.compiling.cold_start import fill_cache; fill_cache('engine.work', (1, 1, 1), 2)"
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def place(tmp_path: Path) -> Path:
     package.mkdir()
     (package / "compiling").mkdir()
     compiling = [f"compiling/{path.name}" for path in (ROOT / "engine" / "compiling").glob("*.py")]
-    for name in ("__init__.py", "jit.py", *compiling, "kernel_cache.py", "cold_start.py"):
+    for name in ("__init__.py", *compiling):
         text = "" if name == "__init__.py" else (ROOT / "engine" / name).read_text("utf-8")
         (package / name).write_text(text)
     (tmp_path / "done").mkdir()

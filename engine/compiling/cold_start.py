@@ -13,8 +13,8 @@ from pathlib import Path
 
 from numba import config as numba_config
 
-from engine.jit import complete_signs
-from engine.kernel_cache import cache_folder, is_of_its_source, seed, source_digest
+from engine.compiling.jit import complete_signs
+from engine.compiling.kernel_cache import cache_folder, is_of_its_source, seed, source_digest
 
 try:
     import fcntl

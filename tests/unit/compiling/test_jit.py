@@ -19,18 +19,14 @@ import pytest
 from numba import config as numba_config
 
 import engine
-from engine import jit, kernel_cache
+from engine.compiling import jit, kernel_cache
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
-COMPILER = (
-    "jit.py",
-    "kernel_cache.py",
-    *(f"compiling/{path.name}" for path in (ROOT / "engine" / "compiling").glob("*.py")),
-)
+COMPILER = [f"compiling/{path.name}" for path in (ROOT / "engine" / "compiling").glob("*.py")]
 HELPER = """
-from engine.jit import inline
+from engine.compiling.jit import inline
 
 @inline
 def step(x):
@@ -38,7 +34,7 @@ def step(x):
 """
 KERNEL = """
 from engine.deep.{middle} import step
-from engine.jit import kernel
+from engine.compiling.jit import kernel
 
 @kernel
 def run(x):
@@ -260,12 +256,17 @@ def test_a_kernel_elsewhere_is_kept_under_its_own_source_and_what_that_imports()
     """Or a test would be answered by what was compiled before the engine changed."""
     digest, named = kernel_cache.read_source(__name__)
     assert digest == hashlib.sha256(Path(__file__).read_bytes()).digest()
-    assert "engine.kernel_cache" in named
+    assert "engine.compiling.kernel_cache" in named
 
 
 def test_every_import_form_is_read() -> None:
     found = kernel_cache.read_source("engine.predicates.orientation")[1]
-    assert {"engine.jit", "engine.types", "engine.predicates.expansion", "engine.predicates.error_free"} <= found
+    assert {
+        "engine.compiling.jit",
+        "engine.types",
+        "engine.predicates.expansion",
+        "engine.predicates.error_free",
+    } <= found
     assert "engine" not in found
 
 
@@ -285,7 +286,8 @@ def test_without_any_writable_place_it_runs_uncached(project: Path) -> None:
     blocked.write_text("")
     code = (
         f"import tempfile; tempfile.tempdir = {str(blocked)!r}\n"
-        "from engine.work import run; from engine.kernel_cache import cache_folder; print(run(1.0), cache_folder())"
+        "from engine.work import run; from engine.compiling.kernel_cache import cache_folder\n"
+        "print(run(1.0), cache_folder())"
     )
     assert run(project, code, HOME=str(blocked), ENGINE_CACHE_DIR=str(blocked)) == ["2.0", "None"]
 
@@ -437,7 +439,9 @@ def test_a_damaged_file_is_compiled_anew(project: Path) -> None:
 def test_a_kernel_is_compiled_anew_where_the_class_of_an_argument_has_moved(project: Path) -> None:
     """The source of the kernel does not name the module of that class, and so its key is the same."""
     cache, package = {"ENGINE_CACHE_DIR": str(project / "cache")}, project / "engine"
-    (package / "work.py").write_text("from engine.jit import kernel\n\n@kernel\ndef run(p):\n    return p.x + p.y\n")
+    (package / "work.py").write_text(
+        "from engine.compiling.jit import kernel\n\n@kernel\ndef run(p):\n    return p.x + p.y\n"
+    )
     use = "from engine.{} import Place; " + USE.replace("run(1.0)", "run(Place(1.0, 2.0))")
     for module, hits in (("here", "0"), ("here", "1"), ("there", "0"), ("there", "1")):
         for path in (package / "here.py", package / "there.py"):
@@ -470,7 +474,7 @@ def test_no_compiled_function_calls_a_kernel() -> None:
 
 COUNTING = """
 import numpy as np
-from engine.jit import allocating, allocating_kernel, inline, kernel
+from engine.compiling.jit import allocating, allocating_kernel, inline, kernel
 
 @inline
 def kept(values):
@@ -528,7 +532,7 @@ def test_who_makes_arrays_counts_them_and_nobody_else(project: Path) -> None:
 BESIDE = """
 import numba
 import numpy as np
-from engine.jit import allocating_kernel, called
+from engine.compiling.jit import allocating_kernel, called
 
 @called
 def twice(x):
