@@ -2,9 +2,9 @@
 
 The segment's contacts with the boundary cut [0, 1] into open spans. A span along which the segment lies in an element
 is kept (the boundary counts as in). Any other meets no element, so one location holds for all of it, and for the line
-beside it, moved by infinitesimals (eps, eps^2): from span to span it turns over as often as that line crosses elements,
-which signs tell, through vertices and along edges too. The location of one span is that of an end that is not on the
-boundary, else it is asked for. Contacts are kept as points. Pieces are what hangs together.
+beside it, moved by (eps, eps^2) (predicates/ties.py): from span to span it turns over as often as that line crosses
+elements, which signs tell, through vertices and along edges too. The location of one span is that of an end that is not
+on the boundary, else it is asked for. Contacts are kept as points. Pieces are what hangs together.
 
 All coordinates of a segment and of the elements it meets are integers over one denominator, parameters are Fractions.
 Cost: n log n for n elements.
@@ -18,6 +18,7 @@ from itertools import groupby
 from typing import Final, NamedTuple
 
 from engine.predicates.rational import cross, dot, minus, nearest
+from engine.predicates.ties import tie_sign_exact
 
 Integers = Sequence[int]
 ZERO, ONE = Fraction(0), Fraction(1)
@@ -108,7 +109,7 @@ def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
     k = max(range(3), key=lambda axis: abs(u[axis]))
     i, j = (k + 1) % 3, (k + 2) % 3
     seen = [(w[i] * u[k] - w[k] * u[i], w[j] * u[k] - w[k] * u[j]) for w in (minus(corner, p) for corner in corners)]
-    sides = [a[0] * b[1] - a[1] * b[0] or a[1] - b[1] or b[0] - a[0] for a, b in zip(seen, [*seen[1:], seen[0]])]
+    sides = [a[0] * b[1] - a[1] * b[0] or tie_sign_exact(*a, *b) for a, b in zip(seen, [*seen[1:], seen[0]])]
     return min(sides) > 0 or max(sides) < 0
 
 

@@ -7,8 +7,8 @@ plane there, and each changes the status on the way through.
 
 Regions are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two
 traces cross, so one point between each two neighbours on the middle of every slab meets every region with an interior.
-The line is moved by (eps, eps^2) across itself, so that it meets no edge; a face that holds the point is known by its
-plane, whatever the move.
+The line is moved by (eps, eps^2) across itself (predicates/ties.py), so that it meets no edge; a face that holds the
+point is known by its plane, whatever the move.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from engine.collision.meshes.exact_body import (
     without_axis,
 )
 from engine.predicates.rational import cross, dot, minus, sign_of
+from engine.predicates.ties import tie_sign_exact
 from engine.running.budget import Budget
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
@@ -104,7 +105,7 @@ def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) 
         value = dx * (y - a[k] * w) - dy * (x - a[j] * w)
         turn = (value > 0) - (value < 0)
         if turn == 0:
-            turn = -sign_of(dy) or sign_of(dx)
+            turn = tie_sign_exact(a[j], a[k], b[j], b[k])
         if before * turn < 0:
             return False
         before = turn

@@ -31,6 +31,7 @@ from engine.lanes.boxes import inside_box
 from engine.lanes.lanes import lowest_bit
 from engine.predicates.orientation import orient3d
 from engine.predicates.posed import orient3d_rounded
+from engine.predicates.ties import tie_sign
 from engine.predicates.vectors import as_point3, largest_of, minus
 from engine.types import UNDECIDED, Point2, Point3
 
@@ -43,16 +44,9 @@ MISSED = 3
 @inline
 def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
     """Return the side of the line a b, seen along z, on which q moved by (eps, eps^2) lies; 0 if a and b coincide
-    there.
-
-    The derivatives of orient2d(a, b, q) are a.y - b.y along x and b.x - a.x along y.
-    """
+    there. See predicates/ties.py."""
     side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
-    if side != 0:
-        return side
-    if a.y != b.y:
-        return 1 if a.y > b.y else -1
-    return int(b.x > a.x) - int(b.x < a.x)
+    return side if side != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
 @inline

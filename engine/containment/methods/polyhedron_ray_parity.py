@@ -4,7 +4,7 @@ The ray goes straight up from q = (x, y, z), moved by the symbolic (eps, eps^2, 
 vertical triangle lies over it, and every other triangle is passed in its interior or not at all:
 
 - q' is in the triangle's projection if orient2d(a, b, q), (b, c, q), (c, a, q) have one sign, that of its area. A zero
-  is decided by the move: the derivative of orient2d(a, b, q) by q.x is a.y - b.y, by q.y it is b.x - a.x.
+  is decided by the move: see predicates/ties.py.
 - orient3d(a, b, c, q) tells whether the triangle passes above q or below. Where it is zero and q is in the closed
   projection, q is on the triangle: BOUNDARY, whatever the parity.
 - The three signs add up to the area: all are zero where the triangle is vertical (or less) and q on its line. It is
@@ -18,8 +18,7 @@ The triangles over q are found in a tree of boxes (bvh.py), whose float32 boxes 
 its own rounding. Eight at a time are counted or left out in single precision (`overhead`), the rest one by one. A q
 with a blur (posed/filters.py) is located where all rays of it agree, else left UNDECIDED.
 
-Source: the textbook's ray and parity test; symbolic perturbation after Edelsbrunner and Muecke 1990, "Simulation of
-simplicity".
+Source: the textbook's ray and parity test.
 """
 
 from __future__ import annotations
@@ -37,6 +36,7 @@ from engine.lanes.lanes import count_bits, lowest_bit
 from engine.lanes.triangles import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
 from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
 from engine.predicates.posed import orient3d_rounded
+from engine.predicates.ties import tie_sign
 from engine.predicates.vectors import as_point3, corners_of
 from engine.types import UNDECIDED, Point2, Point3
 
@@ -64,11 +64,7 @@ def decide2(a: Point2, b: Point2, c: Point2) -> Any:
 @inline
 def moved_sign(turn: int, a: Point2, b: Point2) -> int:
     """Return `turn` = orient2d(a, b, q), a zero decided as for q + (eps, eps^2)."""
-    if turn != 0:
-        return turn
-    if a.y != b.y:
-        return 1 if a.y > b.y else -1
-    return 1 if b.x > a.x else -1 if b.x < a.x else 0
+    return turn if turn != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
 @inline

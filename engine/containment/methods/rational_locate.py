@@ -32,6 +32,7 @@ from engine.predicates.rational import (
     side_rational,
     sign_of,
 )
+from engine.predicates.ties import tie_sign_exact
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convex import Convex, rows_of
@@ -99,7 +100,7 @@ def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
         if side == 0:
             return ON_FACE
         for turn, (p, r) in zip(turns, ((a, b), (b, c), (c, a))):
-            if turn == 0 and (sign_of(p[1] - r[1]) or sign_of(r[0] - p[0])) != area:
+            if turn == 0 and tie_sign_exact(*p[:2], *r[:2]) != area:
                 return MISSED
         return CROSSED if side < 0 else MISSED
     return ON_FACE if _is_on_closed_triangle(a, b, c, q) else MISSED

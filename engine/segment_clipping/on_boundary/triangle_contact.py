@@ -72,7 +72,7 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 @called
 def _beside(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
     """Return on which side of a side a b, which the line p q meets, that lies when it is moved: by eps along one axis,
-    by eps^2 along the next. UNDECIDED where they are parallel."""
+    by eps^2 along the next (predicates/ties.py). UNDECIDED where they are parallel."""
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
     if side == 0:
         side = -_slope(a, b, p, q, AXES_BEFORE[k], k)
