@@ -15,7 +15,7 @@ from engine.compiling.direct import entry_of
 from engine.containment.locators import Locator, locator_of, polygon_by, polyhedron_by, rational_half, settle
 from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.rational_locate import is_located
-from engine.containment.policy import CELLS, LISTS, PASS, choose_for_mesh, choose_for_rings
+from engine.containment.policy import Choice, choose_for_mesh, choose_for_rings
 from engine.running.budget import UNLIMITED
 from engine.solids.base import Solid
 from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
@@ -29,7 +29,7 @@ MOST: Final = 1024
 _SMALL: Final = 32
 """Edges of a polygon that is passed over whatever the number of points."""
 _NO_FLAG: Final = np.zeros(1, np.uint8)
-_KEYS: Final = {PASS: "pass_plan", LISTS: "list_plan", CELLS: "plan"}
+_KEYS: Final = {Choice.PASS: "pass_plan", Choice.LISTS: "list_plan", Choice.CELLS: "plan"}
 
 Plan: TypeAlias = tuple[Any, tuple[Any, ...], str]
 """Compiled code, what stands between points and locations among its arguments, and the method's name."""
@@ -84,13 +84,13 @@ def _settled(array: FloatArray, solid: Solid, locations: Int8Array, n_beyond: in
 def _plan_of(solid: Solid, n_points: int) -> Plan | None:
     """Return a plan, kept where one is made; None where cells are chosen, or no kernel is compiled yet."""
     if isinstance(solid, Polygon) and len(solid.vertices) <= _SMALL:
-        return _kept(solid, "plan", polygon_by(solid, PASS, UNLIMITED))
+        return _kept(solid, "plan", polygon_by(solid, Choice.PASS, UNLIMITED))
     if isinstance(solid, Polygon):
         choice = choose_for_rings(solid, n_points)
         return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polygon_by(solid, choice, UNLIMITED))
     if isinstance(solid, Polyhedron):
         choice = choose_for_mesh(solid, n_points)
-        if choice == CELLS:
+        if choice == Choice.CELLS:
             return None
         return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polyhedron_by(solid, choice, UNLIMITED))
     return _kept(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))

@@ -21,7 +21,7 @@ from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.rational_locate import combine, is_located, over_tree, rational_location, unsupported
-from engine.containment.policy import CELLS, LONG_PASS, PASS, choose_for_mesh, choose_for_rings
+from engine.containment.policy import LONG_PASS, Choice, choose_for_mesh, choose_for_rings
 from engine.containment.prepared.rings import edges_of, ring_cells_of, rings_of
 from engine.containment.prepared.triangle_tree import EXACT, prism_rows, tree_of
 from engine.errors import InvalidArrayError, NotFiniteError
@@ -178,9 +178,9 @@ def polygon_locator(solid: Polygon) -> Locator:
 
 def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
     """Return the locator by what policy.py chose; it builds that."""
-    if choice == CELLS:
+    if choice == Choice.CELLS:
         return by_kernel("ring_cells", locate_in_rings, solid, EXACT, ring_cells_of(solid, budget.flag, budget.check))
-    rings = edges_of(solid) if choice == PASS else rings_of(solid, budget.check)
+    rings = edges_of(solid) if choice == Choice.PASS else rings_of(solid, budget.check)
     return by_kernel("ring_crossing", locate_in_rings, solid, EXACT, rings)
 
 
@@ -193,11 +193,11 @@ def polyhedron_locator(solid: Polyhedron) -> Locator:
 
 def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
     """Return the locator by what policy.py chose; it builds that."""
-    if choice == PASS:
+    if choice == Choice.PASS:
         by_pass = by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
         return by_pass._replace(is_long=len(solid.triangles) > LONG_PASS)
     by_rays = by_kernel("ray_parity", locate_by_tree, solid, EXACT, tree_of(solid, budget.check))
-    if choice != CELLS:
+    if choice != Choice.CELLS:
         return by_rays
     return Locator("segment_parity", _filled_by(locate_by_cells, cells_of(solid, budget), rest=by_rays.fill))
 

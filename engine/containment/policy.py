@@ -7,6 +7,7 @@ thread, measured on meshes of 10^3 to 10^6 faces and rings of 10 to 2 10^5 edges
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Final
 
 import numpy as np
@@ -17,8 +18,16 @@ from engine.containment.prepared.triangle_tree import IN_TREE, IN_TREE_A_FACE_OV
 from engine.solids.polygon import Polygon
 from engine.solids.polyhedron import Polyhedron
 
-PASS, LISTS, CELLS = 0, 1, 2
-"""One pass over all faces or edges; a tree or slabs; cells."""
+
+class Choice(IntEnum):
+    """How the points of a batch are located."""
+
+    PASS = 0
+    """One pass over all faces or edges."""
+    LISTS = 1
+    """A tree, or slabs."""
+    CELLS = 2
+
 
 _FEW: Final = 192
 """Points for which the tree, entered directly, is as fast as cells."""
@@ -40,17 +49,17 @@ _RING_CELLS, _RING_CELLS_AN_EDGE = 100_000.0, 80.0
 _IN_SLABS: Final = 50.0
 
 
-def choose_for_mesh(solid: Polyhedron, n_points: int) -> int:
+def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
     """Return PASS, LISTS (the tree) or CELLS."""
     seen, n_faces = _points_seen(solid, n_points), len(solid.triangles)
     if n_points * n_faces <= _FEW_RAYS:
-        return PASS
+        return Choice.PASS
     if n_points > _FEW and (solid.kept("cells") is not None or _pay_cells(solid, seen)):
-        return CELLS
+        return Choice.CELLS
     if solid.kept("tree") is not None:
-        return LISTS
+        return Choice.LISTS
     if n_points > _POINTS_A_PASS and n_faces > LONG_PASS:
-        return LISTS
+        return Choice.LISTS
     calls = solid.prepared("passes", lambda: [0.0])
     earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
     calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
@@ -58,7 +67,7 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> int:
         more = _PASS_A_FACE * faces_over(solid) - cost_in_tree(solid)  # that a point costs in a pass
         earlier += (seen - n_points) * more
         tree -= n_points * more
-    return PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else LISTS
+    return Choice.PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else Choice.LISTS
 
 
 def _pay_cells(solid: Polyhedron, seen: int) -> bool:
@@ -70,17 +79,17 @@ def _pay_cells(solid: Polyhedron, seen: int) -> bool:
     return solid.prepared("can_have_cells", lambda: can_have_cells(solid))
 
 
-def choose_for_rings(solid: Polygon, n_points: int) -> int:
+def choose_for_rings(solid: Polygon, n_points: int) -> Choice:
     """Return PASS, LISTS (slabs) or CELLS."""
     seen, n_edges = _points_seen(solid, n_points), len(solid.vertices)
     if solid.kept("ring_cells") is not None:
-        return CELLS
+        return Choice.CELLS
     by_pass, by_slabs = _IN_RINGS + _PASS_AN_EDGE * n_edges, np.inf
     if solid.kept("slabs") is not None or seen * by_pass > _SLABS + _SLABS_AN_EDGE * n_edges:
         by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * edges_met(solid)[1])
     if seen * min(by_pass, by_slabs) > _RING_CELLS + _RING_CELLS_AN_EDGE * n_edges:
-        return CELLS
-    return LISTS if by_slabs < by_pass else PASS
+        return Choice.CELLS
+    return Choice.LISTS if by_slabs < by_pass else Choice.PASS
 
 
 def _points_seen(solid: Polygon | Polyhedron, n_points: int) -> int:

@@ -14,7 +14,7 @@ from engine.containment.prepared.triangle_tree import tree_line, tree_of
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.rational import nearest_pair
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
-from engine.scenes.through import BALL, MESH, OTHER, ROWS, UNREADY
+from engine.scenes.through import BodyKind
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -55,43 +55,43 @@ class Table:
             words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
             words[TREE + 1 : TREE + 5] = addresses[1:]
             words[TREE] = addresses[0]  # order: last, kernels of other threads look at it
-        elif self.rows[body, 0] == UNREADY:
+        elif self.rows[body, 0] == BodyKind.UNREADY:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 
     def _fill(self, row: IntArray, solid: Solid, pose: Pose | None) -> int:
         """Fill the row of a body, but for its kind; return that, OTHER where no kernel takes its type, or numbers."""
         if isinstance(solid, Sphere):
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
-                return OTHER
+                return BodyKind.OTHER
             center = solid.center.tolist() if pose is None else to_world_frame(solid.center.tolist(), pose)
             doubles = [nearest_pair(*Fraction(x).as_integer_ratio()) for x in center]
             ball = np.zeros(7)
             ball[: 2 * len(center)], ball[6] = np.ravel(doubles), solid.radius
             self._own.append(ball)
             row[2] = ball.ctypes.data
-            return BALL if _are_safe([head for head, _ in doubles]) else OTHER
+            return BodyKind.BALL if _are_safe([head for head, _ in doubles]) else BodyKind.OTHER
         if pose is not None and not pose.is_identity:
             frame = _frame_of(pose)
             if frame is None:
-                return OTHER
+                return BodyKind.OTHER
             self._own.append(frame)
             row[3] = frame.ctypes.data
         if isinstance(solid, (HalfSpace, Aabb, Convex)):
             planes = self._kept.setdefault(id(solid), rows_in_space(rows_of(solid)))
             row[1], row[2] = len(planes), planes.ctypes.data
-            return ROWS if _are_safe(planes.ravel().tolist()) else OTHER
+            return BodyKind.ROWS if _are_safe(planes.ravel().tolist()) else BodyKind.OTHER
         if isinstance(solid, (Polyhedron, Surface)):
             words = self._kept.get(id(solid))
             words = self._kept.setdefault(id(solid), _words_of(solid)) if words is None else words
             row[1], row[2] = isinstance(solid, Polyhedron), words.ctypes.data
-            return MESH
-        return OTHER
+            return BodyKind.MESH
+        return BodyKind.OTHER
 
 
 def unready(n: int) -> IntArray:
     """Return what says of n bodies that none is prepared."""
     rows = np.zeros((n, 4), np.int64)
-    rows[:, 0] = UNREADY
+    rows[:, 0] = BodyKind.UNREADY
     return rows
 
 

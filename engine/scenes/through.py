@@ -9,6 +9,7 @@ segment whose first piece would be found by two that round alike, or on a body t
 from __future__ import annotations
 
 from collections import namedtuple
+from enum import IntEnum
 from typing import Any, Final
 
 import numpy as np
@@ -40,12 +41,19 @@ from engine.segment_clipping.on_boundary.touching_cut import Crossings
 from engine.segment_clipping.pieces import Pieces, put_piece
 from engine.types import OPEN
 
-UNREADY: Final = -1
-OTHER: Final = 0
-BALL: Final = 1
-ROWS: Final = 2
-MESH: Final = 3
-"""Kinds of bodies, UNREADY until one is prepared; OTHER ones are cut in exact arithmetic."""
+
+class BodyKind(IntEnum):
+    """What cuts segments on a body."""
+
+    UNREADY = -1
+    """Not prepared yet."""
+    OTHER = 0
+    """Exact arithmetic."""
+    BALL = 1
+    ROWS = 2
+    MESH = 3
+
+
 MET: Final = 1
 """State of a segment, beside SETTLED, which meets nothing, and OPEN."""
 AHEAD: Final = 8
@@ -66,9 +74,9 @@ def _cut_on(
     address = words[0, PLACED] + 32 * name if name < n else words[1, PLACED] + 32 * (name - n)
     body = array_at(address, (4,), np.int64)
     kind = body[0]
-    if kind <= OTHER:
-        return UNSURE if kind == OTHER else WANTS_BODY
-    if kind == MESH:
+    if kind <= BodyKind.OTHER:
+        return UNSURE if kind == BodyKind.OTHER else WANTS_BODY
+    if kind == BodyKind.MESH:
         n_met, is_in = crossings_in(body, segments, item, is_any, scratch, stop)
         if n_met < 0 or is_any:
             return n_met if n_met != 0 else int(is_in)
@@ -76,7 +84,7 @@ def _cut_on(
         if body[1] == 0:
             return _emit_points(cuts, n_met, item, out, row)
         return emit(segments, item, item, is_in, cuts, n_met, out, row) - row
-    if kind == BALL:
+    if kind == BodyKind.BALL:
         meets, first, last = in_ball(body, segments, item, is_any)
     else:
         meets, first, last = between_planes(body, segments, item, is_any)

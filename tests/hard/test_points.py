@@ -11,11 +11,11 @@ import pytest
 from engine import Polyhedron, locate
 from engine.containment import locators
 from engine.containment.cells.lattice import can_have_cells
-from engine.containment.policy import CELLS, LISTS, PASS
+from engine.containment.policy import Choice
 from tests.hard.points import STORED, generated_solids, hard_points
 from tests.reference.many_points import locate_points
 
-METHODS = {"pass": PASS, "tree": LISTS, "cells": CELLS}
+METHODS = {"pass": Choice.PASS, "tree": Choice.LISTS, "cells": Choice.CELLS}
 MESHES = {
     "c3d_spot": (0.0, 1e6),
     "syn_sliver_uv": (0.0, 1e9),
@@ -38,7 +38,7 @@ PLACES = [(name, offset) for name, offsets in MESHES.items() for offset in offse
 def assert_exact(points: Any, vertices: Any, faces: Any, exact: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     solid = Polyhedron(vertices, faces)
     for name, method in METHODS.items():
-        if method == CELLS and not can_have_cells(solid):
+        if method == Choice.CELLS and not can_have_cells(solid):
             continue
         monkeypatch.setattr(locators, "choose_for_mesh", lambda *_, method=method: method)
         found = locate(points, solid)

@@ -18,6 +18,7 @@ all, so a vertex where there is one), crossings through one point later, when th
 from __future__ import annotations
 
 from collections import namedtuple
+from enum import IntEnum
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -81,17 +82,22 @@ def segments_are_far(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: in
 
 _ANY_SLACK: Final = 4.0
 """Slack of a parameter known by its sign only: any comparison with it is made exactly."""
-NOT_SIMPLE: Final = 0
-LEFT: Final = 1
-RIGHT: Final = 2
-"""How the second edge of a crossing leaves, seen along the first; NOT_SIMPLE where floating point is not sure of that,
-or the crossing is not alone."""
+
+
+class Turn(IntEnum):
+    """How the second edge of a crossing leaves, seen along the first."""
+
+    NOT_SIMPLE = 0
+    """Floating point is not sure of that, or the crossing is not alone."""
+    LEFT = 1
+    RIGHT = 2
+
 
 Events = namedtuple("Events", "edge point other t slack reach first second turn")
 """Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex; t,
 slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer than the
 margin of clearance.py, where that is sure, and the slack. By crossing: first and second, its edges;
-turn: LEFT or RIGHT as the second leaves to that side of the first, or NOT_SIMPLE."""
+turn: see `Turn`."""
 
 Unions = namedtuple("Unions", "points is_node rings")
 """points: forest of points that are one; is_node: by vertex, uint8, whether something meets it or a ring begins there;
@@ -176,7 +182,7 @@ def _enter_contact(
     if side_a != 0 and side_b != 0 and side_c != 0 and side_d != 0:
         crossing = n + n_crossings
         parent[crossing] = crossing
-        events.first[n_crossings], events.second[n_crossings], events.turn[n_crossings] = e, f, NOT_SIMPLE
+        events.first[n_crossings], events.second[n_crossings], events.turn[n_crossings] = e, f, Turn.NOT_SIMPLE
         _add_event(events, n_events, e, crossing, f, 0.5, _ANY_SLACK)
         _add_event(events, n_events + 1, f, crossing, e, 0.5, _ANY_SLACK)
         return n_events + 2, n_crossings + 1
@@ -270,7 +276,9 @@ def find_contacts(
                 if nearest > to_j.bound and nearest_i > to_i.bound:
                     unite(unions.rings, edges.ring[i], edges.ring[j])
                     unions.points[n + n_crossings] = n + n_crossings
-                    events.turn[n_crossings] = LEFT if to_i.first > 0.0 else RIGHT  # edge i comes from j's left
+                    events.turn[n_crossings] = (
+                        Turn.LEFT if to_i.first > 0.0 else Turn.RIGHT
+                    )  # edge i comes from j's left
                     events.first[n_crossings], events.second[n_crossings] = i, j
                     _add_crossing(events, n_events, n + n_crossings, i, j, to_i, margin)
                     _add_crossing(events, n_events + 1, n + n_crossings, j, i, to_j, margin)

@@ -12,7 +12,7 @@ from engine.arrangement.union_find import unite
 from engine.arrays import FlagArray
 from engine.compiling.jit import called, inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
-from engine.polygon_overlay.compiled.edge_contacts import NOT_SIMPLE, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import Events, Turn, Unions
 from engine.polygon_overlay.compiled.edge_tree import POLL
 
 _RUN: Final = 16
@@ -132,7 +132,7 @@ def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n:
             before = order[low - 1]
             for point in (points[before], points[moving]):
                 if point >= n:
-                    events.turn[point - n] = NOT_SIMPLE
+                    events.turn[point - n] = Turn.NOT_SIMPLE
             unite(unions.points, points[before], points[moving])
         for at in range(k, low, -1):
             order[at], keys[at] = order[at - 1], keys[at - 1]

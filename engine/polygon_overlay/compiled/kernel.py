@@ -240,16 +240,30 @@ def overlay_pairs(
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and the output of words from its beginning.
 
-    subject_items, clip_items: the first ring of each polygon, and the end of the last one's. kept: (4,) uint8 by label,
-    of more than one part where some are above 1: then evidence is of each ring its number and its part. nesting: of the
-    rule PAIR; or, without clips, and kept all but the first, that of the rings of subjects (ring_nesting.py), numbers
-    counted from the pair's first ring; by the rule AGAIN evidence is filled too, with numbers of rings. A source is an
-    input vertex and -1, where the ring goes on along an edge of that vertex, or -3 - e, along edge e; or two edges that
-    cross, the one that it goes on along first. Edges by their first vertices; vertices are counted from the pair's
-    first, those of its clip after those of its subject. The input vertex and LEFT_OUT where the vertices up to the next
-    source are left out. reduced: what reduce_pair returned for the only pair; no vertices, no such pair. Returns the
-    pair reached, FINISHED or what is needed to go on with it, numbers of vertices, rings, pieces, rows of evidence, and
-    how many vertices are left out.
+    subject_items, clip_items: the first ring of each polygon, and the end of the last one's.
+    kept: (4,) uint8 by label (bit 0: in the subject, bit 1: in the clip), of more than one part where some are above 1.
+    nesting: of the rule PAIR; without clips, and kept all but the first, of the rings of subjects (ring_nesting.py).
+    reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
+    words: of a `Scratch`. stop: one uint8, polled.
+
+    Returns the pair reached, FINISHED or what is needed to go on with it, the numbers of vertices, rings, pieces and
+    rows of evidence written, and how many vertices are left out.
+
+    Output (`Output`), row by row:
+
+        vertices   (n, 2) float64   vertices of boundary rings
+        sources    (n, 2) int32     where each comes from, see below
+        rings      (r,) int64       offsets of rings into vertices
+        pieces     (p,) int64       offsets of pieces into rings
+        evidence   (e, 2) int64     by the rule AGAIN, of each ring the rings it comes from, counted from the pair's
+                                    first; where kept is above 1, of each ring its number and its part
+
+    A row of sources, edges named by their first vertices, vertices counted from the pair's first, clips after subjects:
+
+        v, -1        input vertex v; the ring goes on along an edge of v
+        v, -3 - e    input vertex v; the ring goes on along edge e
+        v, LEFT_OUT  input vertex v; the vertices up to the next source are left out
+        e, f         where edges e and f cross; the ring goes on along e
     """
     w, output = rows_of(words), output_at(words)
     is_intersection = not (kept[0] or kept[1] or kept[2])

@@ -13,7 +13,7 @@ from engine.scenes.bodies import Bodies
 from engine.scenes.posed_mesh import WANTS_BODY
 from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
-from engine.scenes.through import OTHER, cut_near
+from engine.scenes.through import BodyKind, cut_near
 from engine.segment_clipping.parameters import compare
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
 from engine.segment_clipping.profiles import exact_pieces
@@ -82,7 +82,7 @@ def test_what_has_no_range_is_left() -> None:
     with Budget() as budget:
         for body in range(3):
             bodies.prepare(body, WANTS_BODY, budget)
-        assert bodies.table(budget).rows[:, 0].tolist() == [OTHER] * 3
+        assert bodies.table(budget).rows[:, 0].tolist() == [BodyKind.OTHER] * 3
 
 
 def test_touched_corners_and_sides_are_settled() -> None:

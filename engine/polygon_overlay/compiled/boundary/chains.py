@@ -24,7 +24,7 @@ from engine.arrangement.union_find import root_of
 from engine.arrays import FlagArray, Int32Array, IntArray
 from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
-from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Events, Unions
+from engine.polygon_overlay.compiled.edge_contacts import Events, Turn, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
@@ -109,7 +109,7 @@ def _pass_crossing(events: Events, chains: Chains, stars: Stars, point: int, cro
     if other < 0:  # here for the first time
         stars.node_of[point] = chain
         return
-    goes_left = (events.turn[crossing] == LEFT) == (events.first[crossing] == e)
+    goes_left = (events.turn[crossing] == Turn.LEFT) == (events.first[crossing] == e)
     chains.across[chain], chains.across[other] = 2 * other + goes_left, 2 * chain + 1 - goes_left
 
 
@@ -145,7 +145,7 @@ def build_chains(
             before = -1
             for k in range(along.starts[e], along.starts[e + 1]):
                 point = events.point[along.order[k]]
-                is_simple = point >= n and events.turn[point - n] != NOT_SIMPLE
+                is_simple = point >= n and events.turn[point - n] != Turn.NOT_SIMPLE
                 if is_simple:
                     node = point - n
                 else:

@@ -14,7 +14,7 @@ from engine.arrays import FlagArray, Int32Array
 from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, pass_point, pass_vertex
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
-from engine.polygon_overlay.compiled.edge_contacts import LEFT, NOT_SIMPLE, Contacts, Events
+from engine.polygon_overlay.compiled.edge_contacts import Contacts, Events, Turn
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
@@ -27,7 +27,7 @@ def do_nothing_but_cross(given: Given, events: Events, contacts: Contacts, n_rin
         return False
     ring, is_simple = given.edges.ring, given.masks[0] != given.masks[1]
     for c in range(contacts.n_crossings):
-        is_simple &= (ring[events.first[c]] != ring[events.second[c]]) & (events.turn[c] != NOT_SIMPLE)
+        is_simple &= (ring[events.first[c]] != ring[events.second[c]]) & (events.turn[c] != Turn.NOT_SIMPLE)
     return is_simple
 
 
@@ -78,15 +78,15 @@ def walk_crossings(
     rings.offset[0] = 0
     for c in range(n_crossings):
         is_second = ring[events.first[c]] != 0
-        goes_right = (events.turn[c] == LEFT) != is_second  # the first ring, as it was given, to the other's right
+        goes_right = (events.turn[c] == Turn.LEFT) != is_second  # the first ring, as it was given, to the other's right
         enters = (goes_right != is_other_left) == is_forward
-        if events.turn[c] == NOT_SIMPLE or enters != is_within:
+        if events.turn[c] == Turn.NOT_SIMPLE or enters != is_within:
             continue
         event = 2 * c + is_second
-        while events.turn[event >> 1] != NOT_SIMPLE:  # bound: each turn passes one crossing
+        while events.turn[event >> 1] != Turn.NOT_SIMPLE:  # bound: each turn passes one crossing
             if stop[0]:
                 return n_rings, n_points
-            events.turn[event >> 1] = NOT_SIMPLE
+            events.turn[event >> 1] = Turn.NOT_SIMPLE
             event, n_points = _follow(edges, events, along, place, marks, event, is_forward, rings, n_points, stop)
             event, n_points = _follow(
                 edges, events, along, place, marks, event ^ 1, is_other_forward, rings, n_points, stop
