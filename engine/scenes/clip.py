@@ -240,7 +240,7 @@ def _cut(
         for group in range(first, last):
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
-            pieces, rational, is_told = _on_body(segments[items], *standing.placed(body), budget)
+            pieces, rational, is_told = _on_body(read_only(segments[items]), *standing.placed(body), budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:

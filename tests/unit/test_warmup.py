@@ -70,13 +70,18 @@ assert len(done) == before
 FIRST_CALLS = """
 import sys
 import numpy as np
-from engine import Aabb, Pose, Scene, Sphere
+from engine import Aabb, HalfSpace, Polyhedron, Pose, Scene, Sphere
 from engine.compiling.caches import KernelCache
 
 compiled = []
 KernelCache.save_overload = lambda self, types, result: compiled.append(self._function.__name__)
-scene = Scene([Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0], 1)], [None, Pose(np.eye(3), [0.5, 0, 0])])
-segments = np.array([[[-1.0, 0.2, 0.3], [3, 0.4, 0.2]], [[0, 0, -2.0], [0.3, 0.3, 3]]])
+cube = Polyhedron(
+    [[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)],
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]],
+)
+bodies = [Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0], 1), cube, HalfSpace([1, 0, 0], 0), cube]
+scene = Scene(bodies, [None, Pose(np.eye(3), [0.5, 0, 0]), None, None, Pose(np.eye(3), [0.5, 0, 0])])
+segments = np.array([[[-1.0, 0.2, 0.3], [3, 0.4, 0.2]], [[0, 0, -2.0], [0.3, 0.3, 3]], [[-1, 0, 0], [3, 0, 0.0]]])
 for keep in sys.argv[2:]:
     scene.clip_segments(np.tile(segments, (int(sys.argv[1]), 1, 1)), keep=keep)
 assert not compiled, compiled
