@@ -184,7 +184,7 @@ def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -
         if not len(rows):
             return
         entry_of(relate_poses)(
-            a.arrays, b.arrays, STILL, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.found, rows,
+            a.arrays, b.arrays, STILL, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.found, 0, rows,
             budget.flag,
         )  # fmt: skip
         budget.check()

@@ -36,6 +36,8 @@ Rational2 = tuple[Rational, Rational]
 Homogeneous = tuple[int, ...]
 """x, y, z, w: the point (x / w, y / w, z / w), w > 0."""
 
+Only = tuple[int, list[int]]
+
 WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
 """Weights of the corners for points within a face."""
 
@@ -83,6 +85,20 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
     return Sides(above, above != changes, above and not is_on_face)
 
 
+def side_of_clean(body: ExactBody, face: int) -> int:
+    """Return the side of a clean face, 1 that of its normal or -1, on which its body lies, 0 where no point tells it;
+    kept with the mesh, as by `face_state.py`."""
+    kept, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
+    if kept[face] not in (1, -1):
+        for q in points_within(body.corners(face)):
+            sides = sides_over(body, q, axis, plane)
+            if sides is not None:
+                kept[face] = 1 if sides.above == (plane[axis] > 0) else -1
+                return int(kept[face])
+        return 0
+    return int(kept[face])
+
+
 def points_within(corners: Corners) -> Iterator[Homogeneous]:
     """Yield a few points within a face."""
     for weights in WITHIN:
@@ -112,9 +128,14 @@ def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) 
     return True
 
 
-def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> Iterator[Homogeneous]:
-    """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace."""
-    traces = _traces(body, face, cutters, budget)
+def regions_of(
+    body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None = None
+) -> Iterator[Homogeneous]:
+    """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace.
+
+    only: a side of the face's plane and the faces that meet the face, where what lies on that side is all that counts.
+    """
+    traces = _traces(body, face, cutters, budget, only)
     if not traces:
         yield next(points_within(body.corners(face)))
     for (x, y), _ in _samples(body, face, traces, budget) if traces else ():
@@ -124,7 +145,7 @@ def regions_of(body: ExactBody, face: int, cutters: list[ExactBody], budget: Bud
 def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
     """Yield a point within, and the corners, of each convex cell between the traces of its body's faces."""
     plane, axis = body.plane(face), body.axis(face)
-    for (x, y), (x0, x1, low, high) in _samples(body, face, _traces(body, face, [body], budget), budget):
+    for (x, y), (x0, x1, low, high) in _samples(body, face, _traces(body, face, [body], budget, None), budget):
         corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
         yield _lifted(x, y, plane, axis), [_lifted(*corner, plane, axis) for corner in corners]
 
@@ -144,18 +165,21 @@ def _segment(p: Rational2, q: Rational2) -> tuple[Rational2, Rational2]:
     return (p, q) if p <= q else (q, p)
 
 
-def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget) -> list[tuple[Rational2, Rational2]]:
+def _traces(
+    body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None
+) -> list[tuple[Rational2, Rational2]]:
     """Return the segments in which other faces meet the plane of a face, near the face, projected along its axis."""
     low, high = _around(body, [(*p, 1) for p in body.corners(face)])
     found = set()
     for cutter in cutters:
-        for other in cutter.faces_in(low, high):
+        for other in cutter.faces_in(low, high) if only is None else only[1]:
             budget.check()
             if (cutter is body and other == face) or not any(cutter.plane(other)[:3]):
                 continue
             points = cutter.corners(other)
             values = [value_at(body.plane(face), p) for p in points]
-            found |= {_segment(p, q) for p, q in _trace(points, values, body.axis(face)) if p != q}
+            if only is None or max(only[0] * value for value in values) > 0:
+                found |= {_segment(p, q) for p, q in _trace(points, values, body.axis(face)) if p != q}
     return sorted(found)
 
 

@@ -36,6 +36,7 @@ from engine.collision.meshes.exact_regions import (
     pieces_of_segment,
     points_within,
     regions_of,
+    side_of_clean,
     sides_at,
     sides_over,
 )
@@ -44,6 +45,7 @@ from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, unles
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, RELATION, SAME_SIDE
 from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Parts, Poses, Witness, Work
+from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
 from engine.types import Relation
 
@@ -54,8 +56,17 @@ def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
     axis = body.axis(face)
     if axis < 0:
         return False, False
-    pierces, is_whole = False, not body.mesh.has_inside or pair.state(own, face) == STATE_CLEAN
-    for q in regions_of(body, face, [other] if is_whole else [other, body], pair.work.budget):
+    side = side_of_clean(body, face) if body.mesh.has_inside and pair.state(own, face) == STATE_CLEAN else 0
+    if side != 0:  # all that counts lies on one side: only faces that reach there cut it
+        met = pair.contacts[pair.contacts[:, own] == face, 1 - own].tolist()
+        is_above = side == sign_of(body.plane(face)[axis])
+        for q in regions_of(body, face, [other], pair.work.budget, (side, met)):
+            theirs = sides_at(other, q, axis)
+            if theirs.above if is_above else theirs.below:
+                return True, False
+        return False, False  # a point of the face within the other body has both insides beside it
+    pierces = False
+    for q in regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
         theirs = sides_at(other, q, axis)
         if theirs.above or theirs.below:
             ours = sides_at(body, q, axis)

@@ -13,7 +13,7 @@ import numpy as np
 
 from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.contact_kinds import BOTH, N_NAMED, STRENGTH
+from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
 from engine.collision.meshes.dual_traversal import (
     LEAST_LOOK,
     SEEK_CONTACT,
@@ -30,8 +30,8 @@ from engine.collision.meshes.face_state import state_at, states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.pose_batch import BESIDE, KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
-from engine.collision.meshes.triangle_triangle import APART, COPLANAR, CROSSING
+from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
+from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Poses, Witness, Work
 from engine.compiling.direct import entry_of
 from engine.types import UNDECIDED
@@ -60,17 +60,20 @@ def unless_identity(poses: Poses) -> Poses:
 
 
 def relate(
-    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, n_named: int | None = None
-) -> tuple[list[int], Found]:
-    """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; n_named:
-    as `relate_poses` takes it, None for what `work` wants."""
-    found = SPACE.found
+    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: Found | None = None,
+    n_named: int | None = None,
+) -> tuple[list[int], Found]:  # fmt: skip
+    """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
+    all contacts, their classes too, where they are found already; n_named: as `relate_poses` takes it, None
+    for what `work` wants."""
+    found, n_known = (SPACE.found, 0) if known is None else (known, len(known.kinds))
     n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
     room = len(found.kinds)
     while True:  # bound: each turn has more room
         entry_of(relate_poses)(
-            first.arrays, second.arrays, *posed, seek, n_named, SPACE.descent, found, SPACE.rows, work.budget.flag
-        )
+            first.arrays, second.arrays, *posed, seek, n_named, SPACE.descent, found, n_known,
+            SPACE.rows, work.budget.flag,
+        )  # fmt: skip
         row: list[int] = SPACE.row.tolist()
         n = row[N_CONTACTS]
         if n <= room:
@@ -116,7 +119,7 @@ class MeshPair:
 
     def find_contacts(self, seen: tuple[list[int], Found] | None = None) -> None:
         """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
-        self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work, self.n_named)
+        self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
         self.contacts, self.kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
@@ -125,7 +128,7 @@ class MeshPair:
             self._settle_classes(self.kinds)
 
     def _settle_classes(self, kinds: Int8Array) -> None:
-        """Find the classes that kernels left open; regions tell the rest then."""
+        """Find the classes that kernels left open, and let them judge all contacts then."""
         open_ones = np.flatnonzero(kinds == UNDECIDED)
         self.work.n_rational += len(open_ones)
         a, b = self.exact
@@ -136,10 +139,11 @@ class MeshPair:
             if kinds[index] != APART and self._is_settled_by(int(kinds[index]), i, j):
                 self.contacts, self.is_settled = self.contacts[index : index + 1], True
                 return
-        self.contacts, kinds = self.contacts[kinds != APART], kinds[kinds != APART]
-        (first, second), (i, j) = self.meshes, self.contacts.T
-        order = np.lexsort((j, i, second.faces[j], first.faces[i], kinds != COPLANAR))  # as `put_in_order` does
-        self.contacts, self.kinds = self.contacts[order], np.full(len(order), BESIDE | BOTH, np.int8)
+        self.contacts, self.kinds = self.contacts[kinds != APART], kinds[kinds != APART]
+        if len(self.kinds):
+            found = Found(self.contacts, self.kinds, np.empty(0, np.bool_))
+            self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, found, self.n_named)
+            self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
         """The rule of `dual_traversal.settles` for a class found exactly."""

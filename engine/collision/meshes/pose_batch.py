@@ -164,21 +164,22 @@ def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds:
 @kernel
 def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
-    descent: Descent, found: Found, rows: IntArray, flag: FlagArray,
+    descent: Descent, found: Found, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the one of the first.
 
     n_named: how many contacts name the witness; without any, relations are all that is told, and for DETAIL only how
     the contacts lie. `descent` and `found` are
     work space: pairs in contact at more faces than fit into `found`, and those no proof here settles, are UNSETTLED.
-    What is found of the last pose stays there.
+    What is found of the last pose stays there. n_known: of one pose, how many contacts there are, where all of them are
+    in `found` already, their classes known; else 0.
     """
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
         place, is_apart = place_bodies(first, still, 0, second, poses, item, descent)
         s = Search(first, second, place, descent, seek, found, flag)
-        how, n_pairs = (DONE, 0) if is_apart else search(s)
+        how, n_pairs = (DONE, n_known) if is_apart or n_known > 0 else search(s)
         row[N_CONTACTS] = n_pairs
         if how == INTERRUPTED:
             return
@@ -193,7 +194,7 @@ def relate_poses(
             row[KIND] = CONTAINED
             row[FIRST_FACE] = first.first_face if row[RELATION] == FIRST_INSIDE_SECOND else -1
             row[SECOND_FACE] = second.first_face if row[RELATION] == SECOND_INSIDE_FIRST else -1
-        elif n_pairs <= room_of(found):
+        elif n_known > 0 or n_pairs <= room_of(found):
             if n_named == DETAIL:
                 in_detail(s, n_pairs)
             else:

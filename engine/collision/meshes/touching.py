@@ -45,6 +45,7 @@ from engine.collision.meshes.triangle_triangle import (
     Signs,
     beside,
     corner,
+    is_on_face,
     passes_within,
     separation,
     sides_of,
@@ -151,9 +152,21 @@ def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPo
 
 
 @called
+def _corners_on(poses: FloatArray, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+    """Return a bit for each corner of t that lies on the closed face u, -1 where that is not known."""
+    found = 0
+    for k in range(3):
+        how = is_on_face(poses, corner(t, k), u, off, axis, error) if sides[k] == 0 else 0
+        if how == UNDECIDED:
+            return -1
+        found |= how << k
+    return found
+
+
+@called
 def judge(s: Search, item: int) -> tuple[int, bool]:
     """Return OVERLAPPING where a contact proves that, TOUCHING where not, UNSETTLED where that is open; and whether its
-    faces share an area. Its class becomes JUDGED with the corners in the plane of the other face."""
+    faces share an area. Its class becomes JUDGED with the corners on the other face."""
     i, j, kinds = s.found.pairs[item, 0], s.found.pairs[item, 1], s.found.kinds
     if CORNER <= kinds[item] < JUDGED:
         common = kinds[item] - CORNER
@@ -170,9 +183,11 @@ def judge(s: Search, item: int) -> tuple[int, bool]:
     if not np.isfinite(off.x + off.y + off.z + their_off.x + their_off.y + their_off.z):
         return UNSETTLED, False
     flat, their_flat = (axis, their_axis) if are_unposed else (-1, -1)
-    kinds[item] = JUDGED
-    for k in range(3):
-        kinds[item] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
+    on = _corners_on(poses, t, sides, u, their_off, their_flat, error)
+    theirs_on = _corners_on(poses, u, their_sides, t, off, flat, error)
+    if on < 0 or theirs_on < 0:
+        return UNSETTLED, False
+    kinds[item] = JUDGED | on | theirs_on << 3
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
         return flush(s, i, j, t, u, axis, off)
     by_own = _enters(s, t, sides, u, their_off, their_flat, s.second, j)
@@ -257,8 +272,8 @@ def where_faces_are(
     corner off it does not, nor any component without contact; INSIDE where one surely lies inside and has an inside of
     its own beside it; else UNDECIDED.
 
-    own: the column of the body in contacts (n, 2); their classes: of each the corners in the plane of the other face
-    (`kind_of`, `judge`). shares (n,), or none: whether the two faces share an area. known,
+    own: the column of the body in contacts (n, 2); their classes: of each the corners that lie on the other face, and
+    maybe others of its plane (`kind_of`, `judge`). shares (n,), or none: whether the two faces share an area. known,
     is_flush, told: tables (`place_of`) of vertices and of faces that share an area.
     """
     contacts, flush, met = s.found

@@ -102,20 +102,14 @@ def corner(t: Facet, index: int) -> Any:
     return t.q if index == 1 or index == 4 else (t.r if index == 2 or index == 5 else t.p)
 
 
-@inline
-def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
-    """Return both triangles, lone vertex first and above the plane of the other; sides: t1 of t2, then t2 of t1."""
-    lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
-    lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
-    a, b = turned(t1, lone1), turned(t2, lone2)
-    if side1 < 0:  # turn b over: now a.p is above b
-        b = Facet(b.p, b.r, b.q)
-    if side2 < 0:
-        a = Facet(a.p, a.r, a.q)
-    return a, b
-
-
 # ---- near: one bound for all signs ----------------------------------------------------------------------------------
+
+
+@inline
+def with_lone_first(t: Facet, p: float, q: float, r: float) -> Facet:
+    """Return a triangle with the vertex first that is alone on its side of a plane; p, q, r: values, none near 0."""
+    above = int(p > 0.0) + int(q > 0.0) + int(r > 0.0) == 1
+    return turned(t, 0 if (p > 0.0) == above else (1 if (q > 0.0) == above else 2))
 
 
 @merged
@@ -129,12 +123,6 @@ def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: flo
     m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p), largest_of(q), largest_of(r)))
     e = 2.0 * error
     return 2.0**-46 * (m * m * m) + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1068 * (1.0 + m)
-
-
-@inline
-def _signs(p: float, q: float, r: float) -> Signs:
-    """Return the signs of numbers, none of them 0."""
-    return 1 if p > 0.0 else -1, 1 if q > 0.0 else -1, 1 if r > 0.0 else -1
 
 
 @inline
@@ -155,7 +143,12 @@ def classify_near(t1: Facet, t2: Facet, error: float) -> int:
         return APART
     if not (min(abs(a), abs(b), abs(c)) > bound and min(abs(d), abs(f), abs(g)) > bound):
         return UNDECIDED
-    s, t = lone_first(t1, t2, _signs(d, f, g), _signs(a, b, c))
+    # the lone vertices first, each above the plane of the other triangle
+    s, t = with_lone_first(t1, d, f, g), with_lone_first(t2, a, b, c)
+    if int(d > 0.0) + int(f > 0.0) + int(g > 0.0) == 2:  # the lone one is below: turn the other triangle over
+        t = Facet(t.p, t.r, t.q)
+    if int(a > 0.0) + int(b > 0.0) + int(c > 0.0) == 2:
+        s = Facet(s.p, s.r, s.q)
     from_p = minus(t.p, s.p)
     first = dot(cross(minus(s.q, s.p), from_p), minus(t.q, s.p))  # orient3d(s.q, t.p, s.p, t.q)
     second = dot(cross(from_p, minus(s.r, s.p)), minus(t.r, s.p))  # orient3d(s.p, t.p, s.r, t.r)
@@ -199,6 +192,20 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
         sign_of_four(poses, t.p, t.q, t.r, u.q, error) if not abs(by_q) > bound else (1 if by_q > 0.0 else -1),
         sign_of_four(poses, t.p, t.q, t.r, u.r, error) if not abs(by_r) > bound else (1 if by_r > 0.0 else -1),
     )
+
+
+@inline
+def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
+    """Return two triangles with the lone vertices first, each above the plane of the other; sides: of the corners of
+    t1 of the plane of t2, and the other way."""
+    lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
+    lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
+    a, b = turned(t1, lone1), turned(t2, lone2)
+    if side1 < 0:  # turn b over: now a.p is above b
+        b = Facet(b.p, b.r, b.q)
+    if side2 < 0:
+        a = Facet(a.p, a.r, a.q)
+    return a, b
 
 
 @called
@@ -309,6 +316,19 @@ def passes_within(
     if unsure or p == UNDECIDED or q == UNDECIDED or r == UNDECIDED:
         return UNDECIDED
     return int(is_straddling(p, q, r))
+
+
+@called
+def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
+    """Tell whether a point in the plane of t lies on the closed face: 1, or not: 0; UNDECIDED."""
+    found, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
+    for edge in range(3):
+        side = turn_in_plane(poses, corner(t, edge), corner(t, edge + 1), p, off, axis, error)
+        if turn == UNDECIDED or side == UNDECIDED:
+            found = UNDECIDED
+        elif side == -turn:
+            return 0
+    return found
 
 
 @inline

@@ -87,6 +87,7 @@ def test_agrees_with_single_questions(size: int, room: int) -> None:
                 0,
                 new_descent(),
                 new_found(room),
+                0,
                 rows,
                 np.zeros(1, np.uint8),
             )
