@@ -4,7 +4,7 @@
 off by at most (degree + t + small) u times the sum of magnitudes. Underflow: powers of |x| < 1 are each off by at
 most 16 times 2^-1075, later products by 2^-1075 times the factors that follow. Both are covered by adding the floor
 2^-1010 to every magnitude on the way, because even u 2^-1010 = 2^-1063 is more than 16 times 2^-1075. A blur
-(posed/filters.py) changes a term by at most degree times blur times the same term with one factor left out, all factors
+(filters.py) changes a term by at most degree times blur times the same term with one factor left out, all factors
 grown by the blur; each factor is at most the largest grown coordinate or 1, m: by less than degree |c| m^degree blur.
 
 **The exact stage** multiplies significands (in [1/2, 1)) as expansions, so that every term of degree D is a multiple of

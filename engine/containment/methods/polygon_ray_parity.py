@@ -10,7 +10,7 @@ them (rings.py). The filter looks at all edges of a run without a branch, so tha
 time; where the sign at a passed edge is not sure, or a vertex is level with q (which may then lie on a horizontal
 edge), the edges are taken one by one. A grid of cells, if there is one, knows the location of all points of most cells.
 
-A point may carry a blur, a bound on its coordinates' error as in posed/filters.py; then what is not sure stays
+A point may carry a blur, a bound on its coordinates' error as in methods/filters.py; then what is not sure stays
 UNDECIDED.
 
 Source: Shimrat 1962, "Algorithm 112: position of point relative to polygon"; Hormann and Agathos 2001, "The point in

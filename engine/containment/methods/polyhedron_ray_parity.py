@@ -16,7 +16,7 @@ for every surface that is even at each edge: also self-intersecting, non-manifol
 
 The triangles over q are found in a tree of boxes (bvh.py), whose float32 boxes hold theirs; q is widened by more than
 its own rounding. Eight at a time are counted or left out in single precision (`overhead`), the rest one by one. A q
-with a blur (posed/filters.py) is located where all rays of it agree, else left UNDECIDED.
+with a blur (methods/filters.py) is located where all rays of it agree, else left UNDECIDED.
 
 Source: the textbook's ray and parity test.
 """
