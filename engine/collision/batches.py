@@ -16,10 +16,9 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import TAKEN, check_pose, pair_function
+from engine.collision.collide import TAKEN, check_pose, details_of_boxes, details_where_proven, pair_function
 from engine.collision.convex.body import ConvexBody, convex_body_of, pooled
 from engine.collision.convex.pair import relate_convex_pairs
-from engine.collision.detail import details_of_boxes, details_where_proven
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_pool, relate_outline_pairs
 from engine.collision.simple.form_relations import relate_box_pairs

@@ -1,21 +1,24 @@
-"""Public: how two solids lie to each other. One table from the two types to the function that decides.
+"""Public: how two solids lie to each other. One table from the two types to the functions that decide.
+
+**Detail.** Of the eight relations of RCC-8 disjoint is DC, touching EC, inside NTPP. Only overlapping splits further:
+neither body sticks out of the other, EQ; one does, TPP or NTPP by whether the boundaries meet; both do, PO.
 
 Of calls about many pairs kernels fill what answers they can (`Answers`), the rest is settled one by one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import Int8Array, IntArray
+from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.detail import NO_DETAIL, check_has_detail, detail_of
-from engine.collision.meshes.mesh_mesh import mesh_mesh
-from engine.collision.planar.outline_batch import collide_outlines
+from engine.collision.meshes.mesh_arrays import mesh_body_of
+from engine.collision.meshes.mesh_mesh import mesh_mesh, mesh_parts
+from engine.collision.planar.outline import collide_outlines, live_edges, outline_of, outline_parts
 from engine.collision.result import (
     BODIES,
     FACES,
@@ -23,49 +26,70 @@ from engine.collision.result import (
     UNNAMED,
     Collision,
     PairFunction,
+    PartsFunction,
     Poses,
     Witness,
     Work,
     meets_as,
 )
-from engine.collision.simple.against_ball import collide_body_sphere
-from engine.collision.simple.against_half_space import collide_half_space_body
+from engine.collision.simple.against_ball import body_sphere_parts, collide_body_sphere
+from engine.collision.simple.boundary import live_parts
 from engine.collision.simple.closed_forms import (
     by_forms_or,
     collide_form_sphere,
+    collide_half_space_body,
     collide_half_space_sphere,
     collide_half_spaces,
+    half_space_body_parts,
+    half_space_sphere_parts,
+    half_spaces_parts,
+    sphere_sphere_parts,
 )
-from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
+from engine.errors import (
+    InvalidArrayError,
+    InvalidInputError,
+    UnsupportedPairError,
+    UnsupportedSolidError,
+    WrongDimensionError,
+)
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
+from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
+from engine.solids.checks import spell
+from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
-from engine.types import Accuracy
+from engine.solids.sphere import Sphere
+from engine.solids.surface import Surface
+from engine.types import Accuracy, Rcc8, Relation
 
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
 
 
-PAIRS: dict[tuple[int, str, str], PairFunction] = {
-    **{(3, first, second): mesh_mesh for first in FACES[3] for second in FACES[3]},
-    **{(2, first, second): collide_outlines for first in FACES[2] for second in FACES[2]},
-    **{(d, "half_space", body): collide_half_space_body for d, body in BODIES},
-    **{(d, body, "sphere"): collide_body_sphere for d, body in BODIES},
+_BODIES: dict[int, tuple[PairFunction, PartsFunction]] = {
+    3: (mesh_mesh, mesh_parts),
+    2: (collide_outlines, outline_parts),
 }
-for _dimension in (2, 3):
-    PAIRS[_dimension, "box", "box"] = by_forms_or(mesh_mesh if _dimension == 3 else collide_outlines)
-    PAIRS[_dimension, "box", "sphere"] = by_forms_or(collide_form_sphere)
-    PAIRS[_dimension, "half_space", "half_space"] = collide_half_spaces
-    PAIRS[_dimension, "half_space", "sphere"] = collide_half_space_sphere
-    PAIRS[_dimension, "sphere", "sphere"] = by_forms_or(collide_form_sphere)
-"""Dimension and as what two solids meet (`Row.meets`) to the function of that pair, in one order or both."""
+PAIRS: dict[tuple[int, str, str], tuple[PairFunction, PartsFunction]] = {
+    **{(d, first, second): _BODIES[d] for d in (2, 3) for first in FACES[d] for second in FACES[d]},
+    **{(d, "half_space", body): (collide_half_space_body, half_space_body_parts) for d, body in BODIES},
+    **{(d, body, "sphere"): (collide_body_sphere, body_sphere_parts) for d, body in BODIES},
+}
+for _d, (_function, _parts) in _BODIES.items():
+    PAIRS[_d, "box", "box"] = by_forms_or(_function), _parts
+    PAIRS[_d, "box", "sphere"] = by_forms_or(collide_form_sphere), body_sphere_parts
+    PAIRS[_d, "half_space", "half_space"] = collide_half_spaces, half_spaces_parts
+    PAIRS[_d, "half_space", "sphere"] = collide_half_space_sphere, half_space_sphere_parts
+    PAIRS[_d, "sphere", "sphere"] = by_forms_or(collide_form_sphere), sphere_sphere_parts
+"""Dimension and as what two solids meet (`Row.meets`), in one order or both, to the functions of that pair: how the two
+lie to each other, and of two that overlap what lies outside the other."""
 
-_BY_TYPE: dict[tuple[int, str, int, str], tuple[PairFunction, bool]] = {}
+_BY_TYPE: dict[tuple[int, str, int, str], tuple[PairFunction, PartsFunction, bool]] = {}
 """What `PAIRS` says of types that were asked about."""
 
 
-def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, bool]:
-    """Return the function of a pair and whether it wants the two in the other order."""
+def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, PartsFunction, bool]:
+    """Return the functions of a pair and whether they want the two in the other order."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:
@@ -73,8 +97,8 @@ def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, bool]:
         if first.dimension == second.dimension:
             one, other = meets_as(first), meets_as(second)
             for key, is_swapped in (((first.dimension, one, other), False), ((first.dimension, other, one), True)):
-                if (function := PAIRS.get(key)) is not None:
-                    return _BY_TYPE.setdefault(types, (function, is_swapped))
+                if (functions := PAIRS.get(key)) is not None:
+                    return _BY_TYPE.setdefault(types, (*functions, is_swapped))
     for name, solid in (("first", first), ("second", second)):
         if not isinstance(solid, Solid):
             raise UnsupportedSolidError(
@@ -114,7 +138,7 @@ def collide_pair(first: Solid, second: Solid, poses: Poses, work: Work) -> Colli
     """
     if poses[0] is not None and poses[0] == poses[1]:
         poses = None, None
-    function, is_swapped = pair_function(first, second)
+    function, _, is_swapped = pair_function(first, second)
     answer = (
         function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
     )
@@ -262,3 +286,79 @@ def accuracy_of(n_pairs: int, n_open: int, works: list[Work], method: str) -> Ac
     """Return the report on many pairs; n_open: those that batches left, all of them beyond a filter."""
     beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
     return Accuracy("exact", None, n_pairs, max(beyond, n_open), rational, method)
+
+
+NO_DETAIL = -1
+"""In place of a code of `Rcc8`: a body without interior."""
+
+UNLESS_OVERLAPPING = {
+    Relation.DISJOINT: Rcc8.DC,
+    Relation.TOUCHING: Rcc8.EC,
+    Relation.FIRST_INSIDE_SECOND: Rcc8.NTPP,
+    Relation.SECOND_INSIDE_FIRST: Rcc8.NTPPI,
+}
+_WHERE_PROVEN = np.array([UNLESS_OVERLAPPING.get(relation, Rcc8.PO) for relation in Relation], np.int8)
+
+
+def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boolean: bool) -> None:
+    """Raise where a body, given with where it stands in the call, can have no interior by its type."""
+    if boolean:
+        raise InvalidInputError("detail needs the relation, which boolean leaves open; ask for one", ("detail",))
+    for where, solid in named:
+        if isinstance(solid, Surface):
+            raise UnsupportedSolidError(
+                f"{spell(where)} is a surface, which has no interior: detail is told of solids; make it a polyhedron, "
+                "or ask without detail",
+                where,
+            )
+
+
+def details_where_proven(relations: Int8Array) -> Int8Array:
+    """Return the codes for pairs that a batch decided, by crossings or points outside the other: overlapping is PO."""
+    return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
+
+
+def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: Int8Array) -> Int8Array:
+    """Return the codes for pairs (n, 2) of boxes (n_boxes, d) that are not flat."""
+    i, j = pairs.T
+    i_sticks_out = ((low[i] < low[j]) | (high[j] < high[i])).any(axis=1)
+    j_sticks_out = ((low[j] < low[i]) | (high[i] < high[j])).any(axis=1)
+    shared = np.where(j_sticks_out, Rcc8.TPP, Rcc8.EQ)
+    split = np.where(i_sticks_out, np.where(j_sticks_out, Rcc8.PO, Rcc8.TPPI), shared)
+    return np.where(relations == Relation.OVERLAPPING, split, _WHERE_PROVEN[relations]).astype(np.int8)
+
+
+def detail_of(first: Solid, second: Solid, poses: Poses, relation: Relation, work: Work) -> Rcc8 | None:
+    """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
+    if relation != Relation.OVERLAPPING:
+        if not (has_interior(first, work.budget) and has_interior(second, work.budget)):
+            return None
+        return UNLESS_OVERLAPPING[relation]
+    if poses[0] is not None and poses[0] == poses[1]:
+        poses = None, None
+    _, function, is_swapped = pair_function(first, second)
+    if is_swapped:
+        parts = function(second, first, poses[::-1], work).swapped()
+    else:
+        parts = function(first, second, poses, work)
+    if parts.first:
+        return Rcc8.PO if parts.second else (Rcc8.TPPI if parts.meet else Rcc8.NTPPI)
+    return (Rcc8.TPP if parts.meet else Rcc8.NTPP) if parts.second else Rcc8.EQ
+
+
+def has_interior(solid: Solid, budget: Budget) -> bool:
+    """Tell whether some open set lies within a solid; asked once of each."""
+    return solid.prepared("has_interior", lambda: _has_interior(solid, budget), budget.check)
+
+
+def _has_interior(solid: Solid, budget: Budget) -> bool:
+    if isinstance(solid, HalfSpace):
+        return True
+    if isinstance(solid, Sphere):
+        return solid.radius > 0.0
+    if isinstance(solid, Aabb):
+        return bool((solid.min < solid.max).all())
+    if solid.dimension == 2:
+        return bool(live_edges(outline_of(solid, None, budget), budget))
+    mesh = mesh_body_of(solid)
+    return mesh.has_inside and any(any(live_parts(mesh, face, budget)) for face in range(len(mesh.faces)))

@@ -11,19 +11,28 @@ import numpy as np
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision.batches import posed_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
-from engine.collision.collide import Answers, PlacedPair, Witnesses, accuracy_of, collide_pair, pair_function
-from engine.collision.detail import NO_DETAIL, check_has_detail, details_where_proven, has_interior
+from engine.collision.collide import (
+    NO_DETAIL,
+    Answers,
+    PlacedPair,
+    Witnesses,
+    accuracy_of,
+    check_has_detail,
+    collide_pair,
+    details_where_proven,
+    has_interior,
+    pair_function,
+)
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.dual_traversal import PIERCING
-from engine.collision.meshes.face_state import states_of
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, STILL, mesh_body_of
 from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
 from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
+from engine.collision.meshes.parity import states_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work, has_faces
-from engine.collision.simple.against_ball import centers_in_frame, named
-from engine.collision.simple.ball_on_mesh import relate_balls
+from engine.collision.simple.against_ball import centers_in_frame, named, relate_balls
 from engine.collision.simple.closed_forms import told_by_forms
 from engine.compiling.direct import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError

@@ -139,6 +139,7 @@ UNCOUNTED = {(named, boolean): Work(UNLIMITED, named, boolean) for named in (Fal
 """By `witness` and `boolean`: of calls without deadline and report, whose counts nobody reads."""
 
 PairFunction = Callable[[Any, Any, Poses, Work], Collision]
+PartsFunction = Callable[[Any, Any, Poses, Work], Parts]
 """The two solids are of the types that the table in `collide.py` names."""
 
 

@@ -25,9 +25,8 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel, merged
-from engine.distance.closed_forms import gap_of_forms
+from engine.distance.closed_forms import Wide, Wide3, dot3, gap_of_forms, less, less3, root
 from engine.distance.refined import ROUNDING, corner_of, ends_of, height_above
-from engine.distance.wide import Wide, Wide3, dot3, less, less3, root
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff, two_sum, workspace
 from engine.predicates.vectors import dot, largest_of, length, minus, negative

@@ -15,9 +15,8 @@ from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.planar.outline_batch import BLOCK, inside, n_blocks, relate_placed
 from engine.compiling.jit import allocating_kernel, called, inline
-from engine.distance.closed_forms import UNSURE
+from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, measure, minus2, place, point
-from engine.distance.wide import Wide, less, over, plus, times
 from engine.predicates.double_double import U2, surely_rounded
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.orientation import lower

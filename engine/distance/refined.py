@@ -23,21 +23,87 @@ direction off by 2 `error` brings a height, of lengths below 4, off by less than
 
 from __future__ import annotations
 
-from typing import Final
+from collections import namedtuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from engine.arrays import FloatArray
-from engine.collision.meshes.mesh_arrays import triangle_of
+from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import Placement
 from engine.collision.meshes.triangle_triangle import Facet, corner
-from engine.compiling.jit import called, inline
-from engine.distance.boxes import Search, View, keep_below, scaled
-from engine.distance.wide import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
+from engine.compiling.jit import called, inline, merged
+from engine.distance.closed_forms import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
+from engine.lanes.boxes import FRAME_ROWS
+from engine.lanes.gaps import FIXED_ROWS, GAP_ROWS
+from engine.lanes.tracing import LANES
 from engine.predicates.double_double import surely_rounded
 from engine.predicates.error_free import two_diff
 from engine.types import Point3
+
+ROOT: Final = -1
+"""In place of a lane: the whole tree."""
+
+
+class View(NamedTuple):
+    """A body as the search sees it: its mesh, where it is, and the power of two that its numbers are taken times."""
+
+    mesh: MeshArrays
+    place: Placement
+    unit: float
+
+
+Heap = namedtuple("Heap", "bounds lanes")
+"""Pairs of boxes that wait, the least bound first: bounds (room,), lanes (room, 2) int64, eight a node, or ROOT."""
+
+Candidates = namedtuple("Candidates", "pairs bounds")
+"""Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
+
+Room = namedtuple("Room", "heap found limits points frames work fixed")
+"""Work space of searches, one at a time.
+
+limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, work, fixed: of `lanes/gaps.py`.
+"""
+
+
+def new_room(room: int) -> Room:
+    """Return work space for so many pairs."""
+    heap, found = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
+    return Room(
+        heap, Candidates(found, np.empty(room)), np.empty(2),
+        np.empty((2, 3)), np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((GAP_ROWS, LANES), np.float32),
+        np.empty((FIXED_ROWS, LANES), np.float32),
+    )  # fmt: skip
+
+
+class Search(NamedTuple):
+    """One question: both bodies, a bound on the rounding of points of both together, and work space."""
+
+    a: View
+    b: View
+    error: float
+    room: Room
+
+
+@merged
+def scaled(p: Point3, unit: float) -> Point3:
+    """Return a point times the unit; order: before any product, which would be lost where coordinates are denormal."""
+    return Point3(p.x * unit, p.y * unit, p.z * unit)
+
+
+@inline
+def keep_below(found: Candidates, n: int, most: float) -> int:
+    """Leave out the candidates above the bound; return how many there are."""
+    n_kept = 0
+    for item in range(n):
+        if found.bounds[item] <= most:
+            found.bounds[n_kept] = found.bounds[item]
+            for column in range(4):
+                found.pairs[n_kept, column] = found.pairs[item, column]
+            n_kept += 1
+    return n_kept
+
 
 ROUNDING: Final = 2.0**-94
 

@@ -31,9 +31,9 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.planar.outline_batch import outline_arrays
 from engine.collision.result import Clearance, Feature, Poses
 from engine.compiling.direct import entry_of
-from engine.distance.boxes import DONE, Room, new_room
 from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
-from engine.distance.traversal import BEYOND, TOLD, Asked, find_nearest
+from engine.distance.refined import Room, new_room
+from engine.distance.traversal import BEYOND, DONE, TOLD, Asked, find_nearest
 from engine.running.budget import Budget
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

@@ -20,30 +20,105 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray
-from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, set_frame
+from engine.arrays import FlagArray, Float32Array, FloatArray
+from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
+from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
+from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import inline, kernel, merged
-from engine.distance.boxes import (
-    CLOSER,
-    DONE,
-    FULL,
-    INTERRUPTED,
-    ROOT,
-    Heap,
-    Room,
-    Search,
-    View,
-    fix,
-    keep_below,
-    measure_blocks,
-    size_of,
-)
-from engine.distance.refined import certify, refine
-from engine.lanes.boxes import EMPTY, FRAME_ROWS
-from engine.lanes.discs import inverse_ratio
-from engine.lanes.gaps import child_bounds
+from engine.distance.refined import ROOT, Heap, Room, Search, View, certify, keep_below, refine, scaled
+from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
+from engine.lanes.discs import DISC_ROWS, inverse_ratio
+from engine.lanes.gaps import FIXED_ROWS, child_bounds, near_triangle, place_triangles
+from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
+
+
+@inline
+def fix(view: View, at: int, fixed: Float32Array) -> None:
+    """Write box and disc of a lane, or what holds the whole tree, to the first column of `fixed`."""
+    if at == ROOT:
+        for row in range(FIXED_ROWS):
+            fixed[row, 0] = 4.0 if row > 11 else (2.0 if 3 <= row < 6 else (1.0 if row == 9 else 0.0))
+        return
+    for row in range(BOX_ROWS):
+        fixed[row, 0] = view.mesh.boxes[at >> 3, row, at & 7]
+    for row in range(DISC_ROWS):
+        fixed[BOX_ROWS + row, 0] = view.mesh.discs[at >> 3, row, at & 7]
+
+
+@merged
+def size_of(view: View) -> float:
+    """Return the unit of a body's tree."""
+    return float(view.mesh.scale * view.unit)
+
+
+DONE: Final = 0
+FULL: Final = 1
+CLOSER: Final = 2
+INTERRUPTED: Final = 3
+"""How a search ended: with all pairs; without room for more pairs of boxes or triangles; with two points nearer than
+asked; by the flag."""
+_ABOVE_ONE: Final = 1.0 + 2.0**-22
+
+
+@merged
+def _triangle(view: View, item: int) -> Facet:
+    """Return a placed triangle, rounded, times the unit."""
+    t, place, unit = triangle_of(view.mesh, item), view.place, view.unit
+    return Facet(scaled(placed(t.p, place), unit), scaled(placed(t.q, place), unit), scaled(placed(t.r, place), unit))
+
+
+@inline
+def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, tuple[int, int]]:
+    """Return bounds on the distance of two triangles, from below and above, and the features of nearly nearest
+    points; of any where the lower bound is above `most`.
+
+    error: bound on the distance of a point from its rounded one, both bodies together.
+    """
+    origin = s.p
+    s, t = seen_from(origin, s), seen_from(origin, t)
+    slack = rounding_of(s, t) + error
+    best, across = nearest_points(s, t, most + slack)
+    return max(across.low - slack, 0.0), across.size + slack, (best.first, best.second)
+
+
+@merged
+def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: FloatArray) -> tuple[int, int]:
+    """Add the pairs of triangles of two blocks that may be the nearest; return how that ended, and their number.
+
+    limits: as in `find_nearest`; the first falls.
+    """
+    frames, work, found, per_size = s.room.frames, s.room.work, s.room.found, _ABOVE_ONE / size_of(s.a)
+    place_triangles(s.b.mesh.blocks, j, frames, work)
+    for k in range(LANES):
+        own = int(s.a.mesh.child[i, k])
+        if own == EMPTY:
+            break
+        bits = near_triangle(s.a.mesh.blocks, i, k, frames, limits[0] * per_size, work)
+        t = _triangle(s.a, -1 - own)
+        while bits != 0:  # bound: each turn takes a bit
+            their = int(s.b.mesh.child[j, lowest_bit(bits)])
+            bits &= bits - 1
+            if their == EMPTY:
+                break
+            low, high, features = _measure(t, _triangle(s.b, -1 - their), s.error, limits[0])
+            if high < limits[1]:
+                return CLOSER, 0
+            if high < limits[0]:
+                limits[0] = high
+            if low > limits[0]:
+                continue
+            if n_found == len(found.bounds):
+                n_found = keep_below(found, n_found, limits[0])
+                if 2 * n_found > len(found.bounds):
+                    return FULL, 0
+            found.bounds[n_found] = low
+            found.pairs[n_found, 0], found.pairs[n_found, 1] = -1 - own, -1 - their
+            found.pairs[n_found, 2], found.pairs[n_found, 3] = features
+            n_found += 1
+    return DONE, n_found
+
 
 BEYOND: Final = 4
 """How a search ended that was none: beyond `_LARGEST` sums of coordinates may overflow."""

@@ -18,7 +18,7 @@ import numpy as np
 from engine.arrays import FloatArray, IntArray
 from engine.collision.planar.outline_batch import box_blocks
 from engine.compiling.jit import called, inline
-from engine.distance.wide import Wide, less, over, plus, product, root, times
+from engine.distance.closed_forms import Wide, less, over, plus, product, root, times
 from engine.predicates.vectors import as_point2
 
 LARGEST: Final = 2.0**200

@@ -18,9 +18,8 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.collision.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import Answers, PlacedPair, accuracy_of
+from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, accuracy_of, check_has_detail, has_interior
 from engine.collision.convex.body import pooled
-from engine.collision.detail import NO_DETAIL, check_has_detail, has_interior
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Witness, Work
 from engine.collision.simple.closed_forms import form_of

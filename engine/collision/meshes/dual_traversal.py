@@ -17,8 +17,8 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, keep_first
-from engine.collision.meshes.face_state import proves_overlap, state_of
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
+from engine.collision.meshes.parity import proves_overlap, state_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
 from engine.collision.meshes.triangle_triangle import APART, CORNER, CROSSING, Facet, classify, classify_near, with_pose
 from engine.compiling.jit import inline, merged

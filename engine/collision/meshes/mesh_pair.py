@@ -26,9 +26,8 @@ from engine.collision.meshes.dual_traversal import (
 )
 from engine.collision.meshes.exact_body import ExactBody, classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
-from engine.collision.meshes.face_state import state_at, states_of
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
-from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices, state_at, states_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING

@@ -26,17 +26,20 @@ from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces
-from engine.collision.meshes.face_state import UNTOLD, inner_side, point_within, state_of
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
 from engine.collision.meshes.parity import (
     INSIDE,
     OUTSIDE,
     SLACK,
+    UNTOLD,
     OwnPoint,
     box_between,
     brought_back,
+    inner_side,
     locate_point,
     next_face,
+    point_within,
+    state_of,
 )
 from engine.collision.meshes.placement import Placement, defect_of, placed
 from engine.collision.meshes.triangle_triangle import (

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,11 +21,25 @@ from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
+from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import image_point, rounded
+from engine.collision.planar.outline_batch import (
+    APART,
+    KINDS,
+    MOST_EDGES,
+    OUT_OF_FIRST,
+    OUT_OF_SECOND,
+    is_simple_body,
+    outline_arrays,
+    relate_two,
+    rings_of,
+)
 from engine.collision.result import (
     FIRST_WITHIN,
     NO_CONTACT,
+    RELATIONS,
     SECOND_WITHIN,
+    UNNAMED,
     Collision,
     Kind,
     Parts,
@@ -33,13 +47,12 @@ from engine.collision.result import (
     Witness,
     Work,
 )
+from engine.compiling.direct import entry_of
 from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
 from engine.running.budget import Budget
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.polygon import Polygon
-from engine.solids.pose import Pose
+from engine.solids.pose import Pose, motion_of
 from engine.types import Location, Relation
 
 Point = tuple[Fraction, ...]
@@ -88,15 +101,6 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     floats = vertices if pose is None else np.array([[rounded(x), rounded(y)] for x, y in points])
     low, high = np.minimum(floats[ends[:, 0]], floats[ends[:, 1]]), np.maximum(floats[ends[:, 0]], floats[ends[:, 1]])
     return Outline(points, ends, low, high, floats, pose is not None)
-
-
-def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
-    if isinstance(body, Polygon):
-        body.check_not_empty()
-    if isinstance(body, Aabb):
-        (x0, y0), (x1, y1) = body.min, body.max
-        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])
-    return body.vertices, body.ring_offsets
 
 
 def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangement, list[list[int]]]:
@@ -165,6 +169,39 @@ def single_points(outline: Outline) -> list[int]:
             result.append(first)
         first = last + 1
     return result
+
+
+def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, int, int]:
+    """Return what `relate_placed` does; UNSETTLED for large bodies, and for those that meet and are not simple."""
+    one, other = outline_arrays(first), outline_arrays(second)
+    if max(len(one[1]), len(other[1])) > MOST_EDGES:
+        return UNSETTLED, 0, -1, -1, APART
+    found: tuple[int, int, int, int, int] = entry_of(relate_two)(
+        *one, *motion_of(poses[0], 2), *other, *motion_of(poses[1], 2)
+    )
+    if found[0] == DISJOINT or (found[0] != UNSETTLED and is_simple_body(first) and is_simple_body(second)):
+        return found
+    return UNSETTLED, 0, -1, -1, APART
+
+
+def collide_outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
+    """Return what `collide_outline_outline` does, which decides what is not sure here."""
+    relation, _, i, j, kind = _related(first, second, poses)
+    if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
+        return collide_outline_outline(first, second, poses, work)
+    if relation == DISJOINT or not work.witness:
+        return UNNAMED[relation]
+    if relation >= OVERLAPPING:
+        return Collision(RELATIONS[relation], Witness(KINDS[kind], i, j))
+    return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
+
+
+def outline_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+    """Return what of each of two overlapping bodies lies outside the other."""
+    relation, found, _, _, kind = _related(first, second, poses)
+    if relation == UNSETTLED:
+        return parts_by_arrangement(first, second, poses, work)
+    return Parts(found & OUT_OF_SECOND != 0, found & OUT_OF_FIRST != 0, kind != APART)
 
 
 FIRST, SECOND, BOTH = 1, 2, 3

@@ -3,9 +3,9 @@ other.
 
 One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
 outside, for no other edge comes near. Where edges meet and none cross, every such place has a vertex: about it either
-interior is a sector (sectors.py). A ring that meets nothing lies where a vertex of it does. Together that is all: an
-edge that enters the other's interior does so at a contact, or its whole ring lies there. What rounded poses leave open
-stays UNSETTLED.
+interior is a sector, and three comparisons of sectors say whether the interiors meet there, and which of them sticks
+out of the other. A ring that meets nothing lies where a vertex of it does. Together that is all: an edge that enters
+the other's interior does so at a contact, or its whole ring lies there. What rounded poses leave open stays UNSETTLED.
 """
 
 from __future__ import annotations
@@ -19,28 +19,18 @@ import numpy as np
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
-from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement, rings_of
-from engine.collision.planar.sectors import IN_BOTH, OUT_OF_FIRST, OUT_OF_SECOND, at_contact, is_in_box
 from engine.collision.result import (
-    FIRST_WITHIN,
-    RELATIONS,
-    SECOND_WITHIN,
-    UNNAMED,
-    Collision,
     Kind,
-    Parts,
-    Poses,
-    Witness,
-    Work,
     has_faces,
 )
 from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating_kernel, inline, kernel
+from engine.compiling.jit import allocating_kernel, called, inline, kernel
 from engine.predicates.error_free import two_sum
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
+from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.pose import motion_of
+from engine.solids.polygon import Polygon
 from engine.solids.ragged import next_in_rings
 from engine.types import UNDECIDED, Point2
 
@@ -50,7 +40,7 @@ MOST_EDGES = 1024
 _NONE = np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int8)
 APART, CROSSING, UNSURE, _VERTEX_EDGE, _VERTEX_VERTEX = range(5)
 """How two edges lie, of which the last two are contacts, and CROSSING a strict one."""
-_KINDS: dict[int, Kind] = {CROSSING: "edge_edge", _VERTEX_EDGE: "vertex_edge", _VERTEX_VERTEX: "vertex_vertex"}
+KINDS: dict[int, Kind] = {CROSSING: "edge_edge", _VERTEX_EDGE: "vertex_edge", _VERTEX_VERTEX: "vertex_vertex"}
 ON_EDGE = 3
 """Of a point: neither inside, 1, nor outside, 0."""
 _IN, _OUT, _MAYBE = 1, 2, 4
@@ -73,10 +63,19 @@ def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _, _ in outlines]))
     vertices, following, sides = map(np.concatenate, zip(_NONE, *outlines))
     numbers = [
-        number if 0 < len(points) <= MOST_EDGES and _is_simple(body) else -1
+        number if 0 < len(points) <= MOST_EDGES and is_simple_body(body) else -1
         for number, (body, (points, _, _)) in enumerate(zip(bodies, outlines))
     ]
     return OutlineArrays(vertices, following, sides, firsts), np.array(numbers, np.int64)
+
+
+def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
+    if isinstance(body, Polygon):
+        body.check_not_empty()
+    if isinstance(body, Aabb):
+        (x0, y0), (x1, y1) = body.min, body.max
+        return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])
+    return body.vertices, body.ring_offsets
 
 
 def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray, Int8Array]:
@@ -151,7 +150,7 @@ def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
 
 
 @kernel
-def is_simple(vertices: FloatArray, following: IntArray) -> bool:
+def has_simple_edges(vertices: FloatArray, following: IntArray) -> bool:
     """Tell whether no two edges of these rings meet but in the vertex between them, and none has length 0."""
     for i in range(len(vertices)):
         a, b = as_point2(vertices, i), as_point2(vertices, following[i])
@@ -304,19 +303,6 @@ def relate_placed(
     return (DISJOINT if kind == APART else TOUCHING), found, first, second, kind
 
 
-@inline
-def _relate_under(
-    vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
-    theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
-    room: tuple[Any, Any, Any],
-) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return what `relate_placed` does, of two bodies under poses; room: for the vertices of both, and for boxes."""
-    placed, others, boxes = room
-    error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
-    box_blocks(others, theirs, boxes)
-    return relate_placed(placed, following, sides, others, theirs, their_sides, boxes, error)
-
-
 @allocating_kernel
 def relate_outline_pairs(
     pool: OutlineArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, has_detail: bool, relations: Int8Array,
@@ -326,7 +312,8 @@ def relate_outline_pairs(
 
     has_detail: overlaps that are no PO stay UNSETTLED. Returns early when the flag is raised.
     """
-    room = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2)), np.empty((n_blocks(MOST_EDGES), 4))
+    placed, others = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2))
+    boxes = np.empty((n_blocks(MOST_EDGES), 4))
     r, t = poses.rotations, poses.translations
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
@@ -336,58 +323,86 @@ def relate_outline_pairs(
             continue
         own = slice(pool.firsts[bodies[i]], pool.firsts[bodies[i] + 1])
         their = slice(pool.firsts[bodies[j]], pool.firsts[bodies[j] + 1])
-        relation, found, _, _, _ = _relate_under(
-            pool.vertices[own], pool.following[own], pool.sides[own], r[i], t[i],
-            pool.vertices[their], pool.following[their], pool.sides[their], r[j], t[j], room,
-        )  # fmt: skip
+        following, theirs, vertices = pool.following[own], pool.following[their], pool.vertices
+        error = max(_place(vertices[own], r[i], t[i], placed), _place(vertices[their], r[j], t[j], others))
+        box_blocks(others, theirs, boxes)
+        relation, found, _, _, _ = relate_placed(
+            placed, following, pool.sides[own], others, theirs, pool.sides[their], boxes, error
+        )
         if not has_detail or relation != OVERLAPPING or found == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
             relations[item] = relation
 
 
 @allocating_kernel
-def _relate_two(
+def relate_two(
     vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
     theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return what `_relate_under` does."""
-    room = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
-    return _relate_under(
-        vertices, following, sides, turn, move, other, theirs, their_sides, their_turn, their_move, room
-    )
+    """Return what `relate_placed` does, of two bodies under poses."""
+    placed, others, boxes = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
+    error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
+    box_blocks(others, theirs, boxes)
+    return relate_placed(placed, following, sides, others, theirs, their_sides, boxes, error)
 
 
-def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, int, int]:
-    """Return what `relate_placed` does; UNSETTLED for large bodies, and for those that meet and are not simple."""
-    one, other = outline_arrays(first), outline_arrays(second)
-    if max(len(one[1]), len(other[1])) > MOST_EDGES:
-        return UNSETTLED, 0, -1, -1, APART
-    found: tuple[int, int, int, int, int] = entry_of(_relate_two)(
-        *one, *motion_of(poses[0], 2), *other, *motion_of(poses[1], 2)
-    )
-    if found[0] == DISJOINT or (found[0] != UNSETTLED and _is_simple(first) and _is_simple(second)):
-        return found
-    return UNSETTLED, 0, -1, -1, APART
+def is_simple_body(solid: Solid) -> bool:
+    return solid.prepared("is_simple", lambda: bool(has_simple_edges(*outline_arrays(solid)[:2])))
 
 
-def collide_outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
-    """Return what `collide_outline_outline` does, which decides what is not sure here."""
-    relation, _, i, j, kind = _related(first, second, poses)
-    if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
-        return collide_outline_outline(first, second, poses, work)
-    if relation == DISJOINT or not work.witness:
-        return UNNAMED[relation]
-    if relation >= OVERLAPPING:
-        return Collision(RELATIONS[relation], Witness(_KINDS[kind], i, j))
-    return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
+IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
+"""Bits: where the open interiors meet; where that of the first lies outside the second; that of the second outside the
+first."""
 
 
-def outline_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
-    """Return what of each of two overlapping bodies lies outside the other."""
-    relation, found, _, _, kind = _related(first, second, poses)
-    if relation == UNSETTLED:
-        return parts_by_arrangement(first, second, poses, work)
-    return Parts(found & OUT_OF_SECOND != 0, found & OUT_OF_FIRST != 0, kind != APART)
+@inline
+def is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
+    """Tell whether a point lies in the box of an edge."""
+    return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
 
 
-def _is_simple(solid: Solid) -> bool:
-    return solid.prepared("is_simple", lambda: bool(is_simple(*outline_arrays(solid)[:2])))
+@inline
+def _is_from(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
+    """Tell whether the direction from p to x is that to s, or lies strictly between s and e, counter-clockwise."""
+    by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
+    if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
+        if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
+            return True
+    if turn == 0:
+        return by_s > 0
+    return (by_s > 0 and by_e > 0) if turn > 0 else (by_s > 0 or by_e > 0)
+
+
+@called
+def _have_common(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
+    """Tell whether the open sectors about p from s to e, and from t to f, counter-clockwise, have common points."""
+    return _is_from(p, s, e, t) or _is_from(p, t, f, s)
+
+
+@inline
+def _of_sectors(
+    p: Point2, before: Point2, after: Point2, side: int, their_before: Point2, their_after: Point2, their_side: int
+) -> int:
+    """Return what holds about a vertex of one boundary on another, as bits."""
+    s, e = (after, before) if side > 0 else (before, after)
+    t, f = (their_after, their_before) if their_side > 0 else (their_before, their_after)
+    found = IN_BOTH if _have_common(p, s, e, t, f) else 0
+    found |= OUT_OF_SECOND if _have_common(p, s, e, f, t) else 0
+    return found | (OUT_OF_FIRST if _have_common(p, t, f, e, s) else 0)
+
+
+@called
+def at_contact(
+    points: FloatArray, following: IntArray, edge: int, side: int, vertices: FloatArray, theirs: IntArray, other: int,
+    their_side: int,
+) -> int:  # fmt: skip
+    """Return what holds where two edges meet, as bits; of the start of an edge the one before it says that."""
+    a, b = as_point2(points, edge), as_point2(points, following[edge])
+    c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
+    found = 0
+    if b != c and is_in_box(b, c, d) and orient2d(c, d, b) == 0:
+        after = as_point2(points, following[following[edge]])
+        their_after = as_point2(vertices, theirs[theirs[other]]) if b == d else d
+        found = _of_sectors(b, a, after, side, c, their_after, their_side)
+    if d != a and d != b and is_in_box(d, a, b) and orient2d(a, b, d) == 0:
+        found |= _of_sectors(d, a, b, side, c, as_point2(vertices, theirs[theirs[other]]), their_side)
+    return found

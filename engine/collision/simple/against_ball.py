@@ -2,8 +2,13 @@
 
 Is everything strictly inside the ball (the farthest vertex)? Does the boundary meet the ball, and does the part of it
 beside the open interior reach into the open ball (the nearest live face)? Where the boundary keeps clear of the ball,
-is the centre inside? Floats prove most of it (`ball_on_mesh.py`). Else boxes of faces give float64 bounds of the
-distances, and only faces whose bounds allow a contact are measured, in rationals, nearest first.
+is the centre inside?
+
+**Floats** prove most of it for a mesh without a pose. The tree names the faces near the ball; of each nearly nearest
+points and the slab between them and the centre (`near_triangles.py`) prove that it enters the open ball, or keeps clear
+of the closed one; the witness is the one that enters of which the box is nearest. A half-line tells where a centre lies
+that no face comes near to; a face that no other one covers, as the caller asks, has the open interior beside it. Else
+boxes of faces bound the distances; faces whose bounds allow a contact are measured, in rationals, nearest first.
 """
 
 from __future__ import annotations
@@ -13,22 +18,162 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, IntArray
+from engine.bounding.bvh import STACK
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.exact_images import Vector, image_point, rounded
-from engine.collision.meshes.face_state import state_at
-from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, MeshBody, in_tree, mesh_body_of, triangle_of
+from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
+from engine.collision.meshes.parity import (
+    INSIDE,
+    OUTSIDE,
+    SLACK,
+    OwnPoint,
+    box_between,
+    locate_point,
+    next_face,
+    state_at,
+)
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
-from engine.collision.simple.ball_on_mesh import relate_balls
 from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
 from engine.compiling.direct import entry_of
+from engine.compiling.jit import allocating, inline, kernel
 from engine.containment.methods.rational_locate import rational_location
-from engine.predicates.rational import minus, squared_length
+from engine.predicates.rational import minus as difference
+from engine.predicates.rational import squared_length
+from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.registry import own_box
 from engine.solids.sphere import Sphere
-from engine.types import Location, Relation
+from engine.types import Location, Point3, Relation
+
+_MANY = 4096
+_SPREAD = 64
+
+
+@inline
+def _box_distance(t: Facet, center: Point3, slack: float) -> float:
+    """Return a lower bound on the square of the distance of a triangle's box, as `box_distance_bounds` does."""
+    square = 0.0
+    for c, p, q, r in (
+        (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),
+    ):  # fmt: skip
+        gap = max(max((min(p, q, r) - slack) - c, c - (max(p, q, r) + slack)), 0.0)
+        square += gap * gap
+    square = square * (1.0 - 2.0**-48) - 2.0**-1000
+    return square if np.isfinite(square) else 0.0
+
+
+@inline
+def _enters_ball(t: Facet, own: OwnPoint, radius: float) -> int:
+    """Tell whether a triangle surely enters the open ball: 1, surely keeps clear of the closed one: 0; else UNSETTLED.
+
+    The corners as seen from the centre are off by its error and a rounding, the distances by less than twice that.
+    """
+    t, none = seen_from(own.point, t), Point3(0.0, 0.0, 0.0)
+    center = Facet(none, none, none)
+    slack = 4.0 * rounding_of(t, center) + 2.0 * own.error + 2.0**-50 * radius
+    inner = radius - slack
+    if inner > 2.0**-500 and min(dot(t.p, t.p), dot(t.q, t.q), dot(t.r, t.r)) < inner * inner * (1.0 - 2.0**-49):
+        return 1
+    _, across = nearest_points(center, t, radius + 2.0 * slack)  # order: edges are measured from the ends of the first
+    return 1 if across.size < inner else (0 if across.low > radius + slack else UNSETTLED)
+
+
+@allocating
+def _first_to_enter(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
+    """Return the relation of the surface of a mesh and a ball as far as it is proven, DISJOINT or TOUCHING (a face
+    enters the ball), and of the faces that enter any, or where it is to be named the one of the nearest box, of equal
+    ones the first."""
+    center, error = own
+    sizes = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
+    local, slack = in_tree(mesh, center), SLACK + (error + 2.0**-48 * sizes) / mesh.scale
+    if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
+        return UNSETTLED, -1
+    box, stack = box_between(local, local, radius / mesh.scale + slack), np.empty(STACK, np.int32)
+    stack[0] = 0
+    best, found, unsure, box_slack = np.inf, -1, np.inf, 2.0**-50 * largest_of(center) + 2.0**-1070
+    reach = (radius + 2.0 * error) * (1.0 + 2.0**-40)
+    beyond = reach * reach + 2.0**-990  # what is as far from the rounded centre keeps clear of the ball
+    face, n = next_face(mesh, stack, 1, box)
+    while face >= 0:  # bound: the faces of the body
+        t = triangle_of(mesh, face)
+        square = _box_distance(t, center, box_slack)
+        if square <= beyond and (square < best or (square == best and face < found)):
+            how = _enters_ball(t, own, radius)
+            if how == 1:
+                best, found = square, face
+                if not is_named:
+                    return TOUCHING, found
+                within = np.sqrt(square * (1.0 + 2.0**-40) + 2.0**-990)  # of any box that bounds as near
+                box = box_between(local, local, within / mesh.scale + slack)
+            elif how == UNSETTLED:
+                unsure = min(unsure, square)
+        if flag[0] != 0:
+            return UNSETTLED, -1
+        face, n = next_face(mesh, stack, n, box)
+    if unsure <= best and unsure < np.inf:
+        return UNSETTLED, -1
+    return (DISJOINT if found < 0 else TOUCHING), found
+
+
+@inline
+def _holds(vertex: int, own: OwnPoint, radius: float, mesh: MeshArrays) -> int:
+    """Tell whether a vertex of a mesh surely lies in the open ball: 1, surely does not: 0; else UNSETTLED."""
+    v = minus(as_point3(mesh.vertices, vertex), own.point)
+    size = np.sqrt(dot(v, v))
+    slack = 2.0**-49 * (size + radius) + 2.0 * own.error + 2.0**-500
+    return 1 if size < radius - slack else (0 if size > radius + slack else UNSETTLED)
+
+
+@inline
+def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
+    """Tell whether all vertices of a mesh surely lie in the open ball: 1, one surely does not: 0; else UNSETTLED.
+
+    Some that are spread over the mesh are asked first: neighbours are alike.
+    """
+    n, result = mesh.vertices.shape[0], 1
+    for step in (n // _SPREAD + 1, 1):
+        for vertex in range(0, n, step):
+            held = _holds(vertex, own, radius, mesh)
+            if held == 0:
+                return 0
+            if held == UNSETTLED or (vertex % _MANY == 0 and flag[0] != 0):
+                result = UNSETTLED
+    return result
+
+
+@inline
+def _relate(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
+    relation, triangle = _first_to_enter(own, radius, mesh, is_named, flag)
+    if relation == DISJOINT:
+        where = locate_point(own, mesh) if mesh.has_inside else OUTSIDE
+        return (SECOND_INSIDE_FIRST if where == INSIDE else (DISJOINT if where == OUTSIDE else UNSETTLED)), -1
+    if relation == TOUCHING:
+        is_within = _holds_all(own, radius, mesh, flag)
+        if is_within != 0:
+            return (FIRST_INSIDE_SECOND if is_within == 1 else UNSETTLED), -1
+        return (OVERLAPPING if mesh.has_inside else TOUCHING), triangle
+    return UNSETTLED, -1
+
+
+@kernel
+def relate_balls(
+    mesh: MeshArrays, centers: FloatArray, radius: float, is_named: bool, found: IntArray, flag: FlagArray
+) -> None:
+    """Fill found (n, 2) int64 with the relation of a mesh (first) and a ball about each of centers (n, 4), a point and
+    how far each of its coordinates may be off, or UNSETTLED; and a triangle that enters it, where the relation is
+    overlapping, unless even-odd cancels that one, or touching; the one that names the contact if `is_named`.
+    """
+    for row in range(centers.shape[0]):
+        if flag[0] != 0:
+            found[row, 0] = UNSETTLED
+        else:
+            own = OwnPoint(as_point3(centers, row), float(centers[row, 3]))
+            found[row, 0], found[row, 1] = _relate(own, radius, mesh, is_named, flag)
+
 
 Moves = tuple[FloatArray, FloatArray] | None
 """Rotations (n, d, d) and translations (n, d); None for none."""
@@ -186,7 +331,7 @@ def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, wo
     unsure = np.flatnonzero(~(upper < rounded(limit) * (1.0 - 2.0**-50)))
     for vertex in unsure[np.argsort(-lower[unsure], kind="stable")].tolist():
         work.budget.check()
-        if squared_length(minus(boundary.exact(vertex), center)) >= limit:
+        if squared_length(difference(boundary.exact(vertex), center)) >= limit:
             return False
     return True
 
@@ -216,4 +361,4 @@ def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Pa
 
 
 def _farthest(center: Vector, corners: tuple[Vector, ...]) -> Fraction:
-    return max(squared_length(minus(p, center)) for p in corners)
+    return max(squared_length(difference(p, center)) for p in corners)

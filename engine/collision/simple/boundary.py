@@ -20,8 +20,8 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_point, rounded, value_at
 from engine.collision.meshes.exact_body import ExactBody, exact_pair, faces_in
 from engine.collision.meshes.exact_regions import cells_of, sides_at
-from engine.collision.meshes.face_state import state_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
+from engine.collision.meshes.parity import state_at
 from engine.collision.planar.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
 from engine.compiling.direct import entry_of

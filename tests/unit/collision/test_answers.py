@@ -11,8 +11,7 @@ import pytest
 import engine
 from engine import Aabb, HalfSpace, Pose, Relation, Solid
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import PAIRS, TAKEN, Answers, PlacedPair, accuracy_of, pair_function
-from engine.collision.detail import NO_DETAIL
+from engine.collision.collide import NO_DETAIL, PAIRS, TAKEN, Answers, PlacedPair, accuracy_of, pair_function
 from engine.collision.exact_images import as_vector, image_half_space, image_point, value_at
 from engine.collision.result import meets_as
 from engine.predicates.rational import dot
@@ -63,9 +62,9 @@ def test_every_pair_has_one_function(d: int) -> None:
     assert {*bodies} == {row.name for row in engine.solid_types.values() if d in row.meets}
     for first in bodies.values():
         for second in bodies.values():
-            function, is_swapped = pair_function(first, second)
+            function, parts, is_swapped = pair_function(first, second)
             kinds = (second, first) if is_swapped else (first, second)
-            assert PAIRS[d, *map(meets_as, kinds)] is function
+            assert PAIRS[d, *map(meets_as, kinds)] == (function, parts)
             assert is_swapped or pair_function(second, first)[0] is function or first.type == second.type
 
 

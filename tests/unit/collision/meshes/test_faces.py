@@ -10,7 +10,6 @@ import pytest
 from engine import Polyhedron, Pose, Surface, locate
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.exact_body import classify_exact
-from engine.collision.meshes.face_state import UNTOLD, inner_side, states_of
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
     STATE_CROSSED,
@@ -21,7 +20,7 @@ from engine.collision.meshes.mesh_arrays import (
 )
 from engine.collision.meshes.mesh_mesh import look_at_regions
 from engine.collision.meshes.mesh_pair import MeshPair
-from engine.collision.meshes.parity import locate_vertices
+from engine.collision.meshes.parity import UNTOLD, inner_side, locate_vertices, states_of
 from engine.collision.meshes.triangle_triangle import APART, COPLANAR
 from engine.collision.result import Work
 from engine.types import UNDECIDED

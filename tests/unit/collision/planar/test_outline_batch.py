@@ -8,9 +8,14 @@ import pytest
 from engine import Aabb, Polygon, Pose, Solid, Triangle, collide
 from engine.collision.batches import SceneBatches, scene_bodies
 from engine.collision.codes import UNSETTLED
-from engine.collision.planar import outline_batch
-from engine.collision.planar.outline import collide_outline_outline, parts_by_arrangement
-from engine.collision.planar.outline_batch import collide_outlines, outline_parts, outline_pool
+from engine.collision.planar import outline
+from engine.collision.planar.outline import (
+    collide_outline_outline,
+    collide_outlines,
+    outline_parts,
+    parts_by_arrangement,
+)
+from engine.collision.planar.outline_batch import outline_pool
 from engine.collision.result import Work
 from engine.running.budget import Budget
 
@@ -117,8 +122,8 @@ def test_contacts_are_decided_without_an_arrangement(unit: float, monkeypatch: p
         parts = parts_by_arrangement(first, second, poses, work)
         with monkeypatch.context() as patch:
             if answer.relation != answer.relation.OVERLAPPING or answer.witness.kind != "containment":
-                patch.setattr(outline_batch, "collide_outline_outline", None)
-            patch.setattr(outline_batch, "parts_by_arrangement", None)
+                patch.setattr(outline, "collide_outline_outline", None)
+            patch.setattr(outline, "parts_by_arrangement", None)
             assert collide_outlines(first, second, poses, work) == answer
             assert outline_parts(first, second, poses, work) == parts
         batches = SceneBatches(scene_bodies(bodies, list(poses)))

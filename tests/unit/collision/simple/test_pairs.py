@@ -11,7 +11,7 @@ import engine
 from engine import Aabb, HalfSpace, Polygon, Pose, Relation, Solid, Sphere, collide
 from engine.collision.result import Parts, Work
 from engine.collision.simple.against_ball import body_sphere_parts
-from engine.collision.simple.against_half_space import half_space_body_parts
+from engine.collision.simple.closed_forms import half_space_body_parts
 from tests.reference.shapes import box, union_of
 from tests.unit.collision.lattices import (
     COUNTS,

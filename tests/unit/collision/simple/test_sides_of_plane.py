@@ -10,8 +10,8 @@ from engine.collision.exact_images import as_vector, image_half_space, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.result import Work
 from engine.collision.simple import against_half_space
-from engine.collision.simple.against_half_space import _by_scan, _function_in_frame, collide_half_space_body, scan_sides
 from engine.collision.simple.boundary import first_triangle_at, pulled_back
+from engine.collision.simple.closed_forms import _by_scan, _function_in_frame, collide_half_space_body, scan_sides
 from engine.predicates.rational import sign_of
 
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
