@@ -1,5 +1,4 @@
-"""The bodies of a scene as arrays, and the batches that decide most of many pairs: boxes, outlines of the plane, balls
-and convex polyhedra, in kernels.
+"""The bodies of a scene as arrays, and the kernels that decide most of many pairs: boxes, outlines, balls, convex ones.
 
 Of a scene: which solid, where, and a box around each; no work per body beyond a few lookups. One table of pairs serves
 a scene and one body under many poses of another: rows, each a solid and a pose, and pairs of rows.
@@ -17,10 +16,10 @@ from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import TAKEN, check_pose, details_of_boxes, details_where_proven, pair_function
-from engine.collision.convex.body import ConvexBody, convex_body_of, pooled
-from engine.collision.convex.pair import relate_convex_pairs
+from engine.collision.convex_body import ConvexBody, convex_body_of, pooled
+from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.planar.outline_batch import outline_pool, relate_outline_pairs
+from engine.collision.outline_batch import outline_pool, relate_outline_pairs
 from engine.collision.simple.form_relations import relate_box_pairs
 from engine.compiling.direct import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError

@@ -1,4 +1,17 @@
-"""Relations as kernels write them: the values of `engine.types.Relation`, and what is left to be settled elsewhere."""
+"""The codes that kernels of collision write, all plain integers: relations here, others where the table says.
+
+| code | values | where |
+|---|---|---|
+| relation of two bodies | as `engine.types.Relation`, or UNSETTLED | here |
+| class of two faces | APART, CROSSING, UNDECIDED, CONTACT, COPLANAR; CORNER + 3 k + m | triangle_triangle |
+| ... looked at | JUDGED + 3 bits of corners a face; BESIDE + a bit a face, SAME_SIDE, OPPOSITE | touching, pose_batch |
+| kind of a contact | FACE_FACE ... CONTAINED, the places of names in STRENGTH, the strongest first | contact_kinds |
+| state of a face | STATE_UNKNOWN, STATE_CLEAN, STATE_CROSSED, STATE_STACKED, the worst last | mesh_arrays |
+| place of a point | OUTSIDE, 0 on a face, INSIDE, or UNDECIDED | parity |
+| what a search seeks, how it ends | SEEK_...; DONE, SETTLED, FULL, INTERRUPTED | dual_traversal |
+| two edges of the plane | APART, CROSSING, UNSURE, contacts; IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST | outline_batch |
+| two forms | relation + kind << KIND_AT + face << FACE_AT + face << THEIR_FACE_AT | form_relations |
+"""
 
 from __future__ import annotations
 

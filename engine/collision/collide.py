@@ -15,36 +15,14 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray
+from engine.collision import result
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh, mesh_parts
-from engine.collision.planar.outline import collide_outlines, live_edges, outline_of, outline_parts
-from engine.collision.result import (
-    BODIES,
-    FACES,
-    UNCOUNTED,
-    UNNAMED,
-    Collision,
-    PairFunction,
-    PartsFunction,
-    Poses,
-    Witness,
-    Work,
-    meets_as,
-)
+from engine.collision.outline import collide_outlines, live_edges, outline_of, outline_parts
+from engine.collision.simple import closed_forms as forms
 from engine.collision.simple.against_ball import body_sphere_parts, collide_body_sphere
 from engine.collision.simple.boundary import live_parts
-from engine.collision.simple.closed_forms import (
-    by_forms_or,
-    collide_form_sphere,
-    collide_half_space_body,
-    collide_half_space_sphere,
-    collide_half_spaces,
-    half_space_body_parts,
-    half_space_sphere_parts,
-    half_spaces_parts,
-    sphere_sphere_parts,
-)
 from engine.errors import (
     InvalidArrayError,
     InvalidInputError,
@@ -66,36 +44,37 @@ from engine.types import Accuracy, Rcc8, Relation
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
 
 
-_BODIES: dict[int, tuple[PairFunction, PartsFunction]] = {
-    3: (mesh_mesh, mesh_parts),
-    2: (collide_outlines, outline_parts),
-}
-PAIRS: dict[tuple[int, str, str], tuple[PairFunction, PartsFunction]] = {
-    **{(d, first, second): _BODIES[d] for d in (2, 3) for first in FACES[d] for second in FACES[d]},
-    **{(d, "half_space", body): (collide_half_space_body, half_space_body_parts) for d, body in BODIES},
-    **{(d, body, "sphere"): (collide_body_sphere, body_sphere_parts) for d, body in BODIES},
+_Functions = tuple[result.PairFunction, result.PartsFunction]
+_BODIES: dict[int, _Functions] = {3: (mesh_mesh, mesh_parts), 2: (collide_outlines, outline_parts)}
+PAIRS: dict[tuple[int, str, str], _Functions] = {
+    **{(d, first, second): _BODIES[d] for d in (2, 3) for first in result.FACES[d] for second in result.FACES[d]},
+    **{
+        (d, "half_space", body): (forms.collide_half_space_body, forms.half_space_body_parts)
+        for d, body in result.BODIES
+    },
+    **{(d, body, "sphere"): (collide_body_sphere, body_sphere_parts) for d, body in result.BODIES},
 }
 for _d, (_function, _parts) in _BODIES.items():
-    PAIRS[_d, "box", "box"] = by_forms_or(_function), _parts
-    PAIRS[_d, "box", "sphere"] = by_forms_or(collide_form_sphere), body_sphere_parts
-    PAIRS[_d, "half_space", "half_space"] = collide_half_spaces, half_spaces_parts
-    PAIRS[_d, "half_space", "sphere"] = collide_half_space_sphere, half_space_sphere_parts
-    PAIRS[_d, "sphere", "sphere"] = by_forms_or(collide_form_sphere), sphere_sphere_parts
+    PAIRS[_d, "box", "box"] = forms.by_forms_or(_function), _parts
+    PAIRS[_d, "box", "sphere"] = forms.by_forms_or(forms.collide_form_sphere), body_sphere_parts
+    PAIRS[_d, "half_space", "half_space"] = forms.collide_half_spaces, forms.half_spaces_parts
+    PAIRS[_d, "half_space", "sphere"] = forms.collide_half_space_sphere, forms.half_space_sphere_parts
+    PAIRS[_d, "sphere", "sphere"] = forms.by_forms_or(forms.collide_form_sphere), forms.sphere_sphere_parts
 """Dimension and as what two solids meet (`Row.meets`), in one order or both, to the functions of that pair: how the two
 lie to each other, and of two that overlap what lies outside the other."""
 
-_BY_TYPE: dict[tuple[int, str, int, str], tuple[PairFunction, PartsFunction, bool]] = {}
+_BY_TYPE: dict[tuple[int, str, int, str], tuple[result.PairFunction, result.PartsFunction, bool]] = {}
 """What `PAIRS` says of types that were asked about."""
 
 
-def pair_function(first: Solid, second: Solid) -> tuple[PairFunction, PartsFunction, bool]:
+def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, result.PartsFunction, bool]:
     """Return the functions of a pair and whether they want the two in the other order."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:
             return known
         if first.dimension == second.dimension:
-            one, other = meets_as(first), meets_as(second)
+            one, other = result.meets_as(first), result.meets_as(second)
             for key, is_swapped in (((first.dimension, one, other), False), ((first.dimension, other, one), True)):
                 if (functions := PAIRS.get(key)) is not None:
                     return _BY_TYPE.setdefault(types, (*functions, is_swapped))
@@ -125,24 +104,23 @@ def check_pose(pose: object, solid: Solid, name: str) -> None:
     if not isinstance(pose, Pose):
         raise InvalidArrayError(f"{name} must be a Pose or None, got {type(pose).__name__}", (name,))
     if pose.dimension != solid.dimension:
-        raise WrongDimensionError(
-            f"{name} has dimension {pose.dimension}, the {solid.type} it moves has {solid.dimension}", (name,)
-        )
+        message = f"{name} has dimension {pose.dimension}, the {solid.type} it moves has {solid.dimension}"
+        raise WrongDimensionError(message, (name,))
 
 
-def collide_pair(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
+def collide_pair(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the relation of two checked solids under checked poses, within the budget of `work`.
 
-    Two equal poses are left out: what moves together keeps its relation, although a rotation of floats is not quite
-    orthogonal and a ball's radius is kept under it.
+    Two equal poses are left out: what moves together keeps its relation, though rotations of floats stretch a bit.
     """
     if poses[0] is not None and poses[0] == poses[1]:
         poses = None, None
     function, _, is_swapped = pair_function(first, second)
-    answer = (
-        function(second, first, poses[::-1], work).swapped() if is_swapped else function(first, second, poses, work)
-    )
-    return answer if work.witness else UNNAMED[answer.relation]
+    if is_swapped:
+        answer = function(second, first, poses[::-1], work).swapped()
+    else:
+        answer = function(first, second, poses, work)
+    return answer if work.witness else result.UNNAMED[answer.relation]
 
 
 class CollideOptions(Options, total=False):
@@ -158,11 +136,11 @@ class CollideOptions(Options, total=False):
 @overload
 def collide(
     first: Solid, second: Solid, *, report: Literal[False] = False, **options: Unpack[CollideOptions]
-) -> Collision: ...
+) -> result.Collision: ...
 @overload
 def collide(
     first: Solid, second: Solid, *, report: Literal[True], **options: Unpack[CollideOptions]
-) -> tuple[Collision, Accuracy]: ...
+) -> tuple[result.Collision, Accuracy]: ...
 def collide(
     first: Solid,
     second: Solid,
@@ -177,7 +155,7 @@ def collide(
     cancel: Cancel | None = None,
     progress: Progress | None = None,
     report: bool = False,
-) -> Collision | tuple[Collision, Accuracy]:
+) -> result.Collision | tuple[result.Collision, Accuracy]:
     """Decide how two solids lie to each other, exactly, and name one reason.
 
     Solids are closed sets. The first true line decides: no common point, disjoint; the first within the open interior
@@ -219,27 +197,27 @@ def collide(
         check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)
     is_named, poses = witness and not boolean, (first_pose, second_pose)
     if deadline is None and cancel is None and progress is None and not (detail or report):
-        return collide_pair(first, second, poses, UNCOUNTED[bool(is_named), bool(boolean)])
+        return collide_pair(first, second, poses, result.UNCOUNTED[bool(is_named), bool(boolean)])
     pair_function(first, second)
     if detail:
         check_has_detail(((("first",), first), (("second",), second)), boolean)
     with Budget(deadline, cancel) as budget:
         budget.check()
-        work = Work(budget, witness=is_named, boolean=boolean)
-        result = collide_pair(first, second, poses, work)
+        work = result.Work(budget, witness=is_named, boolean=boolean)
+        answer = collide_pair(first, second, poses, work)
         if detail:
-            named = detail_of(first, second, poses, result.relation, work)
-            result = Collision(result.relation, result.witness, named)
+            named = detail_of(first, second, poses, answer.relation, work)
+            answer = result.Collision(answer.relation, answer.witness, named)
     if progress is not None:
         progress(1)
     if not report:
-        return result
+        return answer
     method = "+".join(sorted({first.type, second.type}))
-    return result, Accuracy("exact", None, 1, work.n_beyond_filter, work.n_rational, method)
+    return answer, Accuracy("exact", None, 1, work.n_beyond_filter, work.n_rational, method)
 
 
-Witnesses = list[Witness | None]
-PlacedPair = tuple[Solid, Solid, Poses]
+Witnesses = list[result.Witness | None]
+PlacedPair = tuple[Solid, Solid, result.Poses]
 
 
 @dataclass(slots=True, eq=False)
@@ -255,7 +233,7 @@ class Answers:
     relations: Int8Array
     witnesses: Witnesses | None
     details: Int8Array | None
-    works: list[Work] = field(default_factory=list)
+    works: list[result.Work] = field(default_factory=list)
 
     def left(self, start: int = 0, stop: int | None = None) -> IntArray:
         """Return the pairs of a range to be settled one by one: open ones, and those whose witness is asked for yet."""
@@ -268,7 +246,7 @@ class Answers:
 
     def settle(self, items: IntArray, pair_of: Callable[[int], PlacedPair]) -> None:
         """Fill the answers of some pairs by `collide_pair`; threads may settle different pairs."""
-        work = Work(self.budget, witness=self.witnesses is not None, boolean=self.boolean)
+        work = result.Work(self.budget, witness=self.witnesses is not None, boolean=self.boolean)
         self.works.append(work)
         for item in items.tolist():
             self.budget.check()
@@ -282,7 +260,7 @@ class Answers:
                 self.details[item] = NO_DETAIL if named is None else named
 
 
-def accuracy_of(n_pairs: int, n_open: int, works: list[Work], method: str) -> Accuracy:
+def accuracy_of(n_pairs: int, n_open: int, works: list[result.Work], method: str) -> Accuracy:
     """Return the report on many pairs; n_open: those that batches left, all of them beyond a filter."""
     beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
     return Accuracy("exact", None, n_pairs, max(beyond, n_open), rational, method)
@@ -328,7 +306,7 @@ def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relatio
     return np.where(relations == Relation.OVERLAPPING, split, _WHERE_PROVEN[relations]).astype(np.int8)
 
 
-def detail_of(first: Solid, second: Solid, poses: Poses, relation: Relation, work: Work) -> Rcc8 | None:
+def detail_of(first: Solid, second: Solid, poses: result.Poses, relation: Relation, work: result.Work) -> Rcc8 | None:
     """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
     if relation != Relation.OVERLAPPING:
         if not (has_interior(first, work.budget) and has_interior(second, work.budget)):

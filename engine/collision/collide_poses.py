@@ -9,20 +9,9 @@ from typing import Any
 import numpy as np
 
 from engine.arrays import FloatArray, Int8Array, IntArray, read_only
+from engine.collision import collide as one_pair
 from engine.collision.batches import posed_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
-from engine.collision.collide import (
-    NO_DETAIL,
-    Answers,
-    PlacedPair,
-    Witnesses,
-    accuracy_of,
-    check_has_detail,
-    collide_pair,
-    details_where_proven,
-    has_interior,
-    pair_function,
-)
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.dual_traversal import PIERCING
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, STILL, mesh_body_of
@@ -44,9 +33,10 @@ from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion
 from engine.solids.sphere import Sphere
 from engine.types import Accuracy
 
-PoseCollisions = (
-    Int8Array | tuple[Int8Array, Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, Witnesses, Int8Array]
+_Answers = (
+    tuple[Int8Array, one_pair.Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, one_pair.Witnesses, Int8Array]
 )
+PoseCollisions = Int8Array | _Answers
 
 
 def collide_poses(
@@ -87,9 +77,9 @@ def collide_poses(
     are_plain = type(report) is type(witnesses) is type(boolean) is type(detail) is bool
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
-    pair_function(first, second)
+    one_pair.pair_function(first, second)
     if detail:
-        check_has_detail(((("first",), first), (("second",), second)), boolean)
+        one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
     n_poses = len(poses.rotations)
     if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
@@ -98,20 +88,20 @@ def collide_poses(
         return (relations, [one.witness]) if witnesses else relations
     with Budget(deadline, cancel) as budget:
         budget.check()
-        has_detail = detail and has_interior(first, budget) and has_interior(second, budget)
-        details, relations = np.full(n_poses, NO_DETAIL, np.int8), np.full(n_poses, UNSETTLED, np.int8)
-        found: Witnesses | None = [None] * n_poses if witnesses else None
-        answers = Answers(budget, bool(boolean), relations, found, details if has_detail else None)
+        has_detail = detail and one_pair.has_interior(first, budget) and one_pair.has_interior(second, budget)
+        details, relations = np.full(n_poses, one_pair.NO_DETAIL, np.int8), np.full(n_poses, UNSETTLED, np.int8)
+        found: one_pair.Witnesses | None = [None] * n_poses if witnesses else None
+        answers = one_pair.Answers(budget, bool(boolean), relations, found, details if has_detail else None)
         fill = batch_of(first, second, poses, answers)
 
-        def pair_of(item: int) -> PlacedPair:
+        def pair_of(item: int) -> one_pair.PlacedPair:
             return first, second, (None, Pose.of_checked(poses.rotations[item], poses.translations[item]))
 
         def task(start: int, stop: int) -> None:
             if fill is not None:
                 fill(start, stop)
             if has_detail:
-                details[start:stop] = details_where_proven(relations[start:stop])
+                details[start:stop] = one_pair.details_where_proven(relations[start:stop])
             answers.settle(answers.left(start, stop), pair_of)
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
@@ -119,7 +109,7 @@ def collide_poses(
     result: Any = parts if len(parts) > 1 else relations
     if not report:
         return result
-    return result, accuracy_of(n_poses, 0, answers.works, "+".join(sorted({first.type, second.type})))
+    return result, one_pair.accuracy_of(n_poses, 0, answers.works, "+".join(sorted({first.type, second.type})))
 
 
 _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
@@ -137,7 +127,7 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
         if isinstance(answer, Collision):
             return answer
     pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
-    return collide_pair(first, second, (None, pose), work)
+    return one_pair.collide_pair(first, second, (None, pose), work)
 
 
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
@@ -169,7 +159,9 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
 _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 
 
-def batch_of(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None] | None:
+def batch_of(
+    first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
+) -> Callable[[int, int], None] | None:
     """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
@@ -214,7 +206,9 @@ _SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in 
 """What a relation, or UNSETTLED as the last, is for the two bodies in the other order."""
 
 
-def _ball_batch(first: Solid, second: Solid, poses: PoseArrays, answers: Answers) -> Callable[[int, int], None]:
+def _ball_batch(
+    first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
+) -> Callable[[int, int], None]:
     """Return the kernel task for a ball and a mesh over a range of poses; what floats do not prove is UNSETTLED."""
     is_swapped = isinstance(first, Sphere)
     body, ball = (second, first) if is_swapped else (first, second)

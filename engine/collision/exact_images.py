@@ -1,8 +1,7 @@
 """Exact images of points and half-spaces under a pose, as rationals.
 
-A pose maps p to R p + t, R and t taken as the exact numbers they are. R is not quite orthogonal, so the image of the
-half-space n . p + d >= 0 is that of the affine map: with A the adjugate of R, R^-1 = A / det R and det R > 0, it is
-(n A) . q + (d det R - (n A) . t) >= 0.
+A pose maps p to R p + t, R and t exact. R is not quite orthogonal, so the image of the half-space n . p + d >= 0 is
+that of the affine map: with A = R^-1 det R the adjugate and det R > 0, (n A) . q + (d det R - (n A) . t) >= 0.
 """
 
 from __future__ import annotations

@@ -21,8 +21,7 @@ Kind = Literal[
     "vertex_vertex", "vertex_edge", "vertex_face", "edge_edge", "edge_face", "face_face", "containment", "surface"
 ]
 """The features of the two faces that meet; `containment` where a body, or a part of it, lies inside the other without
-contact. Edges are those of the triangles that a face was cut into; `surface` where a body without faces (sphere,
-half-space) takes part in the contact."""
+contact. Edges are those of the triangles that a face was cut into; `surface` where a body has none."""
 
 
 Poses = tuple[Pose | None, Pose | None]
@@ -30,10 +29,8 @@ Poses = tuple[Pose | None, Pose | None]
 Containing = Literal["", "first", "second"]
 
 _SWAPPED: dict[Containing, Containing] = {"": "", "first": "second", "second": "first"}
-SWAPPED_RELATION = {
-    Relation.FIRST_INSIDE_SECOND: Relation.SECOND_INSIDE_FIRST,
-    Relation.SECOND_INSIDE_FIRST: Relation.FIRST_INSIDE_SECOND,
-}
+_IN, _AROUND = Relation.FIRST_INSIDE_SECOND, Relation.SECOND_INSIDE_FIRST
+SWAPPED_RELATION = {_IN: _AROUND, _AROUND: _IN}
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +100,7 @@ OVERLAP, TOUCH = Collision(Relation.OVERLAPPING, Witness("surface")), Collision(
 class Parts(NamedTuple):
     """What of two bodies lies outside the other, for bodies whose open interiors meet.
 
-    first, second: whether some of that body's open interior lies outside the other one. meet: whether the boundaries
-    have a common point.
+    first, second: does some of that body's open interior lie outside the other. meet: do the boundaries meet.
     """
 
     first: bool
@@ -120,12 +116,10 @@ class Parts(NamedTuple):
 class Work:
     """What one pair may spend, what it must find out, and what it counts.
 
-    budget: poll `budget.check()` in slow loops; kernels poll `budget.flag`.
-    witness: False where only the relation is wanted.
-    boolean: True where disjoint or not is all that is wanted: any relation but disjoint may then be answered as
-    touching.
-    n_beyond_filter, n_rational: decisions (faces pairs, points) that the filter, and the compiled exact
-    stage, left open.
+    budget: poll `budget.check()` in slow loops; kernels poll `budget.flag`. witness: False where only the relation is
+    wanted. boolean: True where disjoint or not is all that is wanted: any relation but disjoint may then be answered as
+    touching. n_beyond_filter, n_rational: decisions (pairs of faces, points) that the filter, the compiled exact stage,
+    left open.
     """
 
     budget: Budget = field(default_factory=Budget)

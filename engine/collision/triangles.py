@@ -19,7 +19,7 @@ from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, S
 from engine.collision.meshes.exact_body import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
 from engine.collision.meshes.triangle_triangle import APART, Facet, classify, classify_near, facet_at, with_pose
-from engine.collision.planar.outline import collide_outline_outline
+from engine.collision.outline import collide_outline_outline
 from engine.collision.result import Work
 from engine.compiling.jit import allocating_kernel, inline, kernel, merged
 from engine.errors import InvalidArrayError, WrongDimensionError
@@ -69,18 +69,14 @@ def against_edge(p: Point2, q: Point2, u: Facet) -> int:
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
     """Return how u lies to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors apart."""
-    first = against_edge(t.p, t.q, u)
-    if first in (UNSETTLED, DISJOINT):
-        return first
-    second = against_edge(t.q, t.r, u)
-    if second in (UNSETTLED, DISJOINT):
-        return second
-    third = against_edge(t.r, t.p, u)
-    if third in (UNSETTLED, DISJOINT):
-        return third
-    if first == SECOND_INSIDE_FIRST and second == SECOND_INSIDE_FIRST and third == SECOND_INSIDE_FIRST:
-        return SECOND_INSIDE_FIRST
-    return TOUCHING if first == TOUCHING or second == TOUCHING or third == TOUCHING else OVERLAPPING
+    n_within, found = 0, OVERLAPPING
+    for p, q in ((t.p, t.q), (t.q, t.r), (t.r, t.p)):
+        how = against_edge(p, q, u)
+        if how in (UNSETTLED, DISJOINT):
+            return how
+        n_within += how == SECOND_INSIDE_FIRST
+        found = TOUCHING if how == TOUCHING else found
+    return SECOND_INSIDE_FIRST if n_within == 3 else found
 
 
 @inline

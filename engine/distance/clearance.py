@@ -14,16 +14,7 @@ from engine.collision.collide_poses import as_poses, batch_of
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
-from engine.distance.forms import (
-    MEETING,
-    STILL2,
-    are_small,
-    between_form_and_plane,
-    between_forms,
-    between_outlines,
-    gap_of_planes,
-    told_under_poses,
-)
+from engine.distance import forms
 from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
@@ -138,12 +129,7 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
     if least == 0.0:
         return True
     planes = has_plane(first, second)
-    if planes:
-        closed = between_form_and_plane(first, second, poses, least)
-    else:
-        closed = between_forms(first, second, poses, least)
-        if closed is None:
-            closed = between_outlines(first, second, poses, least)
+    closed = (forms.between_form_and_plane if planes else forms.between_forms)(first, second, poses, least)
     if closed is not None:
         return closed
     if least is not None and not planes:
@@ -151,10 +137,10 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
         spread_pair(first, second, poses, budget).fill(0, 1, answers, Fraction(least))
         return bool(answers[0] > 0.0) and not do_meet(first, second, poses, budget)
     if do_meet(first, second, poses, budget):
-        return MEETING if least is None else False
+        return forms.MEETING if least is None else False
     if not planes:
         return spread_pair(first, second, poses, budget).clearance(0)
-    gap, features = gap_of_planes(first, second, poses, budget)
+    gap, features = forms.gap_of_planes(first, second, poses, budget)
     return gap.clearance(features, first.dimension) if least is None else gap.is_at_least(Fraction(least))
 
 
@@ -221,7 +207,7 @@ class _Batch:
         self.relations = np.full(n_poses, UNSETTLED, np.int8)
         self.relate = batch_of(first, second, poses, Answers(budget, True, self.relations, None, None))
         self.spread = None if has_plane(first, second) or not n_poses else in_space(poses.rotations, poses.translations)
-        self.is_small = self.spread is not None and are_small(first, second)
+        self.is_small = self.spread is not None and forms.are_small(first, second)
         self.n_exact = 0
 
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
@@ -230,8 +216,8 @@ class _Batch:
             self.relate(start, stop)
         if self.is_small:
             turns, moves = read_only(self.poses.rotations[start:stop]), read_only(self.poses.translations[start:stop])
-            motions = *STILL2, turns, moves
-            answers[start:stop] = told_under_poses(self.first, self.second, motions, least, self.budget)
+            motions = *forms.STILL2, turns, moves
+            answers[start:stop] = forms.told_under_poses(self.first, self.second, motions, least, self.budget)
         left = start + np.flatnonzero(np.isnan(answers[start:stop]))
         for item in left.tolist():
             self.budget.check()
@@ -241,7 +227,7 @@ class _Batch:
             if self.relations[item] != DISJOINT:
                 answers[item] = 0.0
             elif self.spread is None:
-                gap, _ = gap_of_planes(self.first, self.second, self._poses(item), self.budget)
+                gap, _ = forms.gap_of_planes(self.first, self.second, self._poses(item), self.budget)
                 answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
         if self.spread is None:
             self.n_exact += len(left)

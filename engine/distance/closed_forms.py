@@ -1,5 +1,4 @@
-"""Double-doubles as one value (`double_double.py` with its bounds), and how far apart boxes along the axes, balls and
-half-spaces are: a few sums and one root of such.
+"""Double-doubles as one value (`double_double.py` has bounds); clearance of boxes along the axes, balls, half-spaces.
 
 A box is an interval on each axis, a ball one without length and a radius about it. On each axis two of them are apart,
 or share an interval: the distance is the root of the squares of what parts them, less the radii. Where they share
@@ -7,8 +6,7 @@ intervals every point of those is as near, and `_ends_of_shared` chooses.
 
 **Bound.** A coordinate of a body that is not turned, shifted or not, is a double-double without error; a turned centre
 is off by `error`. A difference of two is off by 3 u^2 of itself (and by `error`), not at all where both are doubles;
-squares, their sum and its root together are below 32 u^2 of the root. What the bounds leave open (a tie, a contact or
-almost, exponents) is left to the search.
+squares, their sum and its root together are below 32 u^2 of the root. What bounds leave open is left to the search.
 """
 
 from __future__ import annotations
@@ -73,8 +71,7 @@ def product(a: float, b: float) -> Wide:
 def root(a: Wide) -> Wide:
     """Return the root of a positive number, within 4 u^2 of itself but for half of the relative error of a.
 
-    With h the rounded root, sqrt(a) = h + (a - h^2) / 2h but for (u h)^2 / 2h; the difference is below 2.1 u h^2 and
-    loses two roundings.
+    With h the rounded root, sqrt(a) = h + (a - h^2) / 2h but for (u h)^2 / 2h; it is < 2.1 u h^2, rounded twice.
     """
     h = np.sqrt(a.h)
     p, e = two_prod(h, h)
@@ -113,8 +110,7 @@ _GAPS, _ROOM = 24, 30
 def _touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
     """Return on which sides of an axis each of two boxes has nearest points, low 1, high 2.
 
-    up, down: the signs of the second's low less the first's high, and of the first's low less the second's high; lows,
-    highs: of the first's bounds less the second's.
+    up, down: signs of the second's low less the first's high, and so on; lows, highs: of bounds less theirs.
     """
     if up > 0:
         return 2, 1
@@ -194,8 +190,7 @@ def gap_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, w: Any,
 ) -> tuple[float, int, int, Wide, float]:  # fmt: skip
-    """Return the distance, 0.0 where they surely meet, or UNSURE; on which faces the nearest points lie; the root; and
-    the error of coordinates.
+    """Return the distance, 0.0 where they surely meet, or UNSURE; faces with nearest points; the root; the error.
 
     w (30,): work space, of the bounds of both forms, then of the gap on each axis.
     """

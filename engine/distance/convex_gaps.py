@@ -4,7 +4,7 @@ Of the differences M = {a - b} of two bodies the point nearest to the origin is 
 furthest toward the origin is added to a simplex of at most three corners, of which those stay that the nearest point
 of all needs. Whatever direction that gives, the slab across it parts the bodies: all vertices are looked at.
 
-**Clear** is proven as *apart* is in `convex/pair.py`, by a slab wider than the gap; **near** by two points, each off by
+**Clear** is proven as *apart* is in `convex_pair.py`, by a slab wider than the gap; **near** by two points, each off by
 the error of a placed point and 2^-48 of the largest corner of M, which covers their weights. The distance itself is
 that of the nearest points of the two features that the last simplex names, bounded as in `refined.py`.
 
@@ -19,8 +19,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.collision.convex.body import ASIDE, CENTER, REACH, ConvexArrays, point_of
-from engine.collision.convex.pair import PlacedBody, farthest, inner_point, largest, placed_body
+from engine.collision.convex_body import ASIDE, CENTER, REACH, ConvexArrays, point_of
+from engine.collision.convex_pair import PlacedBody, farthest, inner_point, largest, placed_body
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays, placed, turned_back
 from engine.collision.meshes.triangle_triangle import Facet
@@ -115,9 +115,8 @@ def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: fl
     """Return a lower bound on the distance of two bodies: the slab between them across v."""
     d = negative(v)
     size = abs(d.x) + abs(d.y) + abs(d.z)
-    return (-(largest(pool.points, a, d) + largest(pool.points, b, v)) - 2.25 * error * size) / (
-        length(d) * (1.0 + 2.0**-50)
-    )
+    gap = -(largest(pool.points, a, d) + largest(pool.points, b, v)) - 2.25 * error * size
+    return gap / (length(d) * (1.0 + 2.0**-50))
 
 
 @merged
@@ -136,10 +135,8 @@ def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b:
         square = dot(v, v)
         if not square > _SMALLEST:
             return np.nan
-        if (
-            not is_measured
-            and np.sqrt(square) - a.round - b.round + error + 2.0**-46 * (reach + a.round + b.round) < gap
-        ):
+        most = np.sqrt(square) - a.round - b.round + error + 2.0**-46 * (reach + a.round + b.round)
+        if not is_measured and most < gap:
             return 0.0
         corner, along = _start(pool, a, b, v)
         reach = max(reach, largest_of(corner.at))

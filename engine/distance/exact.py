@@ -2,8 +2,8 @@
 
 Corners are integers on the lattice of the pair (exact_body.py). Of the two features that floats suggest the nearest
 points of their lines or planes are found, as integers over a denominator. They are the nearest of the triangles exactly
-if they lie on them and both triangles lie beyond the planes across their connection (the triangles are convex); where
-that fails, all pairs of features are tried.
+if they lie on them and both triangles lie beyond the planes across their connection (both are convex); else all pairs
+of features are tried.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Boxes along the axes, balls and half-spaces: how far apart, by `closed_forms.py`, where that is sure. Small bodies of
-the plane by `outlines.py`.
+"""Clearance of boxes along the axes, balls, half-spaces (`closed_forms.py`), small bodies of the plane (`outlines.py`).
 
-A linear function over a body is largest at a vertex: of a half-space and any body floats leave the vertices that may be
-it, rationals decide.
+A linear function over a body is largest at a vertex: against a half-space floats leave some, rationals decide.
 """
 
 from __future__ import annotations
@@ -63,21 +61,32 @@ def _told(distance: float, least: float | None) -> Clearance | bool | None:
 
 
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of two forms, or whether it is at least `least`; None where that is not sure."""
-    if first.type not in FORMS or second.type not in FORMS:
+    """Return the clearance of two forms or small bodies of the plane, or whether it is at least `least`; or None."""
+    d, (pose, their_pose) = first.dimension, poses
+    if first.type in FORMS and second.type in FORMS:
+        form, other = form_of(first), form_of(second)
+        if form is not None and other is not None:
+            points, motions = np.empty((2, d)), (motion_of(pose, d), motion_of(their_pose, d))
+            distance, faces, theirs = entry_of(nearest_of_forms)(form, *motions[0], other, *motions[1], points)
+            told = _told(distance, least)
+            if told is None and distance > 0.0 and faces >= 0 and least is None:
+                return _answer(distance, points, _named(first, faces), _named(second, theirs))
+            if told is not None:
+                return told
+    if d == 3:
         return None
-    form, other = form_of(first), form_of(second)
-    if form is None or other is None:
+    (at, after, radius, names), (there, next_there, their_radius, their_names) = outline_of(first), outline_of(second)
+    if len(at) * len(there) > _MOST_PAIRS:
         return None
-    d = first.dimension
-    points, own, their = np.empty((2, d)), motion_of(poses[0], d), motion_of(poses[1], d)
-    distance, faces, theirs = entry_of(nearest_of_forms)(form, *own, other, *their, points)
-    told = _told(distance, least)
-    if told is not None:
-        return told
-    if distance > 0.0 and faces >= 0 and least is None:
-        return _answer(distance, points, _named(first, faces), _named(second, theirs))
-    return None
+    own = STILL2 if pose is None else (pose.rotation[None], pose.translation[None])
+    their = STILL2 if their_pose is None else (their_pose.rotation[None], their_pose.translation[None])
+    points = np.empty((2, 2))
+    distance, faces, theirs = entry_of(nearest_under_poses)(
+        at, after, radius, *own, there, next_there, their_radius, *their, _NONE, points, UNLIMITED.flag
+    )
+    if faces < 0 or least is not None:
+        return _told(distance, least)
+    return _answer(distance, points, names[faces], their_names[theirs])
 
 
 def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
@@ -95,24 +104,6 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
     if is_second:
         return _answer(distance, points[::-1].copy(), _named(body, faces), PLANE)
     return _answer(distance, points, PLANE, _named(body, faces))
-
-
-def between_outlines(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return what `between_forms` does, of two bodies of the plane; None where that is not sure, or they are large."""
-    if first.dimension == 3:
-        return None
-    one, other = outline_of(first), outline_of(second)
-    if len(one[0]) * len(other[0]) > _MOST_PAIRS:
-        return None
-    motions = [STILL2 if at is None else (at.rotation[None], at.translation[None]) for at in poses]
-    points = np.empty((2, 2))
-    distance, own, theirs = entry_of(nearest_under_poses)(
-        *one[:3], *motions[0], *other[:3], *motions[1], _NONE, points, UNLIMITED.flag
-    )
-    if own < 0 or least is not None:
-        return _told(distance, least)
-    points.setflags(write=False)
-    return Clearance(distance, points, (one[3][own], other[3][theirs]))
 
 
 STILL2: Final = tuple(array[None] for array in motion_of(None, 2))

@@ -1,8 +1,7 @@
 """How far apart two small bodies of the plane are, polygons, triangles, boxes and balls: every vertex and every edge.
 
 Outlines that do not cross are nearest at a vertex of one and an edge of the other, or its end. Doubles leave the pairs
-that may be it; double-doubles (`vertex_edge.py`) rank those and say whether the distance is sure, and of one pair;
-where edges are parallel a tie is proven.
+that may be it; double-doubles (`vertex_edge.py`) rank those and say what is sure; ties of parallel edges are proven.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.planar.outline_batch import BLOCK, inside, n_blocks, relate_placed
+from engine.collision.outline_batch import BLOCK, inside, n_blocks, relate_placed
 from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, measure, minus2, place, point
@@ -154,9 +153,8 @@ def _least_face(following: IntArray, vertex: int) -> int:
 def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tuple[Found, bool]:
     """Return the distance of a vertex of `a` from an edge of `b`, and whether the place of its foot is sure."""
     end = b.following[edge]
-    distance, bound, where = measure(
-        point(a.points, vertex), point(b.points, edge), point(b.points, end), a.error + b.error
-    )
+    p, c, d = point(a.points, vertex), point(b.points, edge), point(b.points, end)
+    distance, bound, where = measure(p, c, d, a.error + b.error)
     feature, face = len(b.following) + edge, edge
     if where == 0 or where == 1:
         feature = edge if where == 0 else end
@@ -259,9 +257,8 @@ def _are_parted(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
 
 @called
 def _related(a: Placed, b: Placed, error: float) -> int:
-    relation, _, _, _, _ = relate_placed(
-        a.points, a.following, a.following[:0], b.points, b.following, b.following[:0], b.boxes, error
-    )
+    own, their, none = a.following, b.following, a.following[:0]
+    relation, _, _, _, _ = relate_placed(a.points, own, none, b.points, their, none, b.boxes, error)
     return -1 if relation == UNSETTLED else (1 if relation == DISJOINT else 0)
 
 
@@ -364,9 +361,8 @@ def nearest_under_poses(
             break
         if item < len(turns):
             error, reach = place(vertices, following, turns[item], moves[item], at, boxes)
-        their_error, their_reach = place(
-            other, their_following, their_turns[item], their_moves[item], their_at, their_boxes
-        )
+        turn, move = their_turns[item], their_moves[item]
+        their_error, their_reach = place(other, their_following, turn, move, their_at, their_boxes)
         a = Placed(at, following, boxes, error, reach)
         b = Placed(their_at, their_following, their_boxes, their_error, their_reach)
         nearest = _nearest(a, b, radius, their_radius, points)

@@ -2,8 +2,7 @@
 one pair of features without a tie is left, the nearest points.
 
 Of each pair of triangles the nearest points of its two features are found as convex combinations of corners, so they
-lie on the triangles but for rounding: their distance bounds that of the pair from above, and the slab across the line
-between them from below, whatever the points are.
+lie on the triangles but for rounding: their distance bounds that of the pair from above, the slab between from below.
 
 **Bound.** Coordinates are products of two doubles, exact, and sums of seven such, each sum off by 4 u^2 of all terms; a
 point takes six operations more, a slab eight, each on numbers below twice `size`, which bounds all coordinates. All
@@ -236,8 +235,7 @@ def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
 
 @called
 def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int) -> tuple[float, int]:
-    """Bound n candidates again and leave out those that are none; return the double nearest to the distance, -1.0 where
-    that is not sure, and how many are left.
+    """Bound n candidates again and leave out those that are none; return the rounded distance, -1.0 if unsure, and n.
 
     start, other: the translations of both bodies (3,). radii: about either, times the unit.
     """
@@ -321,10 +319,9 @@ def certify(
     slack, way, back = _SLACK + 16.0 * error, less3(q, p), less3(p, q)
     if not (inside > _SLACK and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
         return False
-    if not (
-        _are_strictly_beyond(s.a, pairs[0, 0], here, t, way, p, slack)
-        and _are_strictly_beyond(s.b, pairs[0, 1], there, u, back, q, slack)
-    ):
+    if not _are_strictly_beyond(s.a, pairs[0, 0], here, t, way, p, slack):
+        return False
+    if not _are_strictly_beyond(s.b, pairs[0, 1], there, u, back, q, slack):
         return False
     is_sure = _write(s.a, here, p, way, radii[0], start, error, points[0])
     return _write(s.b, there, q, back, radii[1], start, error, points[1]) and is_sure

@@ -1,7 +1,6 @@
 """Two bodies given by triangles and radii: the search over both trees, then the exact stage for what it leaves.
 
-A ball is its centre and its radius; a body of the plane is its edges, in space at z = 0, each a triangle of no area.
-Built once per solid, lazily.
+A ball is its centre and its radius; a body of the plane is its edges, at z = 0, as triangles without area. Kept.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from engine.collision.meshes.mesh_arrays import (
 )
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.planar.outline_batch import outline_arrays
+from engine.collision.outline_batch import outline_arrays
 from engine.collision.result import Clearance, Feature, Poses
 from engine.compiling.direct import entry_of
 from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls

@@ -6,8 +6,7 @@ pairs of triangles that may be near are told eight at once and bounded from both
 upper bound so far ends the search once no pair that waits is below it. What is returned are all pairs of triangles
 whose lower bound does not exceed the least upper bound: the distance of the bodies is that of one of them.
 
-limits (2,) of a search: pairs above the first are not looked for (it falls to the least upper bound found); a pair
-below the second ends it as CLOSER.
+limits (2,): pairs above the first, which falls to the least upper bound, are not wanted; one below the second: CLOSER.
 
 Source: G. Hjaltason, H. Samet, Incremental distance join algorithms for spatial databases, 1998 (the order); E. Larsen,
 S. Gottschalk, M. Lin, D. Manocha, Fast distance queries with rectangular swept sphere volumes, 2000 (the descent).
@@ -57,8 +56,7 @@ DONE: Final = 0
 FULL: Final = 1
 CLOSER: Final = 2
 INTERRUPTED: Final = 3
-"""How a search ended: with all pairs; without room for more pairs of boxes or triangles; with two points nearer than
-asked; by the flag."""
+"""How a search ended: with all pairs; without room for more; with two points nearer than asked; by the flag."""
 _ABOVE_ONE: Final = 1.0 + 2.0**-22
 
 
@@ -129,8 +127,7 @@ _LARGEST: Final = 1e300
 
 class Asked(NamedTuple):
     """What is wanted: the least distance of pairs of triangles up to `most`, or whether some is below `enough`; the
-    radii about the triangles; what bounds sums of coordinates of both bodies but for the translations; whether
-    candidates are wanted where the answer is sure."""
+    radii about the triangles; a bound on sums of their coordinates; whether candidates are wanted of sure answers."""
 
     most: float
     enough: float
@@ -227,8 +224,7 @@ def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
     asked: Asked, answers: FloatArray, room: Room, flag: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Answer for the poses of both bodies from span[0] to span[1] whose answers (n,) are NaN; the first may have but
-    one.
+    """Answer for the poses of both bodies, or one of the first, from span[0] to span[1] whose answers (n,) are NaN.
 
     Returns the first pose that is left, how its search ended, and the number of the pairs of triangles in `room.found`
     that may be the nearest; span[1] where none is left. An answer is the double nearest to the distance; where a limit

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrays import FloatArray, IntArray
-from engine.collision.planar.outline_batch import box_blocks
+from engine.collision.outline_batch import box_blocks
 from engine.compiling.jit import called, inline
 from engine.distance.closed_forms import Wide, less, over, plus, product, root, times
 from engine.predicates.vectors import as_point2
@@ -50,8 +50,7 @@ def place(
 ) -> tuple[float, float]:
     """Write the points and boxes of an outline under a pose; return the last two of `Placed`.
 
-    Each sum of three is off by 12 u^2 of its terms. Where axes are turned onto axes sums are exact, and where each is a
-    double that is what is given.
+    Each sum of three is off by 12 u^2 of its terms. Axes turned onto axes: exact sums, given where doubles.
     """
     reach, is_given = 0.0, True
     for k in range(2):
@@ -153,8 +152,8 @@ def _is_level(u: Wide2, error: float) -> bool:
 
 @called
 def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, int]:
-    """Return the first two of `Found`, and on what of the edge a b, which has a length, the foot of p lies: its start
-    0, its end 1, between 2, or not sure -1.
+    """Return the first two of `Found`, and where on the edge a b, which has a length, is the foot of p: start 0, end 1,
+    2, unsure -1.
 
     error: of the coordinates of both bodies together.
     """

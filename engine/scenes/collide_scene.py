@@ -19,7 +19,7 @@ from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.collision.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, accuracy_of, check_has_detail, has_interior
-from engine.collision.convex.body import pooled
+from engine.collision.convex_body import pooled
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Witness, Work
 from engine.collision.simple.closed_forms import form_of
@@ -229,8 +229,7 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
 def _candidates(
     bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
 ) -> Iterator[IntArray]:
-    """Yield the pairs whose boxes meet, of those wanted and not skipped (keys first * n + second), in blocks, each of
-    them sorted; low: of the boxes, moved outward."""
+    """Yield pairs whose boxes meet, of those wanted and not skipped (keys), in sorted blocks; low: moved outward."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
@@ -251,9 +250,8 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
     try:
         array = np.asarray(named)
     except ValueError:
-        raise InvalidArrayError(
-            f"{name} must be pairs of indices (n, 2), got rows of several lengths", (name,)
-        ) from None
+        message = f"{name} must be pairs of indices (n, 2), got rows of several lengths"
+        raise InvalidArrayError(message, (name,)) from None
     if array.size == 0:
         return np.empty(0, np.int64)
     if array.ndim != 2 or array.shape[1] != 2 or array.dtype.kind not in "iu":
@@ -262,18 +260,15 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
     wrong = np.flatnonzero(((array < 0) | (array >= n_bodies)).any(axis=1))
     if len(wrong):
         row = int(wrong[0])
-        raise IndexOutOfRangeError(
-            f"{name}[{row}] = {array[row].tolist()} names a body that is not there; the scene has {n_bodies}",
-            (name, row),
-        )
+        message = f"{name}[{row}] = {array[row].tolist()} names a body that is not there; the scene has {n_bodies}"
+        raise IndexOutOfRangeError(message, (name, row))
     array = np.sort(array.astype(np.int64), axis=1)
     keys: IntArray = array[:, 0] * n_bodies + array[:, 1]
     return keys
 
 
 _STRETCHED: Final = 1.0 + 2.0**-38
-"""What a pose may stretch: no entry of R' R - I is beyond 1e-12. Two equal poses are left out, as by `collide`, but not
-from the boxes."""
+"""What a pose may stretch: no entry of R' R - I is beyond 1e-12; boxes have equal poses that `collide` leaves out."""
 
 
 _NONE: Final = pooled([])

@@ -37,17 +37,15 @@ from engine.predicates.posed import UNPOSED, PosedPoint3, surely_same
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import UNDECIDED, Point3
 
-STRENGTH: tuple[Kind, ...] = (
-    "face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex", "containment"
-)  # fmt: skip
+_CONTACTS: tuple[Kind, ...] = "face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex"
+STRENGTH: tuple[Kind, ...] = (*_CONTACTS, "containment")
 """Of several contacts the witness is the one of the kind that stands first here; at most `N_NAMED` are looked at."""
 FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX, CONTAINED = range(7)
 N_NAMED = 32
 BOTH = 3
 
 _BAD, FLUSH, N_SIGNS = 9, 10, 11
-"""Places in the work space, after nine turns: that a sign was open; the corners that lie in the plane of the other
-face, three bits for each face."""
+"""Places in the work space, after nine turns: is a sign open; corners in the plane of the other face, 3 bits each."""
 
 
 @called
@@ -133,7 +131,14 @@ def _overlap_on_line(
 
 @called
 def _open_edges_meet(
-    poses: FloatArray, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Int8Array
+    poses: FloatArray,
+    t: Facet,
+    sides: Signs,
+    u: Facet,
+    their_sides: Signs,
+    axis: int,
+    error: float,
+    work: Int8Array,
 ) -> bool:
     """Tell whether two open edges of the faces have a common point."""
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
@@ -190,9 +195,8 @@ def kind_of(
         work[FLUSH] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
     own, their = lone_zero(sides), lone_zero(their_sides)
     for k in range(3):
-        if (own >= 0 and is_same(corner(t, own), corner(u, k))) or (
-            their >= 0 and is_same(corner(u, their), corner(t, k))
-        ):
+        is_common = own >= 0 and is_same(corner(t, own), corner(u, k))
+        if is_common or (their >= 0 and is_same(corner(u, their), corner(t, k))):
             return VERTEX_VERTEX, 0
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
         how = separation(poses, t, u, axis, error)

@@ -39,8 +39,7 @@ PIERCING = SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
 a surface, passes through the interior of the other; any contact at all."""
 
 DONE, SETTLED, FULL, INTERRUPTED = range(4)
-"""How a search ended: all pairs seen; the pair at row 0 settles the question; too many pairs for the room; the flag was
-raised."""
+"""How a search ended: all pairs seen; the pair at row 0 settles the question; too many for the room; by the flag."""
 LEAST_LOOK = 4096
 """So many pairs are counted, however little room there is: a later one may settle the question."""
 

@@ -5,10 +5,10 @@ just below. One point per region, with rational coordinates, and the line throug
 is largest, tell all: crossings strictly above the point give the status above T; faces that hold the point lie in T's
 plane there, and each changes the status on the way through.
 
-Regions are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two
-traces cross, so one point between each two neighbours on the middle of every slab meets every region with an interior.
-The line is moved by (eps, eps^2) across itself (predicates/ties.py), so that it meets no edge; a face that holds the
-point is known by its plane, whatever the move.
+Regions are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two traces
+cross, so one point between each two neighbours on the middle of every slab meets every region with an interior. The
+line is moved by (eps, eps^2) across itself (ties.py), so that it meets no edge; its plane tells whether a face holds
+the point.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from engine.running.budget import Budget
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster
 Rational2 = tuple[Rational, Rational]
+Trace = tuple[Rational2, Rational2]
 Homogeneous = tuple[int, ...]
 """x, y, z, w: the point (x / w, y / w, z / w), w > 0."""
 
@@ -86,8 +87,7 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
-    """Return the side of a clean face, 1 that of its normal or -1, on which its body lies, 0 where no point tells it;
-    kept with the mesh, as by `face_state.py`."""
+    """Return the side of a clean face, 1 that of its normal or -1, of its body, 0 for unknown; kept with the mesh."""
     kept, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
     if kept[face] not in (1, -1):
         for q in points_within(body.corners(face)):
@@ -161,13 +161,11 @@ def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
     return tuple(point)
 
 
-def _segment(p: Rational2, q: Rational2) -> tuple[Rational2, Rational2]:
+def _segment(p: Rational2, q: Rational2) -> Trace:
     return (p, q) if p <= q else (q, p)
 
 
-def _traces(
-    body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None
-) -> list[tuple[Rational2, Rational2]]:
+def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None) -> list[Trace]:
     """Return the segments in which other faces meet the plane of a face, near the face, projected along its axis."""
     low, high = _around(body, [(*p, 1) for p in body.corners(face)])
     found = set()
@@ -183,7 +181,7 @@ def _traces(
     return sorted(found)
 
 
-def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational2, Rational2]]:
+def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
     """Return the segments in which a face meets the plane at which its corners have `values`."""
     if not any(values):
         return [(without_axis(points[i], axis), without_axis(points[i - 2], axis)) for i in range(3)]
@@ -196,9 +194,7 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[tuple[Rational
     return [(ends[0], ends[1])] if len(ends) == 2 else []
 
 
-def _samples(
-    body: ExactBody, face: int, traces: list[tuple[Rational2, Rational2]], budget: Budget
-) -> Iterator[tuple[Rational2, _Cell]]:
+def _samples(body: ExactBody, face: int, traces: list[Trace], budget: Budget) -> Iterator[tuple[Rational2, _Cell]]:
     """Yield a point in every region that `traces` cut from a face, projected along its axis, and the cell around it."""
     corners = [without_axis(corner, body.axis(face)) for corner in body.corners(face)]
     own = [_segment(corners[i], corners[i - 2]) for i in range(3)]
@@ -227,16 +223,15 @@ def _samples(
 class _Segment(NamedTuple):
     """Left and right end, both again as integers (x, y, w), and the line a x + b y + c = 0 through them."""
 
-    ends: tuple[Rational2, Rational2]
+    ends: Trace
     left: Vector
     right: Vector
     line: Vector
 
 
-def _on_line(ends: tuple[Rational2, Rational2]) -> _Segment:
-    left, right = (
-        (x.numerator * y.denominator, y.numerator * x.denominator, x.denominator * y.denominator) for x, y in ends
-    )
+def _on_line(ends: Trace) -> _Segment:
+    whole = [(*x.as_integer_ratio(), *y.as_integer_ratio()) for x, y in ends]
+    left, right = ((x * v, y * u, u * v) for x, u, y, v in whole)
     return _Segment(ends, left, right, cross(left, right))
 
 

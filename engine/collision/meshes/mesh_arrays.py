@@ -61,11 +61,10 @@ MeshArrays = namedtuple(
     "has_inside",
 )
 """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
-inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels
-as needed, and `inner`, on which side of a face its body lies (`face_state.py`), 0 unknown: any thread writes the same
-values. components: of the triangles connected through vertices, one triangle
-each, ascending. faces: the caller's face of each triangle; first_face: the least in the first component.
-has_inside: False for surfaces and flat boxes."""
+inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels as
+needed, and `inner`, on which side of a face its body lies (`parity.py`), 0 unknown: any thread writes the same values.
+components: of triangles connected through vertices, one each, ascending. faces: the caller's face of each triangle;
+first_face: the least in the first component. has_inside: False for surfaces and flat boxes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,9 +123,8 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     ordered, axis = np.empty((n_triangles, 3), np.int64), np.empty(n_triangles, np.int8)
     used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
-        n_used, n_components, first_face = _lay_out(
-            vertices, triangles, faces, child, order, ordered, used, axis, components
-        )
+        given = vertices, triangles, faces
+        n_used, n_components, first_face = _lay_out(*given, child, order, ordered, used, axis, components)
         reach, lowest_bit, shift = _lattice_of(used[:n_used])
     blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
     _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)

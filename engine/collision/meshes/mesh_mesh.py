@@ -1,23 +1,21 @@
 """Polyhedra, surfaces and boxes against each other in 3D: the relation, by contacts, then locations, then regions; and
 of two that overlap, which sticks out of the other and whether their boundaries meet.
 
-1. **Contacts**: every pair of faces with a common point. A strict crossing that `face_state.py` accepts proves that the
+1. **Contacts**: every pair of faces with a common point. A strict crossing that `parity.py` accepts proves that the
    open interiors meet, and ends the search.
 2. **Patches** (mesh_pair.py): faces without contact, connected through vertices, lie wholly inside or wholly outside
    the other body, so one vertex tells. Without any contact disjoint or inside follow. A patch inside the other body
    proves overlapping, if some face of it has an inside of its own body beside it.
 3. **Regions**: what is left are weak contacts (a vertex on a face, flush faces, edges that touch). If the open
    interiors meet, the border of their intersection has a piece with area on some face of either body; on patches that
-   is settled, so look at every region that the two bodies cut from each face in contact: overlapping shows as one with
-   both insides on one side of it.
+   is settled, so a region that both cut from a face in contact has both insides on one side.
 
 Faces that cancel under even-odd (stacked) have nothing to show for themselves; their patches go through step 3 too.
 
 **Parts.** A body A sticks out of B if A's open interior meets the outside of B: beside some region of a face of either,
 on one side, A is inside and B is not. A crossing that proves overlapping shows all four combinations around it; a patch
 has one status of the other body on both sides; of each face in contact either side of each region tells, and one with
-nothing of the other body beside it but faces of its own plane is one region. The search ends as soon as each body is
-known to stick out.
+nothing of the other body beside it but faces of its own plane is one region.
 """
 
 from __future__ import annotations
@@ -28,19 +26,11 @@ import numpy as np
 
 from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, OVERLAPPING, TOUCHING, UNSETTLED
+from engine.collision.meshes import exact_regions as regions
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
 from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
 from engine.collision.meshes.exact_body import as_simplex
-from engine.collision.meshes.exact_regions import (
-    Sides,
-    pieces_of_segment,
-    points_within,
-    regions_of,
-    side_of_clean,
-    sides_at,
-    sides_over,
-)
-from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshBody, mesh_body_of
+from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STILL, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, unless_identity, what_to_seek
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, RELATION, SAME_SIDE
@@ -56,20 +46,20 @@ def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
     axis = body.axis(face)
     if axis < 0:
         return False, False
-    side = side_of_clean(body, face) if body.mesh.has_inside and pair.state(own, face) == STATE_CLEAN else 0
+    side = regions.side_of_clean(body, face) if body.mesh.has_inside and pair.state(own, face) == STATE_CLEAN else 0
     if side != 0:  # all that counts lies on one side: only faces that reach there cut it
         met = pair.contacts[pair.contacts[:, own] == face, 1 - own].tolist()
         is_above = side == sign_of(body.plane(face)[axis])
-        for q in regions_of(body, face, [other], pair.work.budget, (side, met)):
-            theirs = sides_at(other, q, axis)
+        for q in regions.regions_of(body, face, [other], pair.work.budget, (side, met)):
+            theirs = regions.sides_at(other, q, axis)
             if theirs.above if is_above else theirs.below:
                 return True, False
         return False, False  # a point of the face within the other body has both insides beside it
     pierces = False
-    for q in regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
-        theirs = sides_at(other, q, axis)
+    for q in regions.regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
+        theirs = regions.sides_at(other, q, axis)
         if theirs.above or theirs.below:
-            ours = sides_at(body, q, axis)
+            ours = regions.sides_at(body, q, axis)
             if (ours.above and theirs.above) or (ours.below and theirs.below):
                 return True, False
         pierces = pierces or theirs.at
@@ -84,17 +74,19 @@ def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
     ends = as_simplex(body.corners(face))
     if len(ends) < 2:
         return False
-    pieces = pieces_of_segment(body, (ends[0], ends[1]), other, pair.work.budget)
+    pieces = regions.pieces_of_segment(body, (ends[0], ends[1]), other, pair.work.budget)
     # every face with area that holds a point lies across some axis
-    return any(all(sides_at(other, q, axis).at for axis in range(3)) for q in pieces)
+    return any(all(regions.sides_at(other, q, axis).at for axis in range(3)) for q in pieces)
 
 
 def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
     """Return the relation of two polyhedra, surfaces or 3D boxes."""
     a, b = mesh_body_of(first), mesh_body_of(second)
+    posed = STILL, STILL
     if poses[0] is not None or poses[1] is not None:
         poses = unless_identity(poses)
-    told = told_by_kernel(a, b, (a.posed(poses[0]), b.posed(poses[1])), work)
+        posed = a.posed(poses[0]), b.posed(poses[1])
+    told = told_by_kernel(a, b, posed, work)
     if isinstance(told, Collision):
         return told
     work.budget.check()
@@ -172,9 +164,8 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
                 return Collision(Relation.OVERLAPPING, pair.named())
             piercing = piercing or pierces
     if pair.work.witness and not piercing:
-        piercing = any(
-            pierces_without_area(pair, own, face) for own in (0, 1) for face in np.unique(contacts[:, own]).tolist()
-        )
+        faces = [(own, face) for own in (0, 1) for face in np.unique(contacts[:, own]).tolist()]
+        piercing = any(pierces_without_area(pair, own, face) for own, face in faces)
     if len(contacts):
         return Collision(Relation.TOUCHING, pair.named(piercing=piercing))
     own = 0 if patches[0] else 1
@@ -188,8 +179,8 @@ def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, p
     return answer if pair.work.witness and answer is not None else UNNAMED[relation]
 
 
-_BOTH, _NEITHER = Sides(True, True, True), Sides(False, False, False)
-_ABOVE, _BELOW = Sides(True, False, False), Sides(False, True, False)
+_BOTH, _NEITHER = regions.Sides(True, True, True), regions.Sides(False, False, False)
+_ABOVE, _BELOW = regions.Sides(True, False, False), regions.Sides(False, True, False)
 
 
 def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
@@ -248,7 +239,7 @@ class _OverlappingPair(MeshPair):
                 if all(self._sticks_out):
                     return
 
-    def _see(self, own: int, ours: Sides, theirs: Sides) -> None:
+    def _see(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
         """Take note of what lies on either side of a region of body `own`."""
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
@@ -268,12 +259,12 @@ class _OverlappingPair(MeshPair):
             if not kinds.isdisjoint((SAME_SIDE, OPPOSITE)):
                 self._see(own, _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW)
                 return
-            for q in points_within(body.corners(face)):
-                theirs = sides_over(other, q, axis, body.plane(face))
+            for q in regions.points_within(body.corners(face)):
+                theirs = regions.sides_over(other, q, axis, body.plane(face))
                 if theirs is not None and theirs.above == theirs.below:
                     self._see(own, _ABOVE, theirs)
                     return
-        for q in regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
-            self._see(own, sides_at(body, q, axis), sides_at(other, q, axis))
+        for q in regions.regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
+            self._see(own, regions.sides_at(body, q, axis), regions.sides_at(other, q, axis))
             if all(self._sticks_out):
                 return

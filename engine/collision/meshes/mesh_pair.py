@@ -1,8 +1,4 @@
-"""Two placed meshes in one question: their contacts, exact coordinates, states of faces, where their vertices lie.
-
-Patches: faces without contact, connected through vertices, lie wholly inside or wholly outside the other body, so one
-vertex tells. Without any contact the patches are the components of the surfaces.
-"""
+"""Two placed meshes in one question: their contacts, exact coordinates, states of faces, where their vertices lie."""
 
 from __future__ import annotations
 
@@ -13,17 +9,8 @@ import numpy as np
 
 from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
+from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
-from engine.collision.meshes.dual_traversal import (
-    LEAST_LOOK,
-    SEEK_CONTACT,
-    SEEK_OVERLAP,
-    SEEK_PIERCING_BY_FIRST,
-    SEEK_PIERCING_BY_SECOND,
-    Found,
-    new_descent,
-    new_found,
-)
 from engine.collision.meshes.exact_body import ExactBody, classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
@@ -42,7 +29,11 @@ class _WorkSpace(threading.local):
     """What one call of a kernel fills; calls of one thread take turns."""
 
     def __init__(self) -> None:
-        self.descent, self.found, self.rows = new_descent(), new_found(ROOM_AT_ONCE), np.empty((1, N_COLUMNS), np.int64)
+        self.descent, self.found, self.rows = (
+            dual.new_descent(),
+            dual.new_found(ROOM_AT_ONCE),
+            np.empty((1, N_COLUMNS), np.int64),
+        )
         self.row = self.rows[0]
 
 
@@ -59,12 +50,11 @@ def unless_identity(poses: Poses) -> Poses:
 
 
 def relate(
-    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: Found | None = None,
+    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: dual.Found | None = None,
     n_named: int | None = None,
-) -> tuple[list[int], Found]:  # fmt: skip
-    """Return what `relate_poses` says of a pair, and where its contacts are, all of them, until the next call; known:
-    all contacts, their classes too, where they are found already; n_named: as `relate_poses` takes it, None
-    for what `work` wants."""
+) -> tuple[list[int], dual.Found]:  # fmt: skip
+    """Return what `relate_poses` says of a pair, and where all of its contacts are, until the next call; known: these
+    and their classes, where found already; n_named: as of `relate_poses`, None for what `work` says."""
     found, n_known = (SPACE.found, 0) if known is None else (known, len(known.kinds))
     n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
     room = len(found.kinds)
@@ -78,26 +68,25 @@ def relate(
         if n <= room:
             return row, found
         work.budget.check()
-        room = n if n <= LEAST_LOOK else 16 * n
-        found = new_found(room, len(first.faces) + len(second.faces))
+        room = n if n <= dual.LEAST_LOOK else 16 * n
+        found = dual.new_found(room, len(first.faces) + len(second.faces))
 
 
 def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
     """Return what ends the search for contacts early."""
     own, their = first.arrays.has_inside, second.arrays.has_inside
     if own and their and not work.boolean:
-        return SEEK_OVERLAP
+        return dual.SEEK_OVERLAP
     if work.boolean or not (work.witness and (own or their)):
-        return SEEK_CONTACT
-    return SEEK_PIERCING_BY_SECOND if own else SEEK_PIERCING_BY_FIRST
+        return dual.SEEK_CONTACT
+    return dual.SEEK_PIERCING_BY_SECOND if own else dual.SEEK_PIERCING_BY_FIRST
 
 
 class MeshPair:
     """One question, what kernels say of it, and the exact coordinates computed for it so far.
 
     row: of `relate_poses`; contacts (n, 2): the pairs of faces with a common point, in order, or the one that settles
-    all, as is_settled tells; kinds (n,): their classes, or what `relate_poses` puts in their place. Filled by
-    `find_contacts`.
+    all, as is_settled tells; kinds (n,): their classes, or what `relate_poses` puts there.
     """
 
     def __init__(self, first: MeshBody, second: MeshBody, poses: Poses, work: Work, n_named: int | None = None) -> None:
@@ -116,7 +105,7 @@ class MeshPair:
             self._exact = exact_pair(*self.meshes, self.poses)
         return self._exact
 
-    def find_contacts(self, seen: tuple[list[int], Found] | None = None) -> None:
+    def find_contacts(self, seen: tuple[list[int], dual.Found] | None = None) -> None:
         """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
         self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
         self.work.budget.check()
@@ -140,20 +129,20 @@ class MeshPair:
                 return
         self.contacts, self.kinds = self.contacts[kinds != APART], kinds[kinds != APART]
         if len(self.kinds):
-            found = Found(self.contacts, self.kinds, np.empty(0, np.bool_))
+            found = dual.Found(self.contacts, self.kinds, np.empty(0, np.bool_))
             self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, found, self.n_named)
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
         """The rule of `dual_traversal.settles` for a class found exactly."""
-        if self.seek == SEEK_CONTACT:
+        if self.seek == dual.SEEK_CONTACT:
             return True
         if kind != CROSSING:
             return False
         first, second = self.state(0, i), self.state(1, j)
-        if self.seek == SEEK_PIERCING_BY_FIRST:
+        if self.seek == dual.SEEK_PIERCING_BY_FIRST:
             return second == STATE_CLEAN
-        if self.seek == SEEK_PIERCING_BY_SECOND:
+        if self.seek == dual.SEEK_PIERCING_BY_SECOND:
             return first == STATE_CLEAN
         return STATE_CLEAN in (first, second) and STATE_STACKED not in (first, second)
 

@@ -5,8 +5,7 @@ between the triangles across the line of the two points: the triangles are conve
 are the nearest ones. Triangles without area are segments and points.
 
 Source: C. Ericson, Real-Time Collision Detection, 2005, 5.1.9 (segments) and 5.1.10 (triangles); the slab is the
-support bound of E. Gilbert, D. Johnson, S. Keerthi, A fast procedure for computing the distance between complex
-objects, 1988.
+support bound of E. Gilbert, D. Johnson, S. Keerthi, 1988 (`distance/convex_gaps.py`).
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""What half-lines and neighbours say of one body: is a point inside, how does a face lie among its other faces, and on
-which side of it does the body lie.
+"""What half-lines and neighbours say of a body: is a point inside, how does a face lie among others, which side is in.
 
 **Points.** The half-line from q upward along the z axis of the body's own coordinates is moved by (eps, eps^2) in x and
 y, so that it meets no edge and no upright face (predicates/ties.py). A face that the half-line's line meets counts if
@@ -72,8 +71,7 @@ MISSED = 3
 
 @inline
 def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
-    """Return the side of the line a b, seen along z, on which q moved by (eps, eps^2) lies; 0 if a and b coincide
-    there. See predicates/ties.py."""
+    """Return the side of the line a b, along z, on which q moved by (eps, eps^2) lies (ties.py); 0 for a = b."""
     side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
     return side if side != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
@@ -145,9 +143,8 @@ def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> i
         return UNDECIDED
     if largest_of(local) > 4.0 + slack:
         return OUTSIDE
-    far = Point3(
-        ABOVE_ALL if axis == 0 else local.x, ABOVE_ALL if axis == 1 else local.y, ABOVE_ALL if axis == 2 else local.z
-    )
+    z = ABOVE_ALL if axis == 2 else local.z
+    far = Point3(ABOVE_ALL if axis == 0 else local.x, ABOVE_ALL if axis == 1 else local.y, z)
     box, q, stack = box_between(local, far, slack), _last(q, axis), np.empty(STACK, np.int32)
     stack[0] = 0
     n_above, unsure, on_face = 0, False, False

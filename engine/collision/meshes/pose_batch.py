@@ -4,31 +4,8 @@ from __future__ import annotations
 
 from engine.arrays import FlagArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
-from engine.collision.meshes.contact_kinds import (
-    BOTH,
-    CONTAINED,
-    EDGE_FACE,
-    FACE_FACE,
-    FLUSH,
-    N_NAMED,
-    VERTEX_VERTEX,
-    kind_of,
-)
-from engine.collision.meshes.dual_traversal import (
-    DONE,
-    INTERRUPTED,
-    SEEK_OVERLAP,
-    SETTLED,
-    Descent,
-    Found,
-    Place,
-    Search,
-    exact_error,
-    exact_faces,
-    place_bodies,
-    room_of,
-    search,
-)
+from engine.collision.meshes import contact_kinds as contact
+from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
@@ -65,7 +42,7 @@ def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshA
 
 
 @inline
-def relation_apart(first: MeshArrays, second: MeshArrays, place: Place) -> int:
+def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> int:
     """Return the relation of two bodies without contact, or UNSETTLED: none or all of one lies inside the other."""
     in_second = n_components_inside(first, place.a, second, place.b)
     in_first = n_components_inside(second, place.b, first, place.a)
@@ -77,11 +54,10 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: Place) -> int:
 
 
 @called
-def in_contact(s: Search, n: int, n_named: int, row: IntArray) -> None:
+def in_contact(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
     """Fill the row of a pair by its n contacts, all there are, of which the first name the witness.
 
-    The first are put in order, and of those looked at the class becomes JUDGED with the corners in the plane of the
-    other face; nothing of that where a class is open.
+    The first are put in order; unless a class is open all become JUDGED with the corners in the other plane.
     """
     pairs, kinds, _ = s.found
     first, second = s.first, s.second
@@ -91,22 +67,24 @@ def in_contact(s: Search, n: int, n_named: int, row: IntArray) -> None:
             return
         has_crossing |= kinds[item] == CROSSING
     put_in_order(first.faces, second.faces, pairs, kinds, n)
-    is_free, is_named, best, face, their_face = True, n_named > 0, VERTEX_VERTEX + 1, 0, 0
+    is_free, is_named, best, face, their_face = True, n_named > 0, contact.VERTEX_VERTEX + 1, 0, 0
     for item in range(n):
         i, j = pairs[item, 0], pairs[item, 1]
         if kinds[item] >= CORNER:
-            kind, may_cut, common = VERTEX_VERTEX, 0, kinds[item] - CORNER
-            s.descent.signs[FLUSH] = 1 << common // 3 | 8 << common % 3
+            kind, may_cut, common = contact.VERTEX_VERTEX, 0, kinds[item] - CORNER
+            s.descent.signs[contact.FLUSH] = 1 << common // 3 | 8 << common % 3
         else:
             kind, may_cut = kind_of_pair(s, i, j)
-        kinds[item] = JUDGED | s.descent.signs[FLUSH]
+        kinds[item] = JUDGED | s.descent.signs[contact.FLUSH]
         f, g = first.faces[i], second.faces[j]
         if item < n_named and (kind < best or (kind == best and (f < face or (f == face and g < their_face)))):
             best, face, their_face = kind, f, g
         is_free, is_named = is_free and may_cut == 0, is_named and best != UNSETTLED
         if s.flag[0] != 0:
             return
-        if kind == FACE_FACE or not (is_free or (item + 1 < n_named and best > EDGE_FACE)):  # none later is stronger
+        if kind == contact.FACE_FACE or not (
+            is_free or (item + 1 < n_named and best > contact.EDGE_FACE)
+        ):  # none later is stronger
             break
     if is_named:
         row[KIND], row[FIRST_FACE], row[SECOND_FACE] = best, face, their_face
@@ -114,20 +92,19 @@ def in_contact(s: Search, n: int, n_named: int, row: IntArray) -> None:
 
 
 @called
-def in_detail(s: Search, n: int) -> None:
+def in_detail(s: dual.Search, n: int) -> None:
     """Write how each of n contacts lies in place of its class, nothing where a class is open: BESIDE and which of the
-    two open faces it may cut (`kind_of`); SAME_SIDE, OPPOSITE for two clean faces that share an area, by on which side
-    of it their bodies lie."""
+    two open faces it may cut (`kind_of`); SAME_SIDE, OPPOSITE: clean faces that share an area."""
     pairs, kinds, _ = s.found
     for item in range(n):
         if kinds[item] == UNDECIDED:
             return
     for item in range(n):
         i, j = pairs[item, 0], pairs[item, 1]
-        kind, may_cut = (VERTEX_VERTEX, 0) if kinds[item] >= CORNER else kind_of_pair(s, i, j)
+        kind, may_cut = (contact.VERTEX_VERTEX, 0) if kinds[item] >= CORNER else kind_of_pair(s, i, j)
         kinds[item] = BESIDE | may_cut
-        if kind == FACE_FACE:
-            t, u, axis, _ = exact_faces(s, i, j)
+        if kind == contact.FACE_FACE:
+            t, u, axis, _ = dual.exact_faces(s, i, j)
             how, shares = flush(s, i, j, t, u, axis, beside(t, axis))
             if shares:
                 kinds[item] = SAME_SIDE if how == OVERLAPPING else OPPOSITE
@@ -136,13 +113,13 @@ def in_detail(s: Search, n: int) -> None:
 
 
 @merged
-def kind_of_pair(s: Search, i: int, j: int) -> tuple[int, int]:
+def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
     """Return `kind_of` two faces, UNSETTLED where one has no area."""
-    t, u, axis, their_axis = exact_faces(s, i, j)
+    t, u, axis, their_axis = dual.exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
-        s.descent.signs[FLUSH] = 0
-        return UNSETTLED, BOTH
-    return kind_of(s.descent.poses, t, axis, u, their_axis, exact_error(s), s.descent.signs)
+        s.descent.signs[contact.FLUSH] = 0
+        return UNSETTLED, contact.BOTH
+    return contact.kind_of(s.descent.poses, t, axis, u, their_axis, dual.exact_error(s), s.descent.signs)
 
 
 @inline
@@ -152,7 +129,7 @@ def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds:
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
         key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item
         while place > 0:
-            before = min(place, N_NAMED) - 1
+            before = min(place, contact.N_NAMED) - 1
             p, q, other = pairs[before, 0], pairs[before, 1], kinds[before]
             if key > (other != COPLANAR, faces[p], their_faces[q], p, q):
                 break
@@ -164,37 +141,36 @@ def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds:
 @kernel
 def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
-    descent: Descent, found: Found, n_known: int, rows: IntArray, flag: FlagArray,
+    descent: dual.Descent, found: dual.Found, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the one of the first.
 
     n_named: how many contacts name the witness; without any, relations are all that is told, and for DETAIL only how
-    the contacts lie. `descent` and `found` are
-    work space: pairs in contact at more faces than fit into `found`, and those no proof here settles, are UNSETTLED.
-    What is found of the last pose stays there. n_known: of one pose, how many contacts there are, where all of them are
-    in `found` already, their classes known; else 0.
+    the contacts lie. `descent` and `found` are work space: pairs in contact at more faces than fit into `found`, and
+    those no proof here settles, are UNSETTLED. What is found of the last pose stays there. n_known: how many contacts
+    of one pose are in `found`.
     """
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
-        place, is_apart = place_bodies(first, still, 0, second, poses, item, descent)
-        s = Search(first, second, place, descent, seek, found, flag)
-        how, n_pairs = (DONE, n_known) if is_apart or n_known > 0 else search(s)
+        place, is_apart = dual.place_bodies(first, still, 0, second, poses, item, descent)
+        s = dual.Search(first, second, place, descent, seek, found, flag)
+        how, n_pairs = (dual.DONE, n_known) if is_apart or n_known > 0 else dual.search(s)
         row[N_CONTACTS] = n_pairs
-        if how == INTERRUPTED:
+        if how == dual.INTERRUPTED:
             return
-        if how == SETTLED:
-            row[RELATION], row[N_CONTACTS] = OVERLAPPING if seek == SEEK_OVERLAP else TOUCHING, ONE_SETTLES
+        if how == dual.SETTLED:
+            row[RELATION], row[N_CONTACTS] = OVERLAPPING if seek == dual.SEEK_OVERLAP else TOUCHING, ONE_SETTLES
             i, j = found.pairs[0, 0], found.pairs[0, 1]
             if n_named > 0:
                 row[KIND], _ = kind_of_pair(s, i, j)
                 row[FIRST_FACE], row[SECOND_FACE] = first.faces[i], second.faces[j]
         elif n_pairs == 0:
             row[RELATION] = relation_apart(first, second, place)
-            row[KIND] = CONTAINED
+            row[KIND] = contact.CONTAINED
             row[FIRST_FACE] = first.first_face if row[RELATION] == FIRST_INSIDE_SECOND else -1
             row[SECOND_FACE] = second.first_face if row[RELATION] == SECOND_INSIDE_FIRST else -1
-        elif n_known > 0 or n_pairs <= room_of(found):
+        elif n_known > 0 or n_pairs <= dual.room_of(found):
             if n_named == DETAIL:
                 in_detail(s, n_pairs)
             else:

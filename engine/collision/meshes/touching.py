@@ -1,7 +1,7 @@
 """Compiled: what contacts tell of two bodies where none proves an overlap by crossing.
 
 Two convex bodies that touch are separated by a plane through a face in contact, unless only edges cross; many bodies
-that are not convex too. Of others the faces in contact may tell, clean ones (`face_state.py`) above all, of which the
+that are not convex too. Of others the faces in contact may tell, clean ones (`parity.py`) above all, of which the
 body lies on one side only. Two of these that share an area overlap if that is the same side of both, else neither has
 the other body on its own inner side there. A face with an edge across an open clean one, going to its inner side from
 there, has points in the open interior beside it: they overlap. Where no contact is of these kinds, all of the inner
@@ -25,22 +25,9 @@ import numpy as np
 from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
+from engine.collision.meshes import parity
 from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
-from engine.collision.meshes.parity import (
-    INSIDE,
-    OUTSIDE,
-    SLACK,
-    UNTOLD,
-    OwnPoint,
-    box_between,
-    brought_back,
-    inner_side,
-    locate_point,
-    next_face,
-    point_within,
-    state_of,
-)
 from engine.collision.meshes.placement import Placement, defect_of, placed
 from engine.collision.meshes.triangle_triangle import (
     CORNER,
@@ -133,8 +120,8 @@ def _enters(
         if a == 0 and b == 0:
             how = passes_within(s.descent.poses, corner(t, k), corner(t, k + 1), u, off, axis, exact_error(s))
             if how == 1:
-                inner = inner_side(mesh, face, s.descent.poses)
-                how = UNDECIDED if inner == UNTOLD else int(inner == apex)
+                inner = parity.inner_side(mesh, face, s.descent.poses)
+                how = UNDECIDED if inner == parity.UNTOLD else int(inner == apex)
             return UNSETTLED if how == UNDECIDED else (OVERLAPPING if how == 1 else TOUCHING)
     return TOUCHING
 
@@ -148,8 +135,8 @@ def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPo
     if how == UNDECIDED or how >= 0:
         return (UNSETTLED if how == UNDECIDED else TOUCHING), False
     by_t, by_u = sign_of_four(poses, t.p, t.q, t.r, off, error), sign_of_four(poses, u.p, u.q, u.r, off, error)
-    inner, theirs = inner_side(s.first, i, poses), inner_side(s.second, j, poses)
-    if by_t == UNDECIDED or by_u == UNDECIDED or inner == UNTOLD or theirs == UNTOLD:
+    inner, theirs = parity.inner_side(s.first, i, poses), parity.inner_side(s.second, j, poses)
+    if by_t == UNDECIDED or by_u == UNDECIDED or inner == parity.UNTOLD or theirs == parity.UNTOLD:
         return UNSETTLED, False
     return (OVERLAPPING if inner * by_t == theirs * by_u else TOUCHING), True
 
@@ -194,10 +181,10 @@ def judge(s: Search, item: int) -> tuple[int, bool]:
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
         return flush(s, i, j, t, u, axis, off)
     by_own = _enters(s, t, sides, u, their_off, their_flat, s.second, j)
-    if by_own == OVERLAPPING and state_of(s.first, i, poses) == STATE_STACKED:
+    if by_own == OVERLAPPING and parity.state_of(s.first, i, poses) == STATE_STACKED:
         by_own = UNSETTLED
     by_theirs = _enters(s, u, their_sides, t, off, flat, s.first, i)
-    if by_theirs == OVERLAPPING and state_of(s.second, j, poses) == STATE_STACKED:
+    if by_theirs == OVERLAPPING and parity.state_of(s.second, j, poses) == STATE_STACKED:
         by_theirs = UNSETTLED
     if by_own == OVERLAPPING or by_theirs == OVERLAPPING:
         return OVERLAPPING, False
@@ -251,19 +238,19 @@ def place_of(known: IntArray, vertex: int) -> int:
 
 
 @allocating
-def may_be_corner(own: OwnPoint, mesh: MeshArrays) -> bool:
+def may_be_corner(own: parity.OwnPoint, mesh: MeshArrays) -> bool:
     """Tell whether a point may be a vertex of a mesh: of faces that meet there not all are listed as contacts."""
-    local, slack, stack = in_tree(mesh, own.point), SLACK + own.error / mesh.scale, np.empty(STACK, np.int32)
-    box = box_between(local, local, slack)
+    local, slack, stack = in_tree(mesh, own.point), parity.SLACK + own.error / mesh.scale, np.empty(STACK, np.int32)
+    box = parity.box_between(local, local, slack)
     stack[0] = 0
-    face, n = next_face(mesh, stack, 1, box)
+    face, n = parity.next_face(mesh, stack, 1, box)
     while face >= 0:  # bound: the faces of the body
         t = triangle_of(mesh, face)
         if min(largest_of(minus(t.p, own.point)), largest_of(minus(t.q, own.point))) <= 2.0 * own.error:
             return True
         if not largest_of(minus(t.r, own.point)) > 2.0 * own.error:
             return True
-        face, n = next_face(mesh, stack, n, box)
+        face, n = parity.next_face(mesh, stack, n, box)
     return False
 
 
@@ -272,8 +259,7 @@ def where_faces_are(
     s: Search, own: int, n: int, shares: BoolArray, known: IntArray, is_flush: BoolArray, told: IntArray
 ) -> int:
     """Return OUTSIDE where every face of a body in contact has a point that surely lies outside the other body, and no
-    corner off it does not, nor any component without contact; INSIDE where one surely lies inside and has an inside of
-    its own beside it; else UNDECIDED.
+    corner off it does not, nor any component without contact; INSIDE where one surely is, with an inside; UNDECIDED.
 
     own: the column of the body in contacts (n, 2); their classes: of each the corners that lie on the other face, and
     maybe others of its plane (`kind_of`, `judge`). shares (n,), or none: whether the two faces share an area. known,
@@ -297,21 +283,21 @@ def where_faces_are(
             continue
         before, n_outside = face, 0
         for k in range(3):
-            vertex, where = source.triangles[face, k], OUTSIDE
+            vertex, where = source.triangles[face, k], parity.OUTSIDE
             at = place_of(known, vertex)
             if known[at] < 0:
-                point = brought_back(as_point3(source.vertices, vertex), place, target, defect)
-                where = UNDECIDED if len(met) > 0 and may_be_corner(point, mesh) else locate_point(point, mesh)
-                if where != OUTSIDE:
-                    return INSIDE if where == INSIDE and has_inside_beside(s, source, face) else UNDECIDED
+                point = parity.brought_back(as_point3(source.vertices, vertex), place, target, defect)
+                where = UNDECIDED if len(met) > 0 and may_be_corner(point, mesh) else parity.locate_point(point, mesh)
+                if where != parity.OUTSIDE:
+                    return parity.INSIDE if where == parity.INSIDE and has_inside_beside(s, source, face) else UNDECIDED
                 if item < n:
                     known[at], is_flush[at] = vertex, False
             n_outside += known[at] < 0 or not is_flush[at]
         if n_outside == 0 and told[place_of(told, face)] != face:
             where = _where_within(source, face, place, mesh, target, defect)
-            if where != OUTSIDE:
-                return INSIDE if where == INSIDE and has_inside_beside(s, source, face) else UNDECIDED
-    return OUTSIDE
+            if where != parity.OUTSIDE:
+                return parity.INSIDE if where == parity.INSIDE and has_inside_beside(s, source, face) else UNDECIDED
+    return parity.OUTSIDE
 
 
 @called
@@ -323,11 +309,11 @@ def _where_within(
     Placing rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of what it adds to.
     """
     for item in range(3):
-        p = point_within(source, face, item)
-        q = brought_back(p.point, place, target, defect)
+        p = parity.point_within(source, face, item)
+        q = parity.brought_back(p.point, place, target, defect)
         moved = largest_of(p.point) + largest_of(place.shift) + largest_of(target.shift)
-        where = locate_point(OwnPoint(q.point, q.error + 2.0 * p.error + 2.0**-50 * moved), mesh)
-        if where in (INSIDE, OUTSIDE):
+        where = parity.locate_point(parity.OwnPoint(q.point, q.error + 2.0 * p.error + 2.0**-50 * moved), mesh)
+        if where in (parity.INSIDE, parity.OUTSIDE):
             return where
     return UNDECIDED
 
@@ -335,7 +321,7 @@ def _where_within(
 @inline
 def has_inside_beside(s: Search, source: MeshArrays, face: int) -> bool:
     """Tell whether a face has an inside of its body beside it, all along but for single points."""
-    return bool(source.axis[face] >= 0 and state_of(source, face, s.descent.poses) != STATE_STACKED)
+    return bool(source.axis[face] >= 0 and parity.state_of(source, face, s.descent.poses) != STATE_STACKED)
 
 
 @allocating
@@ -347,6 +333,6 @@ def by_places(s: Search, n: int, shares: BoolArray) -> int:
     known, is_flush, told = np.empty(n_places, np.int64), np.empty(n_places, np.bool_), np.empty(n_places, np.int64)
     for own in range(2):
         where = where_faces_are(s, own, n, shares, known, is_flush, told)
-        if where != OUTSIDE:
-            return OVERLAPPING if where == INSIDE else UNSETTLED
+        if where != parity.OUTSIDE:
+            return OVERLAPPING if where == parity.INSIDE else UNSETTLED
     return TOUCHING

@@ -1,8 +1,8 @@
 """Two triangles in space: how they meet, decided by orientation signs only.
 
 Each triangle is compared with the plane of the other. Where both straddle, each plane cuts the other triangle in an
-interval of the common line, and two more signs tell whether the intervals have a common point, strictly or not; in one
-plane, the edges are separating axes. Two stages:
+interval of the common line, and two more signs tell whether the intervals have a common point, strictly or not. Two
+stages:
 
 - `classify_near`: float64 with one bound for all signs; answers APART or CROSSING, UNDECIDED where any sign is near 0.
 - `classify`: every sign exact, of points under their poses; answers always but out of exponent range.
@@ -96,6 +96,19 @@ def turned(t: Facet, lone: int) -> Facet:
     return t if lone == 0 else (Facet(t.q, t.r, t.p) if lone == 1 else Facet(t.r, t.p, t.q))
 
 
+@inline
+def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
+    """Return two triangles with the lone vertices first, each above the other's plane; sides: of t1, of t2."""
+    lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
+    lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
+    a, b = turned(t1, lone1), turned(t2, lone2)
+    if side1 < 0:  # turn b over: now a.p is above b
+        b = Facet(b.p, b.r, b.q)
+    if side2 < 0:
+        a = Facet(a.p, a.r, a.q)
+    return a, b
+
+
 @merged
 def corner(t: Facet, index: int) -> Any:
     """Return a corner by its number, at most 6, modulo 3."""
@@ -103,13 +116,6 @@ def corner(t: Facet, index: int) -> Any:
 
 
 # ---- near: one bound for all signs ----------------------------------------------------------------------------------
-
-
-@inline
-def with_lone_first(t: Facet, p: float, q: float, r: float) -> Facet:
-    """Return a triangle with the vertex first that is alone on its side of a plane; p, q, r: values, none near 0."""
-    above = int(p > 0.0) + int(q > 0.0) + int(r > 0.0) == 1
-    return turned(t, 0 if (p > 0.0) == above else (1 if (q > 0.0) == above else 2))
 
 
 @merged
@@ -143,12 +149,8 @@ def classify_near(t1: Facet, t2: Facet, error: float) -> int:
         return APART
     if not (min(abs(a), abs(b), abs(c)) > bound and min(abs(d), abs(f), abs(g)) > bound):
         return UNDECIDED
-    # the lone vertices first, each above the plane of the other triangle
-    s, t = with_lone_first(t1, d, f, g), with_lone_first(t2, a, b, c)
-    if int(d > 0.0) + int(f > 0.0) + int(g > 0.0) == 2:  # the lone one is below: turn the other triangle over
-        t = Facet(t.p, t.r, t.q)
-    if int(a > 0.0) + int(b > 0.0) + int(c > 0.0) == 2:
-        s = Facet(s.p, s.r, s.q)
+    theirs = 1 if a > 0.0 else -1, 1 if b > 0.0 else -1, 1 if c > 0.0 else -1
+    s, t = lone_first(t1, t2, (1 if d > 0.0 else -1, 1 if f > 0.0 else -1, 1 if g > 0.0 else -1), theirs)
     from_p = minus(t.p, s.p)
     first = dot(cross(minus(s.q, s.p), from_p), minus(t.q, s.p))  # orient3d(s.q, t.p, s.p, t.q)
     second = dot(cross(from_p, minus(s.r, s.p)), minus(t.r, s.p))  # orient3d(s.p, t.p, s.r, t.r)
@@ -194,26 +196,11 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
     )
 
 
-@inline
-def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
-    """Return two triangles with the lone vertices first, each above the plane of the other; sides: of the corners of
-    t1 of the plane of t2, and the other way."""
-    lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
-    lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
-    a, b = turned(t1, lone1), turned(t2, lone2)
-    if side1 < 0:  # turn b over: now a.p is above b
-        b = Facet(b.p, b.r, b.q)
-    if side2 < 0:
-        a = Facet(a.p, a.r, a.q)
-    return a, b
-
-
 @called
 def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
 
-    poses (n, 12), error: as for `orient3d_posed`. axis: a coordinate axis, before its pose, along which the projection
-    of t1 has an area.
+    poses (n, 12), error: as for `orient3d_posed`. axis: along it t1 before its pose has an area.
     """
     p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):

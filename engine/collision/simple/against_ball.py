@@ -1,8 +1,7 @@
 """A body with faces or edges (mesh, box, polygon, triangle) against a ball, by distances.
 
 Is everything strictly inside the ball (the farthest vertex)? Does the boundary meet the ball, and does the part of it
-beside the open interior reach into the open ball (the nearest live face)? Where the boundary keeps clear of the ball,
-is the centre inside?
+beside the open interior reach into the open ball (the nearest live face)? Is the centre inside?
 
 **Floats** prove most of it for a mesh without a pose. The tree names the faces near the ball; of each nearly nearest
 points and the slab between them and the centre (`near_triangles.py`) prove that it enters the open ball, or keeps clear
@@ -22,18 +21,9 @@ from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.exact_images import Vector, image_point, rounded
+from engine.collision.meshes import parity
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, MeshBody, in_tree, mesh_body_of, triangle_of
 from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
-from engine.collision.meshes.parity import (
-    INSIDE,
-    OUTSIDE,
-    SLACK,
-    OwnPoint,
-    box_between,
-    locate_point,
-    next_face,
-    state_at,
-)
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
@@ -67,7 +57,7 @@ def _box_distance(t: Facet, center: Point3, slack: float) -> float:
 
 
 @inline
-def _enters_ball(t: Facet, own: OwnPoint, radius: float) -> int:
+def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
     """Tell whether a triangle surely enters the open ball: 1, surely keeps clear of the closed one: 0; else UNSETTLED.
 
     The corners as seen from the centre are off by its error and a rounding, the distances by less than twice that.
@@ -83,21 +73,22 @@ def _enters_ball(t: Facet, own: OwnPoint, radius: float) -> int:
 
 
 @allocating
-def _first_to_enter(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
-    """Return the relation of the surface of a mesh and a ball as far as it is proven, DISJOINT or TOUCHING (a face
-    enters the ball), and of the faces that enter any, or where it is to be named the one of the nearest box, of equal
-    ones the first."""
+def _first_to_enter(
+    own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray
+) -> tuple[int, int]:
+    """Return the relation of the surface of a mesh and a ball, DISJOINT or TOUCHING (a face enters), where proven, and
+    one of the faces that enter; where it is to be named that of the nearest box, of equal ones the first."""
     center, error = own
     sizes = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
-    local, slack = in_tree(mesh, center), SLACK + (error + 2.0**-48 * sizes) / mesh.scale
+    local, slack = in_tree(mesh, center), parity.SLACK + (error + 2.0**-48 * sizes) / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
         return UNSETTLED, -1
-    box, stack = box_between(local, local, radius / mesh.scale + slack), np.empty(STACK, np.int32)
+    box, stack = parity.box_between(local, local, radius / mesh.scale + slack), np.empty(STACK, np.int32)
     stack[0] = 0
     best, found, unsure, box_slack = np.inf, -1, np.inf, 2.0**-50 * largest_of(center) + 2.0**-1070
     reach = (radius + 2.0 * error) * (1.0 + 2.0**-40)
     beyond = reach * reach + 2.0**-990  # what is as far from the rounded centre keeps clear of the ball
-    face, n = next_face(mesh, stack, 1, box)
+    face, n = parity.next_face(mesh, stack, 1, box)
     while face >= 0:  # bound: the faces of the body
         t = triangle_of(mesh, face)
         square = _box_distance(t, center, box_slack)
@@ -108,19 +99,19 @@ def _first_to_enter(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bo
                 if not is_named:
                     return TOUCHING, found
                 within = np.sqrt(square * (1.0 + 2.0**-40) + 2.0**-990)  # of any box that bounds as near
-                box = box_between(local, local, within / mesh.scale + slack)
+                box = parity.box_between(local, local, within / mesh.scale + slack)
             elif how == UNSETTLED:
                 unsure = min(unsure, square)
         if flag[0] != 0:
             return UNSETTLED, -1
-        face, n = next_face(mesh, stack, n, box)
+        face, n = parity.next_face(mesh, stack, n, box)
     if unsure <= best and unsure < np.inf:
         return UNSETTLED, -1
     return (DISJOINT if found < 0 else TOUCHING), found
 
 
 @inline
-def _holds(vertex: int, own: OwnPoint, radius: float, mesh: MeshArrays) -> int:
+def _holds(vertex: int, own: parity.OwnPoint, radius: float, mesh: MeshArrays) -> int:
     """Tell whether a vertex of a mesh surely lies in the open ball: 1, surely does not: 0; else UNSETTLED."""
     v = minus(as_point3(mesh.vertices, vertex), own.point)
     size = np.sqrt(dot(v, v))
@@ -129,7 +120,7 @@ def _holds(vertex: int, own: OwnPoint, radius: float, mesh: MeshArrays) -> int:
 
 
 @inline
-def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
+def _holds_all(own: parity.OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
     """Tell whether all vertices of a mesh surely lie in the open ball: 1, one surely does not: 0; else UNSETTLED.
 
     Some that are spread over the mesh are asked first: neighbours are alike.
@@ -146,11 +137,13 @@ def _holds_all(own: OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) 
 
 
 @inline
-def _relate(own: OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
+def _relate(own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
     relation, triangle = _first_to_enter(own, radius, mesh, is_named, flag)
     if relation == DISJOINT:
-        where = locate_point(own, mesh) if mesh.has_inside else OUTSIDE
-        return (SECOND_INSIDE_FIRST if where == INSIDE else (DISJOINT if where == OUTSIDE else UNSETTLED)), -1
+        where = parity.locate_point(own, mesh) if mesh.has_inside else parity.OUTSIDE
+        return (
+            SECOND_INSIDE_FIRST if where == parity.INSIDE else (DISJOINT if where == parity.OUTSIDE else UNSETTLED)
+        ), -1
     if relation == TOUCHING:
         is_within = _holds_all(own, radius, mesh, flag)
         if is_within != 0:
@@ -171,7 +164,7 @@ def relate_balls(
         if flag[0] != 0:
             found[row, 0] = UNSETTLED
         else:
-            own = OwnPoint(as_point3(centers, row), float(centers[row, 3]))
+            own = parity.OwnPoint(as_point3(centers, row), float(centers[row, 3]))
             found[row, 0], found[row, 1] = _relate(own, radius, mesh, is_named, flag)
 
 
@@ -242,7 +235,7 @@ def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> C
     entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, found, work.budget.flag)
     work.budget.check()
     relation, triangle = found[0].tolist()
-    if relation == UNSETTLED or (relation == OVERLAPPING and state_at(mesh.arrays, triangle) == STATE_STACKED):
+    if relation == UNSETTLED or (relation == OVERLAPPING and parity.state_at(mesh.arrays, triangle) == STATE_STACKED):
         return None
     return named(mesh, relation, triangle)
 

@@ -1,8 +1,7 @@
 """The boundary of one placed body as balls and half-spaces see it: the faces of a mesh, or the edges of an outline.
 
 Only beside what even-odd does not cancel of a face lies the body's open interior. Most faces are whole: no other face
-of the body covers a part of them. A stacked face (see `face_state.py`) is cut into cells (`exact_regions.py`); one with
-the open interior on one side is live.
+of the body covers a part of them. A stacked one (`parity.py`) is cut into cells (`exact_regions.py`), live or not.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from engine.collision.meshes.exact_body import ExactBody, exact_pair, faces_in
 from engine.collision.meshes.exact_regions import cells_of, sides_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
 from engine.collision.meshes.parity import state_at
-from engine.collision.planar.outline import is_clean, live_edges, outline_of
+from engine.collision.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
 from engine.compiling.direct import entry_of
 from engine.compiling.jit import kernel
@@ -61,9 +60,8 @@ class Boundary:
     ends: (n, d) the vertices of each face or edge. floats: of a place in it the rounded posed vertices, each number
     within `error` of the exact one. near: all faces that come as near to a point as a radius, ascending, and maybe
     others. exact: the position of a vertex. number, number_at: the caller's number of a face, and of one at a vertex.
-    signs: of a plane at each vertex. live: what even-odd leaves of faces, the corners of triangles; the ends of edges,
-    maybe of others too. is_inside: whether a point on no face lies in the body. has_inside: False for surfaces and
-    flat boxes.
+    signs: of a plane at each vertex. live: what even-odd leaves of faces, corners of triangles; ends of edges, maybe of
+    others too. is_inside: is a point on no face in the body. has_inside: False for surfaces, flat boxes.
     """
 
     ends: IntArray
@@ -208,8 +206,7 @@ def segment_distance(point: Sequence[Any], a: Sequence[Any], b: Sequence[Any]) -
 def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
     """Return the squared distance from `point` to the closed segment or triangle of these corners, degenerate or not.
 
-    Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge. In integers, with a
-    twentieth of the time that fractions take.
+    Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge; in integers.
     """
     d, (numbers, scale) = len(point), common_integers([*point, *chain(*corners)])
     q, *ends = [tuple(numbers[at : at + d]) for at in range(0, len(numbers), d)]

@@ -18,36 +18,15 @@ from typing import Final
 import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, IntArray, read_only
+from engine.collision import result
 from engine.collision.codes import OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, image_point, value_at
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, mesh_body_of
 from engine.collision.meshes.parity import state_at
-from engine.collision.result import (
-    FIRST_WITHIN,
-    NO_CONTACT,
-    OVERLAP,
-    SECOND_WITHIN,
-    TOUCH,
-    UNNAMED,
-    Collision,
-    PairFunction,
-    Parts,
-    Poses,
-    Witness,
-    Work,
-)
+from engine.collision.simple import form_relations as relations
 from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.boundary import Boundary, boundary_of, first_triangle_at, pulled_back
-from engine.collision.simple.form_relations import (
-    FACE_AT,
-    HIGH,
-    KIND_AT,
-    N_NUMBERS,
-    RADIUS,
-    THEIR_FACE_AT,
-    relate_forms,
-)
 from engine.compiling.direct import entry_of
 from engine.compiling.jit import inline, kernel
 from engine.predicates.rational import largest_axis, minus, sign_of, squared_length
@@ -71,21 +50,21 @@ def form_of(solid: Solid) -> FloatArray | None:
 
 
 def _form(solid: Solid) -> FloatArray | None:
-    d, form = solid.dimension, np.zeros(N_NUMBERS)
+    d, form = solid.dimension, np.zeros(relations.N_NUMBERS)
     if isinstance(solid, Sphere):
-        form[:d] = form[HIGH : HIGH + d] = solid.center
-        form[RADIUS:] = solid.radius, 1.0
+        form[:d] = form[relations.HIGH : relations.HIGH + d] = solid.center
+        form[relations.RADIUS :] = solid.radius, 1.0
         return read_only(form)
     if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
-        form[:d], form[HIGH : HIGH + d] = solid.min, solid.max
+        form[:d], form[relations.HIGH : relations.HIGH + d] = solid.min, solid.max
         return read_only(form)
     return None
 
 
-def by_forms_or(otherwise: PairFunction) -> PairFunction:
+def by_forms_or(otherwise: result.PairFunction) -> result.PairFunction:
     """Return the function that asks `relate_forms` first, then another one for what that leaves open."""
 
-    def collide_forms(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
+    def collide_forms(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
         d = first.dimension
         told = told_by_forms(first, second, motion_of(poses[0], d), motion_of(poses[1], d), work)
         return otherwise(first, second, poses, work) if told is None else told
@@ -93,37 +72,39 @@ def by_forms_or(otherwise: PairFunction) -> PairFunction:
     return collide_forms
 
 
-def told_by_forms(first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: Work) -> Collision | None:
+def told_by_forms(
+    first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: result.Work
+) -> result.Collision | None:
     """Return what `relate_forms` tells of a box and a box or ball, or of two balls; None where that is not all."""
     form, other, d = form_of(first), form_of(second), first.dimension
     if form is None or other is None:
         return None
-    code: int = entry_of(relate_forms)(form, *motion, other, *their_motion)
+    code: int = entry_of(relations.relate_forms)(form, *motion, other, *their_motion)
     if code == UNSETTLED:
         return None
     if not work.witness:
-        return UNNAMED[code & _RELATION]
+        return result.UNNAMED[code & _RELATION]
     if second.type == "aabb":
         return None if d == 2 and code >= OVERLAPPING else _named(code)
     is_turned = first.type == "aabb" and motion is not motion_of(None, d)  # its faces may count
     return None if is_turned and code >= OVERLAPPING else _BY_BALL[code]
 
 
-_RELATION = (1 << KIND_AT) - 1
-_BY_BALL = NO_CONTACT, FIRST_WITHIN, SECOND_WITHIN, OVERLAP, TOUCH
+_RELATION = (1 << relations.KIND_AT) - 1
+_BY_BALL = result.NO_CONTACT, result.FIRST_WITHIN, result.SECOND_WITHIN, result.OVERLAP, result.TOUCH
 
 
 @lru_cache(4096)
-def _named(code: int) -> Collision:
+def _named(code: int) -> result.Collision:
     """Return what the code of two boxes says."""
-    relation, kind = code & _RELATION, code >> KIND_AT & _RELATION
+    relation, kind = code & _RELATION, code >> relations.KIND_AT & _RELATION
     if relation < OVERLAPPING:
         return _BY_BALL[relation]
-    faces = code >> FACE_AT & _RELATION, code >> THEIR_FACE_AT
-    return Collision(Relation(relation), Witness(STRENGTH[kind], *faces))
+    faces = code >> relations.FACE_AT & _RELATION, code >> relations.THEIR_FACE_AT
+    return result.Collision(Relation(relation), result.Witness(STRENGTH[kind], *faces))
 
 
-def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: Poses, work: Work) -> Collision:
+def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the relation of a box (2D or 3D) or a ball and a ball, exact, in rationals; a posed box is any body.
 
     Flat boxes and balls of radius 0 have no interior and never overlap.
@@ -138,43 +119,46 @@ def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: Poses, work: 
         low, high = as_vector(first.min), as_vector(first.max)
     near = squared_length([max(a - c, c - b, Fraction(0)) for c, a, b in zip(center, low, high)])
     if near > (r + s) ** 2:
-        return NO_CONTACT
+        return result.NO_CONTACT
     if r > s and squared_length([max(c - a, b - c) for c, a, b in zip(center, low, high)]) < (r - s) ** 2:
-        return FIRST_WITHIN
+        return result.FIRST_WITHIN
     if (s > r and near < (s - r) ** 2) or all(c - a > r and b - c > r for c, a, b in zip(center, low, high)):
-        return SECOND_WITHIN
+        return result.SECOND_WITHIN
     enters = near < (r + s) ** 2
     if enters and r > 0 and (s > 0 or all(a < b for a, b in zip(low, high))):
-        return OVERLAP
-    return Collision(Relation.TOUCHING, Witness("surface", piercing=True)) if enters else TOUCH
+        return result.OVERLAP
+    return result.Collision(Relation.TOUCHING, result.Witness("surface", piercing=True)) if enters else result.TOUCH
 
 
-def collide_half_spaces(first: HalfSpace, second: HalfSpace, poses: Poses, work: Work) -> Collision:
+def collide_half_spaces(
+    first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work
+) -> result.Collision:
     """Return the relation of two half-spaces (half-planes in 2D), exact.
 
-    Equal ones overlap; opposite ones that share only their plane touch. Neither holds the other unless its plane lies
-    strictly inside.
+    Equal ones overlap; opposite ones that share their plane touch. One is inside if its plane lies strictly inside.
     """
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]  # m = factor n if parallel
     if any(m[k] != factor * n[k] for k in range(len(n))):
-        return OVERLAP
+        return result.OVERLAP
     low, bound = -d, -e / factor if factor != 0 else -d  # first: n . x >= low; factor = 0 only if not parallel
     if factor > 0:
-        return FIRST_WITHIN if low > bound else (SECOND_WITHIN if low < bound else OVERLAP)
-    return NO_CONTACT if low > bound else (TOUCH if low == bound else OVERLAP)
+        return result.FIRST_WITHIN if low > bound else (result.SECOND_WITHIN if low < bound else result.OVERLAP)
+    return result.NO_CONTACT if low > bound else (result.TOUCH if low == bound else result.OVERLAP)
 
 
-def collide_half_space_sphere(space: HalfSpace, ball: Sphere, poses: Poses, work: Work) -> Collision:
+def collide_half_space_sphere(
+    space: HalfSpace, ball: Sphere, poses: result.Poses, work: result.Work
+) -> result.Collision:
     """Return the relation of a half-space (first) and a ball (second), exact; a half-space is never inside."""
     plane = image_half_space(space, poses[0])
     value = value_at(plane, image_point(ball.center, poses[1]))
     reach = Fraction(ball.radius) ** 2 * squared_length(plane[0])
     if value**2 > reach:
-        return NO_CONTACT if value < 0 else SECOND_WITHIN
+        return result.NO_CONTACT if value < 0 else result.SECOND_WITHIN
     # case: the ball touches the plane from outside, or is a point on it
-    return TOUCH if value**2 == reach and value <= 0 else OVERLAP
+    return result.TOUCH if value**2 == reach and value <= 0 else result.OVERLAP
 
 
 _Function = tuple[FloatArray, FloatArray, float, float]
@@ -185,11 +169,11 @@ _BLOCK = 64
 _MANY = 64 * _BLOCK
 
 
-def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision:
+def collide_half_space_body(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the relation of a half-space (first) and a body with vertices (second), exact."""
     function = _function_in_frame(space, poses)
     if (side := _side_of_box(function, body)) != 0:
-        return SECOND_WITHIN if side > 0 else NO_CONTACT
+        return result.SECOND_WITHIN if side > 0 else result.NO_CONTACT
     if body.dimension == 3:
         answer = _by_scan(function, space, body, poses, work)
         if answer is not None:
@@ -197,21 +181,22 @@ def collide_half_space_body(space: HalfSpace, body: Solid, poses: Poses, work: W
     plane, boundary = image_half_space(space, poses[0]), boundary_of(body, poses[1], work)
     signs = boundary.signs(plane)
     if (signs < 0).all():
-        return NO_CONTACT
+        return result.NO_CONTACT
     if (signs > 0).all():
-        return SECOND_WITHIN
+        return result.SECOND_WITHIN
     enters = bool((signs > 0).any())
     face = boundary.number_at(int(np.argmax(signs > 0 if enters else signs == 0)))
     if enters and boundary.has_inside and _reaches(boundary, boundary.faces_at(signs > 0), plane, 1):
-        return Collision(Relation.OVERLAPPING, Witness("surface", second_face=face))
-    return Collision(Relation.TOUCHING, Witness("surface", second_face=face, piercing=enters))
+        return result.Collision(Relation.OVERLAPPING, result.Witness("surface", second_face=face))
+    return result.Collision(Relation.TOUCHING, result.Witness("surface", second_face=face, piercing=enters))
 
 
-def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Collision | None:
+def _by_scan(
+    function: _Function, space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work
+) -> result.Collision | None:
     """Return the relation of a half-space and a mesh where floats tell the sides of nearly all vertices, else None.
 
-    The face at the first vertex beyond the plane, or on it, is named. Where nothing cancels a face that reaches beyond,
-    there is open interior beside it.
+    The face at the first vertex beyond the plane, or on it, is named. Nothing cancels: open interior lies beside.
     """
     mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
     normal, sizes, offset, size = function
@@ -230,16 +215,18 @@ def _by_scan(function: _Function, space: HalfSpace, body: Solid, poses: Poses, w
     first = {sign: min((vertex for vertex in signs if signs[vertex] == sign), default=-1) for sign in (1, 0, -1)}
     first[1], before = min((v for v in (beyond, first[1]) if v >= 0), default=-1), max(before, first[-1])
     if first[1] < 0 and first[0] < 0:
-        return NO_CONTACT
+        return result.NO_CONTACT
     if before < 0 and first[0] < 0:
-        return SECOND_WITHIN
+        return result.SECOND_WITHIN
     enters = first[1] >= 0
     triangle = entry_of(first_triangle_at)(mesh.arrays, first[1] if enters else first[0])
     overlaps = enters and mesh.has_inside
     if overlaps and state_at(mesh.arrays, triangle) == STATE_STACKED:
         return None
     relation = Relation.OVERLAPPING if overlaps else Relation.TOUCHING
-    return Collision(relation, Witness("surface", second_face=int(mesh.faces[triangle]), piercing=enters != overlaps))
+    return result.Collision(
+        relation, result.Witness("surface", second_face=int(mesh.faces[triangle]), piercing=enters != overlaps)
+    )
 
 
 @inline
@@ -292,12 +279,11 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
     return beyond, before, n_unsure
 
 
-def _function_in_frame(space: HalfSpace, poses: Poses) -> _Function:
+def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
     """Return the function of a half-space in the frame of a body, rounded.
 
     Under a pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of
-    2^-53 of their magnitudes, whose sum is the size, and what underflows, below 2^-1070. Under a pose of its own both
-    are rationals, rounded once.
+    2^-53 of their magnitudes, whose sum is the size, and what underflows, below 2^-1070. Under its own pose: rationals.
     """
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
@@ -335,32 +321,32 @@ def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: i
     return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 
-def half_space_body_parts(space: HalfSpace, body: Solid, poses: Poses, work: Work) -> Parts:
+def half_space_body_parts(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
     """Return what of a half-space and a body with vertices (second) that overlap lies outside the other."""
     boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
     signs = boundary.signs(plane)
     sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)
     meet = np.intersect1d(boundary.faces_at(signs <= 0), boundary.faces_at(signs >= 0), assume_unique=True)
-    return Parts(True, sticks_out, len(meet) > 0)
+    return result.Parts(True, sticks_out, len(meet) > 0)
 
 
-def sphere_sphere_parts(first: Sphere, second: Sphere, poses: Poses, work: Work) -> Parts:
+def sphere_sphere_parts(first: Sphere, second: Sphere, poses: result.Poses, work: result.Work) -> result.Parts:
     between = squared_length(minus(image_point(first.center, poses[0]), image_point(second.center, poses[1])))
     r, s = Fraction(first.radius), Fraction(second.radius)
-    return Parts(r > s or between > (s - r) ** 2, s > r or between > (s - r) ** 2, True)
+    return result.Parts(r > s or between > (s - r) ** 2, s > r or between > (s - r) ** 2, True)
 
 
-def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: Poses, work: Work) -> Parts:
+def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work) -> result.Parts:
     """Overlapping half-spaces are equal, or their planes cross, or each holds the plane of the other."""
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]
     is_equal = factor > 0 and all(q == factor * p for p, q in zip((*n, d), (*m, e)))
-    return Parts(not is_equal, not is_equal, True)
+    return result.Parts(not is_equal, not is_equal, True)
 
 
-def half_space_sphere_parts(space: HalfSpace, ball: Sphere, poses: Poses, work: Work) -> Parts:
+def half_space_sphere_parts(space: HalfSpace, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Parts:
     """A ball that overlaps a half-space reaches its plane."""
     plane = image_half_space(space, poses[0])
     height, reach = value_at(plane, image_point(ball.center, poses[1])), squared_length(plane[0])
-    return Parts(True, height < 0 or height**2 < Fraction(ball.radius) ** 2 * reach, True)
+    return result.Parts(True, height < 0 or height**2 < Fraction(ball.radius) ** 2 * reach, True)

@@ -3,8 +3,7 @@
 A pose that moves, permutes axes and turns signs leaves a box a box. Its bounds are then sums of two doubles, held as
 pairs without error; of these only the order on each axis counts, so they are replaced by their ranks. A ball stays one
 under every pose; of a box, or of another ball's centre as a box without extent, a point is nearest to its centre and a
-point farthest. The squares of their distances are compared with those of the sum and the difference of the radii, as
-expansions.
+point farthest. Their squared distances are compared with the sum and difference of radii, squared.
 """
 
 from __future__ import annotations
@@ -169,8 +168,7 @@ def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind and faces of the contact of two boxes of space that touch.
 
-    They share a part of a face, an edge or a vertex, by on how many axes they only touch; of the faces that meet there
-    the first is on the first of these axes.
+    They share a part of a face, an edge or a vertex, by on how many axes they only touch; faces: on the first of these.
     """
     n, faces = -1, 0
     for axis in range(3):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Pose, Sphere, clearance
-from engine.collision.convex.body import convex_body_of, pooled
+from engine.collision.convex_body import convex_body_of, pooled
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.simple.form_relations import N_NUMBERS
 from engine.distance.convex_gaps import gaps_of_pairs

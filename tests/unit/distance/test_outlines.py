@@ -10,7 +10,7 @@ import pytest
 
 from engine import Polygon, Pose, Relation, Sphere, clearance, clearance_poses, collide
 from engine.collision.result import Clearance, Feature
-from engine.distance.forms import between_outlines
+from engine.distance.forms import between_forms
 from engine.distance.spreads import spread_pair
 from engine.running.budget import UNLIMITED
 from tests.unit.collision.lattices import solid
@@ -40,7 +40,7 @@ def test_squares_that_nearly_touch_are_told_as_rationals_do(is_posed: bool, n: i
         pose = {"rotation": [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]],
                 "translation": [3.0, 0.1]} if is_posed else None  # fmt: skip
         placed = None if pose is None else Pose(pose["rotation"], pose["translation"])
-        found = between_outlines(solid(a), solid(b), (placed, None), None)
+        found = between_forms(solid(a), solid(b), (placed, None), None)
         if found is None:
             continue
         n_told += 1
@@ -56,7 +56,7 @@ def test_squares_that_nearly_touch_are_told_as_rationals_do(is_posed: bool, n: i
 def test_ties_of_parallel_edges_fall_to_the_least_edges_and_other_ties_are_left_open() -> None:
     square = Polygon([[(0, 0), (2, 0), (2, 2), (0, 2)]])
     beside = Polygon([[(3, -1), (5, -1), (5, 3), (3, 3)]])
-    told = between_outlines(square, beside, (None, None), None)
+    told = between_forms(square, beside, (None, None), None)
     assert isinstance(told, Clearance)
     assert told.features is not None
     assert told.points is not None
@@ -67,28 +67,28 @@ def test_ties_of_parallel_edges_fall_to_the_least_edges_and_other_ties_are_left_
     )
     turned = Polygon([[(0, 0), (1, -1), (2, 0), (1, 1)]])
     opposite = Polygon([[(2, 2), (3, 1), (4, 2), (3, 3)]])  # a side each, all along 45 degrees
-    told = between_outlines(turned, opposite, (None, None), None)
+    told = between_forms(turned, opposite, (None, None), None)
     assert isinstance(told, Clearance)
     assert told.points is not None
     assert (told.distance, told.points.tolist()) == (math.sqrt(2), [[2.0, 0.0], [3.0, 1.0]])
     assert told.features == (Feature("vertex", (2,)), Feature("vertex", (1,)))
     arrow, wall = Polygon([[(0, 0), (2, 1), (0, 2)]]), Polygon([[(3, 4), (3, 2), (5, 1), (3, 0), (3, -2), (9, 0)]])
-    assert between_outlines(arrow, wall, (None, None), None) is None  # as far from both sides of a notch
-    assert between_outlines(arrow, wall, (None, None), 0.5) is True
+    assert between_forms(arrow, wall, (None, None), None) is None  # as far from both sides of a notch
+    assert between_forms(arrow, wall, (None, None), 0.5) is True
     assert clearance(arrow, wall).distance == math.sqrt(2)  # type: ignore[union-attr]
 
 
 def test_a_ball_within_a_ring_is_as_far_as_its_sides_and_one_inside_meets() -> None:
     frame = Polygon([[(0, 0), (10, 0), (10, 10), (0, 10)], [(2, 2), (8, 2), (8, 8), (2, 8)]])
-    within = between_outlines(frame, Sphere([5, 4], 1), (None, None), None)
+    within = between_forms(frame, Sphere([5, 4], 1), (None, None), None)
     assert isinstance(within, Clearance)
     assert within.points is not None
     assert (within.distance, within.points.tolist()) == (1.0, [[5.0, 2.0], [5.0, 3.0]])
     for center, radius in [((1, 1), 0.25), ((5, 4), 2.5)]:
-        met = between_outlines(frame, Sphere(center, radius), (None, None), None)
+        met = between_forms(frame, Sphere(center, radius), (None, None), None)
         assert isinstance(met, Clearance)
         assert met.distance == 0.0
-    touching = between_outlines(frame, Sphere([5, 4], 2), (None, None), None)
+    touching = between_forms(frame, Sphere([5, 4], 2), (None, None), None)
     assert touching is None  # a contact is for rationals
 
 

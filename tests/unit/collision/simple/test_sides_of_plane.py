@@ -9,7 +9,7 @@ from engine import HalfSpace, Polygon, Polyhedron, Pose, Relation, Solid, Surfac
 from engine.collision.exact_images import as_vector, image_half_space, value_at
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.result import Work
-from engine.collision.simple import against_half_space
+from engine.collision.simple import closed_forms
 from engine.collision.simple.boundary import first_triangle_at, pulled_back
 from engine.collision.simple.closed_forms import _by_scan, _function_in_frame, collide_half_space_body, scan_sides
 from engine.predicates.rational import sign_of
@@ -68,7 +68,7 @@ def test_answers_as_without_the_scan(
     n_told = sum(
         _by_scan(_function_in_frame(question[0], poses), *question, poses, Work()) is not None for question in questions
     )
-    monkeypatch.setattr(against_half_space, "_by_scan", lambda *_: None)
+    monkeypatch.setattr(closed_forms, "_by_scan", lambda *_: None)
     assert answers == [collide_half_space_body(*question, poses, Work()) for question in questions]
     assert n_told > 40
 
@@ -88,8 +88,8 @@ def test_a_body_far_from_the_plane_is_told_by_its_box(
     def refuse(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(against_half_space, "boundary_of", refuse)
-    monkeypatch.setattr(against_half_space, "_by_scan", refuse)
+    monkeypatch.setattr(closed_forms, "boundary_of", refuse)
+    monkeypatch.setattr(closed_forms, "_by_scan", refuse)
     flat, solid = Pose([[0.6, -0.8], [0.8, 0.6]], [scale, 0]), Pose(TURN.rotation, TURN.translation * scale)
     bodies = [(flat, [0, 1], Polygon([np.array([[0, 0], [4, 0], [1, 1], [0, 4]]) * scale]))]
     bodies.append((solid, [0, 0, 1], Polyhedron(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * scale, FACES)))

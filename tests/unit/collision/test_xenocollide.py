@@ -9,12 +9,12 @@ import pytest
 
 from engine import Aabb, Pose, Relation, collide
 from engine.collision.codes import UNSETTLED
-from engine.collision.convex.body import ASIDE, CENTER, ConvexArrays, convex_body_of, pooled
-from engine.collision.convex.pair import APART, MEETING, inner_point, meet_or_apart, placed_body
+from engine.collision.convex_body import ASIDE, CENTER, ConvexArrays, convex_body_of, pooled
+from engine.collision.convex_pair import APART, MEETING, inner_point, meet_or_apart, placed_body
 from engine.collision.meshes.placement import PoseArrays
 from engine.compiling.jit import kernel
 from engine.predicates.vectors import minus
-from tests.unit.collision.convex.test_pair import poses
+from tests.unit.collision.test_convex_pair import poses
 
 
 @kernel

@@ -10,7 +10,7 @@ import pytest
 
 import engine
 from engine import Aabb, Polygon, Pose, Sphere, Triangle, collide
-from engine.collision.planar.outline import is_clean, live_edges, outline_of, rounded, single_points
+from engine.collision.outline import is_clean, live_edges, outline_of, rounded, single_points
 from engine.running.budget import Budget
 from tests.unit.collision.lattices import COUNTS, Maker, aabb, check_pairs, polygon, triangle
 

@@ -5,8 +5,7 @@ Edge k runs from vertex k to the next vertex of its ring, so that an edge's numb
 edges, or all of them, cancelled; single points remain where a ring has one position only.
 
 One exact arrangement of two bodies answers everything: its faces say whether the open interiors meet, its nodes and
-edges whether the boundaries do, and where the boundaries do not meet, the face at any edge of one body says whether
-that part of it lies in the other.
+edges whether the boundaries do, and where they do not, the face at an edge of one body whether it lies in the other.
 """
 
 from __future__ import annotations
@@ -21,32 +20,10 @@ from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.arrays import FloatArray, IntArray
+from engine.collision import outline_batch as batch
+from engine.collision import result
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import image_point, rounded
-from engine.collision.planar.outline_batch import (
-    APART,
-    KINDS,
-    MOST_EDGES,
-    OUT_OF_FIRST,
-    OUT_OF_SECOND,
-    is_simple_body,
-    outline_arrays,
-    relate_two,
-    rings_of,
-)
-from engine.collision.result import (
-    FIRST_WITHIN,
-    NO_CONTACT,
-    RELATIONS,
-    SECOND_WITHIN,
-    UNNAMED,
-    Collision,
-    Kind,
-    Parts,
-    Poses,
-    Witness,
-    Work,
-)
 from engine.compiling.direct import entry_of
 from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
@@ -88,7 +65,7 @@ class Outline:
 
 def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
     """Return the edges of a polygon, a triangle or a box of the plane under `pose`."""
-    vertices, offsets = rings_of(body)
+    vertices, offsets = batch.rings_of(body)
     ends = np.empty((len(vertices), 2), np.int64)
     ends[:, 0] = np.arange(len(vertices))
     ends[:, 1] = ends[:, 0] + 1
@@ -163,51 +140,50 @@ def is_clean(outline: Outline, number: int) -> bool:
 def single_points(outline: Outline) -> list[int]:
     """Return one vertex of each ring that has one position only."""
     starts = np.flatnonzero(outline.ends[:, 1] != outline.ends[:, 0] + 1)  # the last edge of each ring
-    result, first = [], 0
+    found, first = [], 0
     for last in starts.tolist():
         if all(outline.points[k] == outline.points[first] for k in range(first, last + 1)):
-            result.append(first)
+            found.append(first)
         first = last + 1
-    return result
+    return found
 
 
-def _related(first: Solid, second: Solid, poses: Poses) -> tuple[int, int, int, int, int]:
+def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
     """Return what `relate_placed` does; UNSETTLED for large bodies, and for those that meet and are not simple."""
-    one, other = outline_arrays(first), outline_arrays(second)
-    if max(len(one[1]), len(other[1])) > MOST_EDGES:
-        return UNSETTLED, 0, -1, -1, APART
-    found: tuple[int, int, int, int, int] = entry_of(relate_two)(
-        *one, *motion_of(poses[0], 2), *other, *motion_of(poses[1], 2)
-    )
-    if found[0] == DISJOINT or (found[0] != UNSETTLED and is_simple_body(first) and is_simple_body(second)):
+    one, other = batch.outline_arrays(first), batch.outline_arrays(second)
+    if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
+        return UNSETTLED, 0, -1, -1, batch.APART
+    own, their = motion_of(poses[0], 2), motion_of(poses[1], 2)
+    found: tuple[int, int, int, int, int] = entry_of(batch.relate_two)(*one, *own, *other, *their)
+    if found[0] == DISJOINT or (found[0] != UNSETTLED and batch.is_simple_body(first) and batch.is_simple_body(second)):
         return found
-    return UNSETTLED, 0, -1, -1, APART
+    return UNSETTLED, 0, -1, -1, batch.APART
 
 
-def collide_outlines(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
+def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return what `collide_outline_outline` does, which decides what is not sure here."""
     relation, _, i, j, kind = _related(first, second, poses)
     if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
         return collide_outline_outline(first, second, poses, work)
     if relation == DISJOINT or not work.witness:
-        return UNNAMED[relation]
+        return result.UNNAMED[relation]
     if relation >= OVERLAPPING:
-        return Collision(RELATIONS[relation], Witness(KINDS[kind], i, j))
-    return FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else SECOND_WITHIN
+        return result.Collision(result.RELATIONS[relation], result.Witness(batch.KINDS[kind], i, j))
+    return result.FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else result.SECOND_WITHIN
 
 
-def outline_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+def outline_parts(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
     """Return what of each of two overlapping bodies lies outside the other."""
     relation, found, _, _, kind = _related(first, second, poses)
     if relation == UNSETTLED:
         return parts_by_arrangement(first, second, poses, work)
-    return Parts(found & OUT_OF_SECOND != 0, found & OUT_OF_FIRST != 0, kind != APART)
+    return result.Parts(found & batch.OUT_OF_SECOND != 0, found & batch.OUT_OF_FIRST != 0, kind != batch.APART)
 
 
 FIRST, SECOND, BOTH = 1, 2, 3
 
 
-def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
+def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the relation of two bodies of the plane, each a polygon, a triangle or a box; exact.
 
     Bodies are closed sets under even-odd; an edge that cancels is boundary still, but no interior lies beside it. Where
@@ -215,21 +191,21 @@ def collide_outline_outline(first: Solid, second: Solid, poses: Poses, work: Wor
     """
     a, b = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
-        return NO_CONTACT
+        return result.NO_CONTACT
     labels, meets, first_parts, second_parts = _lying(a, b, (first, second), poses, work.budget)
     if not meets:
         if not any(first_parts) and not any(second_parts):
-            return NO_CONTACT
+            return result.NO_CONTACT
         if all(first_parts) and not any(second_parts):
-            return FIRST_WITHIN
+            return result.FIRST_WITHIN
         if all(second_parts) and not any(first_parts):
-            return SECOND_WITHIN
+            return result.SECOND_WITHIN
     overlapping = BOTH in labels
     pierces = not overlapping and (any(first_parts) or any(second_parts))
     witness = None
     if work.witness:
         witness = _witness(a, b, pierces, "second" if any(first_parts) else "first", work.budget)
-    return Collision(Relation.OVERLAPPING if overlapping else Relation.TOUCHING, witness)
+    return result.Collision(Relation.OVERLAPPING if overlapping else Relation.TOUCHING, witness)
 
 
 class _Lying(NamedTuple):
@@ -241,28 +217,26 @@ class _Lying(NamedTuple):
     second: list[bool]
 
 
-def _lying(a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: Poses, budget: Budget) -> _Lying:
+def _lying(a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: result.Poses, budget: Budget) -> _Lying:
     arrangement, _ = arrange_outlines([a, b], budget)
     subdivision = subdivide(arrangement)
     labels, meet = label_faces(subdivision), _boundaries_meet(arrangement)
     sides = [labels[left] & labels[right] for left, right in zip(subdivision.faces[0::2], subdivision.faces[1::2])]
     parts: list[list[bool]] = []
-    for outline, own, other, solid, pose in (
-        (a, FIRST, SECOND, solids[1], poses[1]),
-        (b, SECOND, FIRST, solids[0], poses[0]),
-    ):
-        points = [rational_location(outline.points[k], solid, pose, budget.check) for k in single_points(outline)]
+    for outline, own, other, k in ((a, FIRST, SECOND, 1), (b, SECOND, FIRST, 0)):
+        alone = [outline.points[vertex] for vertex in single_points(outline)]
+        points = [rational_location(point, solids[k], poses[k], budget.check) for point in alone]
         meet |= Location.BOUNDARY in points
         parts.append([bool(side & other) for cover, side in zip(arrangement.cover, sides) if cover == own])
         parts[-1] += [location == Location.INSIDE for location in points]
     return _Lying(labels, meet, *parts)
 
 
-def parts_by_arrangement(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
+def parts_by_arrangement(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
     """Return what of each of two overlapping bodies lies outside the other; exact."""
     outlines = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     labels, meet, _, _ = _lying(*outlines, (first, second), poses, work.budget)
-    return Parts(FIRST in labels, SECOND in labels, meet)
+    return result.Parts(FIRST in labels, SECOND in labels, meet)
 
 
 def _boundaries_meet(arrangement: Arrangement) -> bool:
@@ -276,7 +250,7 @@ def _boundaries_meet(arrangement: Arrangement) -> bool:
     return BOTH in at_node
 
 
-def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Budget) -> Witness:
+def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Budget) -> result.Witness:
     """Return the first pair of edges, by their numbers, that meet; a containment where no two edges do."""
     for i in range(a.n_edges):
         budget.check()
@@ -284,11 +258,11 @@ def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Bud
         for j in np.flatnonzero(near).tolist():
             kind = _meeting(*a.edge(i), *b.edge(j))
             if kind is not None:
-                return Witness(kind, i, j, piercing=pierces)
-    return Witness("containment", containing="second" if containing == "second" else "first", piercing=pierces)
+                return result.Witness(kind, i, j, piercing=pierces)
+    return result.Witness("containment", containing="second" if containing == "second" else "first", piercing=pierces)
 
 
-def _meeting(p: Point, q: Point, r: Point, s: Point) -> Kind | None:
+def _meeting(p: Point, q: Point, r: Point, s: Point) -> result.Kind | None:
     """Return how the closed segments p q and r s meet, None if they do not."""
     if p in (r, s) or q in (r, s):
         return "vertex_vertex"

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polygon, Pose, Solid, Triangle, collide
+from engine.collision import outline
 from engine.collision.batches import SceneBatches, scene_bodies
 from engine.collision.codes import UNSETTLED
-from engine.collision.planar import outline
-from engine.collision.planar.outline import (
+from engine.collision.outline import (
     collide_outline_outline,
     collide_outlines,
     outline_parts,
     parts_by_arrangement,
 )
-from engine.collision.planar.outline_batch import outline_pool
+from engine.collision.outline_batch import outline_pool
 from engine.collision.result import Work
 from engine.running.budget import Budget
 

@@ -1,7 +1,6 @@
 """Pairs of convex bodies of space in batches: balls around them, then the portal, then faces for one in the other.
 
-Everything is float64 with a proven margin; what no margin proves, contact above all, stays UNSETTLED and is decided by
-the exact path of the pair.
+Everything is float64 with a proven margin; what none proves, contact above all, stays UNSETTLED for the exact path.
 
 **Inside.** The first lies within the open interior of the second when every vertex is strictly below each face of the
 second. With n the unit normal of a face as computed, and p one of its corners, n . (a - p) differs from the value for
@@ -11,8 +10,7 @@ the exact image of the face by the error of the posed coordinates and by the err
 
 **Meet or apart?** Proposed in float64, believed only when proven. The bodies have a common point exactly if the set of
 differences M = {a - b} holds the origin, and common interior points exactly if the origin is in the open interior of M.
-From a point of M, a triangle of points of M (the portal) is moved outward along the half-line to the origin, each
-corner the farthest of M in some direction.
+From a point of M a triangle of points farthest in some direction, the portal, moves outward to the origin.
 
 **Apart** is proven by a direction d in which all of M is below 0: largest d . a < least d . b. The values are those of
 all vertices, with d turned into each body's own coordinates: turning d is off by 3u |d|_1 an entry (u = 2^-53, entries
@@ -24,12 +22,10 @@ of two rounded posed points, of which a coordinate is off by at most `error` = e
 less than e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3 where no coordinate exceeds m, and by 2^-50 of six
 products at most m^3 for rounding. Bodies with an interior then share an interior point.
 
-What neither proves (contact, or almost) is UNSETTLED and decided elsewhere. Exponents: the caller keeps coordinates
-below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a direction or a determinant of at most 2^-900
-proves nothing, so what underflow loses is below the margins.
+Exponents: the caller keeps coordinates below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a
+direction or a determinant of at most 2^-900 proves nothing, so what underflow loses is below the margins.
 
-Source: G. Snethen, XenoCollide: complex collision made simple, Game Programming Gems 7, 2008. Changed: both answers are
-certified; a proposal that stalls ends the search.
+Source: G. Snethen, XenoCollide: complex collision made simple, Game Programming Gems 7, 2008; both answers certified.
 """
 
 from __future__ import annotations
@@ -40,7 +36,7 @@ import numpy as np
 
 from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
-from engine.collision.convex.body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
+from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned, turned_back
 from engine.compiling.jit import inline, kernel, merged
 from engine.predicates.vectors import as_point3, cross, dot, largest_of, length, minus, negative
@@ -168,8 +164,7 @@ def relate_convex_pairs(
 ) -> None:  # fmt: skip
     """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
 
-    poses: n_rows; row 0 holds the identity, which also stands for no pose.
-    Returns early when the flag is raised.
+    poses: n_rows; row 0 holds the identity, also for no pose. Returns early when the flag is raised.
     """
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
@@ -273,8 +268,7 @@ def _size(a: Point3) -> float:
 def meet_or_apart(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
     """Return APART, MEETING (the open interiors) or UNSETTLED. v0: a point of M, better not one of its symmetry.
 
-    Stages: 0 and 1 find the first two corners, 2 the third, until the half-line from v0 to the origin passes between
-    all three; 3 moves the corners outward.
+    Stages: 0 and 1 find two corners, 2 a third so that the half-line from v0 to the origin passes between, 3 moves out.
     """
     error, rounding = a.place.error + b.place.error, a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0

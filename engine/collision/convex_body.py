@@ -31,8 +31,7 @@ CENTER, ASIDE = 0, 3
 RADIUS, REACH, ROUND = 6, 7, 8
 N_NUMBERS = 9
 """Places in the numbers of a body: two points inside, the second off the symmetric middle (three places each); how far
-the farthest vertex is from either, rounded up; the largest magnitude of a coordinate, a ball's radius added; that
-radius, 0.0 for others."""
+the farthest vertex is from either, rounded up; the largest magnitude of a coordinate, radius added; that radius."""
 
 WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
 """How far the second point inside is drawn to the farthest vertices on the diagonals: differently on every axis."""
@@ -44,8 +43,7 @@ ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers
 """Several convex bodies, one after another; few arrays, because kernels count references to each.
 
 points: (3, n) their vertices. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths.
-anchors: (n_faces,) a vertex of each face. firsts: (2, n_bodies + 1) first vertex and face of each body. numbers:
-(n_bodies, N_NUMBERS).
+anchors: (n_faces,) a vertex of each. firsts: (2, n_bodies + 1) of vertices and faces. numbers: (n_bodies, N_NUMBERS).
 """
 
 

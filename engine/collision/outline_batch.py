@@ -1,5 +1,4 @@
-"""Pairs of planar bodies in compiled code: polygons, triangles and boxes whose edges meet only where they follow each
-other.
+"""Pairs of polygons, triangles and boxes of the plane whose edges meet only where they follow each other, compiled.
 
 One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
 outside, for no other edge comes near. Where edges meet and none cross, every such place has a vertex: about it either
@@ -236,15 +235,13 @@ def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -
 
 
 @inline
-def _rings_inside(
-    points: FloatArray, following: IntArray, vertices: FloatArray, their_following: IntArray, error: float
-) -> int:
+def _rings_inside(points: FloatArray, following: IntArray, vertices: FloatArray, theirs: IntArray, error: float) -> int:
     """Return where the rings of a body lie that do not meet another one, as bits; others add nothing that is wrong."""
     found = 0
     for vertex in range(len(following)):
         if following[vertex] > vertex:  # not the last of its ring
             continue
-        where = inside(as_point2(points, vertex), vertices, their_following, error)
+        where = inside(as_point2(points, vertex), vertices, theirs, error)
         if where != ON_EDGE:
             found |= _IN if where == 1 else (_OUT if where == 0 else _MAYBE)
     return found
@@ -255,8 +252,7 @@ def relate_placed(
     points: FloatArray, following: IntArray, sides: Any, vertices: FloatArray, theirs: IntArray, their_sides: Any,
     boxes: FloatArray, error: float,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return the relation of two placed bodies, or UNSETTLED; what holds of their interiors, as bits; the first edges
-    that meet, -1 for none or not the first, and how.
+    """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1; how.
 
     Of bodies that are not simple a relation says no more than whether they meet. sides: none where that is enough.
     boxes: of the second's blocks. error: of each coordinate.
@@ -281,15 +277,12 @@ def relate_placed(
                 if how > UNSURE:
                     if len(sides) == 0 or len(their_sides) == 0 or sides[edge] == 0 or their_sides[other] == 0:
                         return UNSETTLED, 0, -1, -1, kind
-                    found |= at_contact(
-                        points, following, edge, sides[edge], vertices, theirs, other, their_sides[other]
-                    )
+                    side, their_side = sides[edge], their_sides[other]
+                    found |= at_contact(points, following, edge, side, vertices, theirs, other, their_side)
     if is_unsure:
         return UNSETTLED, 0, -1, -1, kind
-    own, their = (
-        _rings_inside(points, following, vertices, theirs, error),
-        _rings_inside(vertices, theirs, points, following, error),
-    )
+    own = _rings_inside(points, following, vertices, theirs, error)
+    their = _rings_inside(vertices, theirs, points, following, error)
     if (own | their) & _MAYBE:
         return UNSETTLED, 0, -1, -1, kind
     if kind == APART and own == _IN and their == _OUT:
@@ -326,9 +319,8 @@ def relate_outline_pairs(
         following, theirs, vertices = pool.following[own], pool.following[their], pool.vertices
         error = max(_place(vertices[own], r[i], t[i], placed), _place(vertices[their], r[j], t[j], others))
         box_blocks(others, theirs, boxes)
-        relation, found, _, _, _ = relate_placed(
-            placed, following, pool.sides[own], others, theirs, pool.sides[their], boxes, error
-        )
+        sides, their_sides = pool.sides[own], pool.sides[their]
+        relation, found, _, _, _ = relate_placed(placed, following, sides, others, theirs, their_sides, boxes, error)
         if not has_detail or relation != OVERLAPPING or found == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
             relations[item] = relation
 
@@ -350,8 +342,7 @@ def is_simple_body(solid: Solid) -> bool:
 
 
 IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
-"""Bits: where the open interiors meet; where that of the first lies outside the second; that of the second outside the
-first."""
+"""Bits: the open interiors meet; some of the first is outside the second; some of the second outside the first."""
 
 
 @inline
@@ -379,12 +370,10 @@ def _have_common(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
 
 
 @inline
-def _of_sectors(
-    p: Point2, before: Point2, after: Point2, side: int, their_before: Point2, their_after: Point2, their_side: int
-) -> int:
-    """Return what holds about a vertex of one boundary on another, as bits."""
+def _of_sectors(p: Point2, before: Point2, after: Point2, side: int, c: Point2, d: Point2, their_side: int) -> int:
+    """Return what holds about a vertex of one boundary on another, as bits; c, d: before and after it on that."""
     s, e = (after, before) if side > 0 else (before, after)
-    t, f = (their_after, their_before) if their_side > 0 else (their_before, their_after)
+    t, f = (d, c) if their_side > 0 else (c, d)
     found = IN_BOTH if _have_common(p, s, e, t, f) else 0
     found |= OUT_OF_SECOND if _have_common(p, s, e, f, t) else 0
     return found | (OUT_OF_FIRST if _have_common(p, t, f, e, s) else 0)
