@@ -152,8 +152,7 @@ def _is_level(u: Wide2, error: float) -> bool:
 
 @called
 def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, int]:
-    """Return the first two of `Found`, and where on the edge a b, which has a length, is the foot of p: start 0, end 1,
-    2, unsure -1.
+    """Return the first two of `Found`, and where the foot of p lies on an edge: start 0, end 1, between 2, unsure -1.
 
     error: of the coordinates of both bodies together.
     """
