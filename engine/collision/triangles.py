@@ -69,14 +69,18 @@ def against_edge(p: Point2, q: Point2, u: Facet) -> int:
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
     """Return how u lies to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors apart."""
-    n_within, found = 0, OVERLAPPING
-    for p, q in ((t.p, t.q), (t.q, t.r), (t.r, t.p)):
-        how = against_edge(p, q, u)
-        if how in (UNSETTLED, DISJOINT):
-            return how
-        n_within += how == SECOND_INSIDE_FIRST
-        found = TOUCHING if how == TOUCHING else found
-    return SECOND_INSIDE_FIRST if n_within == 3 else found
+    first = against_edge(t.p, t.q, u)
+    if first in (UNSETTLED, DISJOINT):
+        return first
+    second = against_edge(t.q, t.r, u)
+    if second in (UNSETTLED, DISJOINT):
+        return second
+    third = against_edge(t.r, t.p, u)
+    if third in (UNSETTLED, DISJOINT):
+        return third
+    if first == SECOND_INSIDE_FIRST and second == SECOND_INSIDE_FIRST and third == SECOND_INSIDE_FIRST:
+        return SECOND_INSIDE_FIRST
+    return TOUCHING if first == TOUCHING or second == TOUCHING or third == TOUCHING else OVERLAPPING
 
 
 @inline
