@@ -15,6 +15,7 @@ from engine.containment.methods import rational_locate
 from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import profiles
+from engine.segment_clipping.on_boundary import boundary
 from engine.solids import bounds
 from engine.solids.aabb import Aabb
 from engine.solids.convex import Convex
@@ -110,7 +111,7 @@ ROWS: Final = (
         bounds=bounds.bounds_of_mesh,
         profile=profiles.on_boundary,
         n_faces=lambda solid: int(solid.n_faces),
-        clip=lambda solid: solid,
+        clip=boundary.on_boundary,
         planes=planes.planes_of_faces,
         meets={3: "mesh"},
     ),
@@ -155,7 +156,7 @@ ROWS: Final = (
         bounds=bounds.bounds_of_vertices,
         profile=profiles.on_boundary,
         n_faces=lambda solid: len(solid.vertices),
-        clip=lambda solid: solid,
+        clip=boundary.on_boundary,
         meets={2: "outline"},
     ),
     Row(

@@ -22,10 +22,9 @@ from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
 from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import MET, Firsts, cut_near, find_first
-from engine.segment_clipping.clip_segments import method_for
-from engine.segment_clipping.decide_then_cut import FEW, clip_on_convex
-from engine.segment_clipping.on_boundary.boundary import clip_chunk, clip_few
-from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
+from engine.segment_clipping.clip_segments import plan_for
+from engine.segment_clipping.decide_then_cut import FEW
+from engine.segment_clipping.on_boundary.boundary import clip_chunk
 from engine.segment_clipping.pieces import Pieces, first_of, room_for
 from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
 from engine.solids.base import Solid
@@ -260,11 +259,10 @@ def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budg
     arithmetic, all where some did and it is not told which; and whether the others are of touching_cut.py."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
-        pieces, _, n_rational = clip_on_convex(segments, shape, cast(Any, method_for(shape)), budget, 1, None)
+        plan = plan_for(shape)
+        pieces, _, n_rational = plan.cut(segments, shape, plan, budget, 1, None)
         return pieces, every[: n * bool(n_rational)], False
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
-        few = clip_few(segments, shape, boundary_of(shape)) if n <= FEW else None
-        if few is not None:
-            return few, every[:0], True
-        return *clip_chunk(segments, 0, n, shape, locator_of(solid).chosen(n, budget), budget), True
+        locator = None if n <= FEW else locator_of(solid).chosen(n, budget)
+        return *clip_chunk(segments, 0, n, shape, locator, budget), True
     return settled(segments, every, solid, pose, budget), every, False

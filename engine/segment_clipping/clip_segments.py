@@ -10,23 +10,18 @@ import numpy.typing as npt
 
 from engine.arrays import FloatArray, IntArray
 from engine.predicates.scaling import balanced_rows
-from engine.running.budget import Budget, Cancel
+from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.ball_cut import decide_on_sphere, fill_on_sphere
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
-from engine.segment_clipping.decide_then_cut import FEW, Method, Scaled, clip_few, clip_on_convex, scaled
-from engine.segment_clipping.on_boundary.boundary import clip_few as clip_few_on_boundary
-from engine.segment_clipping.on_boundary.boundary import clip_on_boundary
-from engine.segment_clipping.pieces import Pieces
+from engine.segment_clipping.decide_then_cut import Method, Plan, Scaled, clip_on_convex, scaled
 from engine.segment_clipping.planes_cut import fill_on_boxes, fill_on_rows
 from engine.solids.aabb import Aabb, rows_between
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
 from engine.solids.convex import Convex, rows_of
 from engine.solids.half_space import HalfSpace
-from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.registry import refused, row_of
 from engine.solids.sphere import Sphere
 from engine.types import Accuracy
@@ -112,57 +107,34 @@ def clip_segments(
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
     """
-    if report is False and is_unlimited(workers, deadline, cancel, progress):
-        few = _clip_array(segments, region)
-        if few is not None:
-            return few
-    check_options(workers, progress, report=report)
-    method = method_for(region)
-    array = as_point_groups(segments, 2, region.dimension, ("segments",), must_be_finite=False)  # kernels look at it
-    with Budget(deadline, cancel) as budget:
-        if isinstance(method, Method):
-            found, n_beyond, n_rational = clip_on_convex(array, region, method, budget, workers, progress)
-        else:
-            found, n_beyond, n_rational = clip_on_boundary(array, method, budget, workers, progress)
-    pieces = _as_result(found)
-    if not report:
-        return pieces
-    name = method.name if isinstance(method, Method) else "box_tree"
-    return pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, name)
-
-
-def _clip_array(segments: Any, region: Solid) -> SegmentPieces | None:
-    """Clip an array of few segments; None where nothing is kept with the region yet, or a segment is left open."""
-    if not isinstance(region, Solid) or not is_ready(segments, 2, region.dimension) or not 0 < len(segments) <= FEW:
-        return None
-    method = region.kept("segment_method")
-    if method is not None:
-        found = clip_few(segments, method)
-        return None if found is None else _as_result(found[0])
-    if not isinstance(region, Polygon | Polyhedron) or (boundary := region.kept("clipping_boundary")) is None:
-        return None
-    pieces = clip_few_on_boundary(segments, region, boundary)
-    return None if pieces is None else _as_result(pieces)
-
-
-def _as_result(found: Pieces) -> SegmentPieces:
-    """Return pieces as callers get them."""
+    is_free = is_unlimited(workers, deadline, cancel, progress)
+    if not is_free or report is not False:
+        check_options(workers, progress, report=report)
+    plan: Plan | None = region.kept("segment_plan") if isinstance(region, Solid) else None
+    array: Any = segments
+    if plan is None or not is_ready(array, 2, region.dimension):
+        plan = plan_for(region)
+        array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks at it
+    if is_free and len(array) <= plan.few:
+        found, n_beyond, n_rational = plan.cut(array, region, plan, UNLIMITED, workers, None)
+    else:
+        with Budget(deadline, cancel) as budget:
+            found, n_beyond, n_rational = plan.cut(array, region, plan, budget, workers, progress)
     source, (start, end), t, faces = found
-    return SegmentPieces(source, start, end, t, faces)
+    pieces = SegmentPieces(source, start, end, t, faces)
+    return (pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, plan.name)) if report else pieces
 
 
-def method_for(region: Solid) -> Method | Polygon | Polyhedron:
-    """Return what clips on this solid, kept with it, or the boundary that it is."""
-    if isinstance(region, Polygon | Polyhedron):
-        return region
+def plan_for(region: Solid) -> Plan:
+    """Return how segments are clipped on this solid, kept with it. Raises: UnsupportedSolidError."""
     make = row_of(region).clip
     if make is None:
         raise refused(region, "clip_segments does not take", lambda row: row.clip, where=("region",))
-    method: Method = region.prepared("segment_method", lambda: make(region))
-    return method
+    plan: Plan = region.prepared("segment_plan", lambda: make(region))
+    return plan
 
 
-def on_box(region: Aabb) -> Method:
+def on_box(region: Aabb) -> Plan:
     """Return how segments are clipped on a box."""
     low, high = region.min, region.max
 
@@ -173,10 +145,11 @@ def on_box(region: Aabb) -> Method:
         found = scaled(segments, low, high)
         return found and replace(found, region=with_columns(*found.region))
 
-    return Method("cohen_sutherland", decide_on_boxes, fill_on_boxes, with_columns(low, high), scale)
+    method = Method(decide_on_boxes, fill_on_boxes, with_columns(low, high), scale)
+    return Plan("cohen_sutherland", clip_on_convex, method=method)
 
 
-def on_planes(region: HalfSpace | Convex) -> Method:
+def on_planes(region: HalfSpace | Convex) -> Plan:
     """Return how segments are clipped on what planes bound."""
     rows = rows_of(region)
     plain = balanced_rows(rows, 0)
@@ -186,10 +159,11 @@ def on_planes(region: HalfSpace | Convex) -> Method:
         balanced = None if found is None else balanced_rows(rows, found.exponent)
         return None if found is None or balanced is None else replace(found, region=(as_columns(balanced),))
 
-    return Method("cyrus_beck", decide_on_rows, fill_on_rows, (as_columns(rows if plain is None else plain),), scale)
+    method = Method(decide_on_rows, fill_on_rows, (as_columns(rows if plain is None else plain),), scale)
+    return Plan("cyrus_beck", clip_on_convex, method=method)
 
 
-def on_ball(region: Sphere) -> Method:
+def on_ball(region: Sphere) -> Plan:
     """Return how segments are clipped on a ball."""
     center, radius = region.center, float(region.radius)
 
@@ -197,4 +171,5 @@ def on_ball(region: Sphere) -> Method:
         found = scaled(segments, center, np.array([radius]))
         return found and replace(found, region=(found.region[0], float(found.region[1][0])))
 
-    return Method("sphere_interval", decide_on_sphere, fill_on_sphere, (center, radius), scale)
+    method = Method(decide_on_sphere, fill_on_sphere, (center, radius), scale)
+    return Plan("sphere_interval", clip_on_convex, method=method)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,7 @@ that are clipped in the time that it takes to plan more."""
 
 _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
 """Scratch for so few segments that no call works in now."""
+_NO_FLAG: Final = UNLIMITED.flag
 _AT_ONCE: Final = 1 << 12
 """Segments that are decided on before their pieces are filled."""
 
@@ -61,34 +62,45 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
     return Scaled(exact[0], tuple(exact[1:]), exponent)
 
 
-@dataclass(frozen=True, slots=True)
-class Method:
-    """How segments are clipped on one region.
+class Method(NamedTuple):
+    """How segments are clipped on one convex region.
 
     decide, fill: kernels; see cohen_sutherland.py, planes_cut.py. region: their arguments. scale: returns the batch
     scaled, None where it is well as it is or cannot be scaled exactly.
     """
 
-    name: str
     decide: Any
     fill: Any
     region: tuple[Any, ...]
     scale: Callable[[FloatArray], Scaled | None]
 
 
-def clip_on_convex(
-    segments: FloatArray, region: Solid, method: Method, budget: Budget, workers: int | None, progress: Progress | None
-) -> Clipped:
-    """Return the piece of each segment that has one. segments: (n, 2, dim) float64, not yet looked at for NaN.
+class Plan(NamedTuple):
+    """How segments are clipped on one solid: made from the cell `clip` of its row, and kept with the solid."""
 
-    Raises: NotFiniteError.
-    """
-    found = clip_few(segments, method) if len(segments) <= FEW else None
-    if found is not None:
-        budget.check()
+    name: str
+    """For `Accuracy.method`."""
+    cut: Callable[[FloatArray, Any, Plan, Budget, int | None, Progress | None], Clipped]
+    """(segments, solid, plan, budget, workers, progress); segments: (n, 2, dim) float64, not yet looked at for NaN.
+    Raises NotFiniteError."""
+    few: int = FEW
+    """Segments that are clipped in one piece where nothing limits the call: `budget` is UNLIMITED then."""
+    method: Method | None = None
+    """Of a convex region."""
+
+
+def clip_on_convex(
+    segments: FloatArray, region: Solid, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
+) -> Clipped:
+    """Return the piece of each segment that has one: see `Plan.cut`."""
+    method = plan.method
+    assert method is not None
+    if len(segments) <= FEW and (few := _clip_few(segments, method)) is not None:
+        if budget is not UNLIMITED:
+            budget.check()
         if progress is not None and len(segments):
             progress(len(segments))
-        return found
+        return few
     scene = Scaled(segments, method.region, 0)
     found = _clip(segments, region, method, scene, FEW + len(segments) // 256, budget, workers, progress)
     if found is None:
@@ -98,20 +110,21 @@ def clip_on_convex(
     return found
 
 
-def clip_few(segments: FloatArray, method: Method) -> Clipped | None:
+def _clip_few(segments: FloatArray, method: Method) -> Clipped | None:
     """Return the pieces of up to `FEW` segments, (n, 2, dim) float64, not yet looked at for NaN; None where anything is
     left open."""
     n, _, dimension = segments.shape
+    decide, fill, region, _ = method
     try:
         scratch = _spare.pop()
     except IndexError:
         scratch = np.empty(FEW, np.int32), np.empty((FEW, 2), np.int32), np.empty(FEW, np.int32), np.zeros(3, np.int64)
     items, planes, still, counts = scratch
-    entry_of(method.decide)(segments, *method.region, 0, n, UNLIMITED.flag, items, planes, still, counts)
+    entry_of(decide)(segments, *region, 0, n, _NO_FLAG, items, planes, still, counts)
     m, n_open, n_beyond = counts.tolist()
     pieces = room_for(m, dimension)
     if not n_open:
-        entry_of(method.fill)(segments, *method.region, items, planes, 0, m, UNLIMITED.flag, pieces, still, counts)
+        entry_of(fill)(segments, *region, items, planes, 0, m, _NO_FLAG, pieces, still, counts)
         n_open, n_more, _ = counts.tolist()
         n_beyond = min(n, n_beyond + n_more)
     _spare.append(scratch)

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Literal, Unpack, overload
+from typing import ClassVar, Final, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
+from engine.arrays import FlagArray, FloatArray, IntArray, read_only
 from engine.compiling.direct import entry_of
 from engine.compiling.jit import inline, kernel
-from engine.running.budget import Budget, Cancel
-from engine.running.parallel import Options, Progress, check_options
-from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
+from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.parallel import Options, Progress, check_options, is_unlimited
+from engine.segment_clipping.clip_segments import plan_for
+from engine.segment_clipping.pieces import Pieces
 from engine.solids.base import Solid
 from engine.solids.ragged import Ragged, as_lines
 from engine.types import Accuracy
@@ -115,17 +116,16 @@ def clip_lines(
     ([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]], [[0, 1]], [[0.5, 0.5]], [[0, 3]])
     """
     check_options(workers, progress, report=report)
-    dimension = getattr(region, "dimension", 2)  # what has none is refused below
-    vertices, offsets = as_lines(lines, dimension)
+    is_free = is_unlimited(workers, deadline, cancel, progress)
+    plan = plan_for(region)
+    vertices, offsets = as_lines(lines, region.dimension)
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
-    segments = np.empty((len(firsts), 2, dimension))
+    segments = np.empty((len(firsts), 2, region.dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]
-    options: Any = {"workers": workers, "deadline": deadline, "cancel": cancel, "progress": progress, "report": report}
-    with Budget(deadline, cancel) as budget:
-        pieces = clip_segments(segments, region, **options)
-        if report:
-            return _joined(pieces[0], firsts, vertices, offsets, budget), pieces[1]
-        return _joined(pieces, firsts, vertices, offsets, budget)
+    with UNLIMITED if is_free and len(firsts) <= plan.few else Budget(deadline, cancel) as budget:
+        pieces, n_beyond, n_rational = plan.cut(read_only(segments), region, plan, budget, workers, progress)
+        made = _joined(pieces, firsts, vertices, offsets, budget)
+    return (made, Accuracy("exact", 0.5, len(firsts), n_beyond, n_rational, plan.name)) if report else made
 
 
 def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
@@ -133,12 +133,10 @@ def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
     return np.delete(np.arange(n_vertices), offsets[1:][np.diff(offsets) > 0] - 1)
 
 
-def _joined(
-    pieces: SegmentPieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray, budget: Budget
-) -> LinePieces:
+def _joined(pieces: Pieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray, budget: Budget) -> LinePieces:
     """Join the pieces of segments; firsts: the vertex that each segment begins with."""
-    m, at = len(pieces), firsts[pieces.source]
-    starts, ends = np.ascontiguousarray(pieces.start), np.ascontiguousarray(pieces.end)
+    m, at = len(pieces.source), firsts[pieces.source]
+    starts, ends = map(np.ascontiguousarray, pieces.ends)
     made = Joined(np.empty((2 * m, vertices.shape[1])), np.empty(m + 1, np.int64), *np.empty((3, m), np.int64))
     budget.check()
     n = entry_of(join_parts)(starts, ends, pieces.faces, at, vertices, offsets, made, budget.flag)

@@ -61,7 +61,7 @@ class Row:
     n_faces: Callable[[Any], int] = lambda _: 1
     """(solid) -> how many faces pieces of segments may name."""
     clip: Callable[[Any], Any] | None = None
-    """(solid) -> the Method that cuts segments on it; without it `clip_segments` refuses the type."""
+    """(solid) -> the Plan by which segments are cut on it; without it `clip_segments` refuses the type."""
     planes: Callable[[Any, Any], Any] | None = None
     """(solid, check) -> the integer rows that polygons are clipped by."""
     meets: Mapping[int, str] = field(default_factory=dict)

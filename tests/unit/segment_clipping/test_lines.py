@@ -18,6 +18,7 @@ from engine.errors import (
 )
 from engine.running.budget import Budget
 from engine.segment_clipping import lines
+from engine.segment_clipping.pieces import Pieces
 from tests.reference.segments import clip_segments as reference_pieces
 from tests.unit.segment_clipping.on_boundary.test_boundary import REGIONS as BOUNDARIES
 from tests.unit.segment_clipping.on_boundary.test_boundary import vertices_of
@@ -173,7 +174,8 @@ def test_other_solids_are_refused() -> None:
 
 def test_the_joining_of_pieces_ends_with_the_call() -> None:
     segments, budget = np.tile([[0.0, 0.0], [1.0, 1.0]], (5, 1, 1)), Budget()
-    pieces = clip_segments(segments, Sphere([0.0, 0.0], 9.0))
+    found = clip_segments(segments, Sphere([0.0, 0.0], 9.0))
+    pieces = Pieces(found.source, np.stack([found.start, found.end]), found.t, found.faces)
     budget.flag[0] = 1
     with pytest.raises(CancelledError):
         lines._joined(pieces, np.arange(5), np.arange(12.0).reshape(6, 2), np.array([0, 6]), budget)
