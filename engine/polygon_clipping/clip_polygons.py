@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
+from math import isfinite, sqrt
 from typing import Any, ClassVar, Final, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
@@ -15,8 +16,8 @@ import numpy.typing as npt
 from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.compiling.direct import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
-from engine.polygon_clipping.in_integers import Row, clip_polygon
-from engine.polygon_clipping.planes import KernelScene, kernel_scene, planes_of
+from engine.polygon_clipping.in_integers import clip_polygon
+from engine.polygon_clipping.planes import KernelScene, Plan, kernel_scene, plan_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.scaling import largest_of, scaled_back
@@ -68,8 +69,11 @@ class ClippedPolygons(Ragged):
 
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
-_FEW: Final = 1024
-"""Vertices that are clipped in the time that it takes to plan more."""
+_FEW: Final = 2048
+"""Coordinates of vertices that are clipped in the time that it takes to plan more."""
+_USUAL: Final = (2.0**-100, 2.0**120)
+"""Sums of the squares of so few between which nothing is scaled: the largest coordinate lies between the root of such a
+sum, and that over the root of how many there are. `numpy.vdot` does not warn where they overflow, as `dot` does."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
 
 
@@ -130,31 +134,36 @@ def clip_polygons(
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]
     """
-    if report is False and is_unlimited(workers, deadline, cancel, progress):
-        few = _clip_array(polygons, region) if isinstance(region, Solid) and isinstance(polygons, np.ndarray) else None
+    is_free = is_unlimited(workers, deadline, cancel, progress)
+    if not is_free or report is not False:
+        check_options(workers, progress, report=report)
+    plan = region.kept("clipping_plan") if isinstance(region, Solid) else None
+    if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
+        few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
             return few
-    check_options(workers, progress, report=report)
-    with Budget(deadline, cancel) as budget:
-        planes = planes_of(region, budget.check)
-        contours = as_contours(polygons, region.dimension)
-        clipped, n_beyond, n_rational = _clip(contours, region, planes, budget, workers, progress)
+    contours = None if plan is None else as_contours(polygons, region.dimension)
+    if plan is not None and contours is not None and is_free and len(contours.vertices) <= _FEW:
+        clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
+    else:
+        with Budget(deadline, cancel) as budget:
+            plan = plan_of(region, budget.check)
+            contours = as_contours(polygons, region.dimension) if contours is None else contours
+            clipped, n_beyond, n_rational = _clip(contours, plan, budget, workers, progress)
     if not report:
         return clipped
     return clipped, Accuracy("exact", 0.5, len(clipped), n_beyond, n_rational, "sutherland_hodgman")
 
 
-def _clip_array(polygons: npt.NDArray[Any], region: Solid) -> ClippedPolygons | None:
-    """Clip an array of few polygons; None where the region has no tables yet, or an item is for the general way."""
-    tables = region.kept("clipping_tables")
-    if tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], region.dimension):
+def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> ClippedPolygons | None:
+    """Clip an array of few polygons; None where an item is for the general way, which checks the array."""
+    if plan.tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], dimension):
         return None
     n, size, _ = polygons.shape
     flat = polygons.reshape(-1)
-    # the largest coordinate lies between the root of this sum, and that over the root of how many there are
-    if not (0 < n * size <= _FEW and 2.0**-100 < flat.dot(flat) < 2.0**120):
+    if not (0 < len(flat) <= _FEW and _USUAL[0] < np.vdot(flat, flat) < _USUAL[1]):
         return None
-    found = _clip_few(flat, tables, *_few_rings(n, size), UNLIMITED)
+    found = _clip_few(flat, plan.tables, *_few_rings(n, size), UNLIMITED)
     return None if found is None else found[0]
 
 
@@ -165,53 +174,31 @@ def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
 
 
 _few_rings = functools.lru_cache(64)(_equal_rings)
-"""Those of arrays that are clipped at once, of up to `_FEW` vertices."""
-
-
-def _clip_few(
-    vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
-) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons, vertices as one row; return the result, and how many needed more than the filter.
-
-    None where one is left open, or there is no room.
-    """
-    n, n_rings, d = len(polygon_offsets) - 1, len(ring_offsets) - 1, tables.high.shape[1] - 1
-    out = np.empty(4 * len(vertices) + d * (4 * len(tables.high) + 64))  # spikes are cut many times
-    ring_sizes, status = np.empty(n_rings, np.int64), np.zeros(n, np.int8)
-    state, bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
-    reached, written = entry_of(clip_rings, d)(
-        vertices, ring_offsets, polygon_offsets, tables, 0, n, budget.flag, out, ring_sizes, state, bridges, _AXES[d]
-    )
-    budget.check()
-    if reached < n or OPEN in (states := state.tolist()):
-        return None
-    left, sizes = out[: written * d].reshape(-1, d), ring_sizes.tolist()
-    n_beyond = n - states.count(CLIPPED)
-    if n == n_rings and all(sizes):
-        offsets = np.array([0, *accumulate(sizes)], np.int64)
-        return ClippedPolygons(left, offsets, polygon_offsets, np.zeros(n, np.int64), status, bridges), n_beyond
-    return _gathered(left, ring_sizes, polygon_offsets, status, bridges), n_beyond
-
-
-def _gathered(
-    vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
-) -> ClippedPolygons:
-    """Return what is left of polygons; sizes: the vertices of each ring, those that vanished with none."""
-    left = np.flatnonzero(sizes)
-    owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
-    contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
-    return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
+"""Those of arrays that are clipped in one piece, of up to `_FEW` coordinates."""
 
 
 class Contours(NamedTuple):
     """The rings of all polygons."""
 
+    dimension: int
     vertices: FloatArray
-    """(m, dim), read-only; zeros of either sign."""
+    """(m * dim,), as one row of numbers; zeros of either sign."""
     ring_offsets: IntArray
     polygon_offsets: IntArray
-    largest: float
-    """Magnitude of any coordinate."""
+    size: float
+    """The largest magnitude of any coordinate, or a number that nothing is scaled for where nothing is for that one."""
+
+
+class Batch(NamedTuple):
+    """Polygons, what they are clipped by, and what becomes of them: see `Clipped` and `ClippedPolygons`."""
+
+    contours: Contours
+    plan: Plan
+    scene: KernelScene | None
+    sizes: IntArray
+    state: FlagArray
+    may_have_bridges: BoolArray
+    status: Int8Array
 
 
 def as_contours(polygons: Any, dimension: int) -> Contours:
@@ -224,10 +211,10 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         n, size = array.shape[:2]
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
-        largest = largest_of(array)
-        if not np.isfinite(largest):
+        flat = array.reshape(-1)
+        if not isfinite(largest := _size_of(flat)):
             check_finite(array, ("polygons",))
-        return Contours(array.reshape(-1, dimension), *_equal_rings(n, size), largest)
+        return Contours(dimension, flat, *_equal_rings(n, size), largest)
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(
             f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
@@ -237,8 +224,10 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
     counts: list[int] = []
     for i, polygon in enumerate(polygons):
         if isinstance(polygon, Polygon):
-            check_dimension(polygon.dimension, dimension, ("polygons", i))
-            found = np.split(polygon.vertices, polygon.ring_offsets[1:-1])
+            if polygon.dimension != dimension:
+                check_dimension(polygon.dimension, dimension, ("polygons", i))
+            n_rings = len(polygon.ring_offsets) - 1
+            found = [polygon.vertices] if n_rings == 1 else np.split(polygon.vertices, polygon.ring_offsets[1:-1])
         elif isinstance(polygon, (list, tuple)) or (isinstance(polygon, np.ndarray) and polygon.ndim == 3):
             found = [as_points(ring, dimension, ("polygons", i, j)) for j, ring in enumerate(polygon)]
         else:
@@ -252,95 +241,127 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
                 raise EmptyGeometryError(f"polygons[{i}][{j}] has no vertices; leave it out", ("polygons", i, j))
         rings += found
         counts.append(len(found))
-    vertices = np.concatenate(rings) if rings else np.zeros((0, dimension))
-    vertices.setflags(write=False)
-    return Contours(vertices, summed([len(ring) for ring in rings]), summed(counts), largest_of(vertices))
+    vertices = np.concatenate(rings).reshape(-1) if rings else np.zeros(0)
+    return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), _size_of(vertices))
 
 
-def clip_chunk(
-    scene: KernelScene, ring_offsets: IntArray, polygon_offsets: IntArray, first: int, last: int, budget: Budget,
-    sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray,
-) -> FloatArray:  # fmt: skip
-    """Clip polygons first .. last - 1 as far as the kernel can; return the vertices of those it settled, in order.
+def _size_of(vertices: FloatArray) -> float:
+    """Return `Contours.size`."""
+    square = np.vdot(vertices, vertices) if len(vertices) <= _FEW else 0.0
+    return sqrt(square) if _USUAL[0] < square < _USUAL[1] else largest_of(vertices)
 
-    Fills sizes (of rings), state and may_have_bridges (of polygons); see `clip_rings`.
-    """
-    n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
-    vertices, tables, done, parts = scene.vertices, scene.tables, first, list[FloatArray]()
-    d = vertices.shape[1]
-    room, clip = d * (n_vertices + 4 * len(tables.high) + 64), entry_of(clip_rings, d)
-    flat, found = vertices.reshape(-1), (sizes, state, may_have_bridges)
+
+def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArray:
+    """Clip polygons first .. last - 1; return the vertices left, in order, and fill what becomes of the polygons."""
+    (d, _, ring_offsets, polygon_offsets, _), _, scene, sizes, state, *_ = batch
+    done, parts = first, list[FloatArray]()
+    if scene is None:
+        state[first:last], done = OPEN, last
+    else:
+        flat, tables, clip, found = read_only(scene.vertices), scene.tables, entry_of(clip_rings, d), batch[3:6]
+        n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
+        room = d * (n_vertices + 4 * len(tables.high) + 64)
     while done < last:
         out = np.empty(room)
         reached, written = clip(
             flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *found, _AXES[d]
         )
-        budget.check()
         parts.append(out[: written * d].reshape(-1, d))
+        budget.check()
         budget.take(2 * parts[-1].nbytes)
         if reached == done:
             room *= 2
             budget.take(room * out.itemsize)
         done = reached
-    vertices = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
-    if scene.exponent:
-        vertices, doubtful = scaled_back(vertices, scene.exponent)
+    left = parts[0] if len(parts) == 1 else np.concatenate([np.zeros((0, d)), *parts])
+    if scene is not None and scene.exponent:
+        left, doubtful = scaled_back(left, scene.exponent)
         if doubtful.any():
-            state[first:last] = OPEN
-            sizes[polygon_offsets[first] : polygon_offsets[last]] = 0
-            return vertices[:0]
-    return vertices
+            state[first:last], sizes[polygon_offsets[first] : polygon_offsets[last]], left = OPEN, 0, left[:0]
+    open_ones = first + np.flatnonzero(state[first:last] == OPEN)
+    if not len(open_ones):
+        return left
+    rings = polygon_offsets[first : last + 1]
+    before = summed(sizes[rings[0] : rings[-1]])[rings - rings[0]]  # vertices that the kernel left
+    settled, taken = list[FloatArray](), 0
+    for i in open_ones:
+        budget.check()
+        settled += [left[taken : before[i - first]], _settle(batch, int(i), budget)]
+        taken = int(before[i - first])
+    return np.concatenate([*settled, left[taken:]])
+
+
+def _settle(batch: Batch, i: int, budget: Budget) -> FloatArray:
+    """Return the vertices left of a polygon by exact integers, and fill what becomes of it."""
+    d, vertices, ring_offsets, polygon_offsets, _ = batch.contours
+    rings, points = range(polygon_offsets[i], polygon_offsets[i + 1]), vertices.reshape(-1, d)
+    contours = [points[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
+    try:
+        found, batch.may_have_bridges[i] = clip_polygon(contours, batch.plan.rows, budget.check)
+    except TooComplexError:
+        batch.status[i], found = PolygonStatus.TOO_COMPLEX, [[] for _ in rings]
+    batch.sizes[rings.start : rings.stop] = [len(contour) for contour in found]
+    return np.array([vertex for contour in found for vertex in contour], np.float64).reshape(-1, d)
 
 
 def _clip(
-    contours: Contours, region: Solid, planes: list[Row], budget: Budget, workers: int | None,
-    progress: Progress | None,
-) -> tuple[ClippedPolygons, int, int]:  # fmt: skip
+    contours: Contours, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
+) -> tuple[ClippedPolygons, int, int]:
     """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
-    vertices, ring_offsets, polygon_offsets, largest = contours
-    n, dimension = len(polygon_offsets) - 1, vertices.shape[1]
-    scene = kernel_scene(region, vertices, largest, planes, budget.check)
+    d, vertices, ring_offsets, polygon_offsets, size = contours
+    scene = kernel_scene(plan, vertices, size, budget.check)
     if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
-        few = _clip_few(vertices.reshape(-1), scene.tables, ring_offsets, polygon_offsets, budget)
+        few = _clip_few(vertices, scene.tables, ring_offsets, polygon_offsets, budget)
         if few is not None:
-            if progress is not None and n:
-                progress(n)
+            if progress is not None and len(few[0]):
+                progress(len(few[0]))
             return *few, 0
-    status, may_have_bridges = np.zeros(n, np.int8), np.zeros(n, np.bool_)
-    sizes = np.zeros(len(ring_offsets) - 1, np.int64)
-    parts: dict[int, FloatArray] = {}
-    state = np.full(n, OPEN, np.uint8)
-
-    def settle(i: int) -> FloatArray:
-        rings = range(polygon_offsets[i], polygon_offsets[i + 1])
-        points = [vertices[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
-        try:
-            found, may_have_bridges[i] = clip_polygon(points, planes, budget.check)
-        except TooComplexError:
-            status[i] = PolygonStatus.TOO_COMPLEX
-            return np.zeros((0, dimension))
-        sizes[rings.start : rings.stop] = [len(contour) for contour in found]
-        return np.array([vertex for contour in found for vertex in contour], np.float64).reshape(-1, dimension)
+    n, sizes, parts = len(polygon_offsets) - 1, np.zeros(len(ring_offsets) - 1, np.int64), dict[int, FloatArray]()
+    state, may_have_bridges, status = np.empty(n, np.uint8), np.zeros(n, np.bool_), np.zeros(n, np.int8)
+    batch = Batch(contours, plan, scene, sizes, state, may_have_bridges, status)
 
     def task(first: int, last: int) -> None:
-        settled = np.zeros((0, dimension))
-        if scene is not None:
-            settled = clip_chunk(
-                scene, ring_offsets, polygon_offsets, first, last, budget, sizes, state, may_have_bridges
-            )
-        open_ones = first + np.flatnonzero(state[first:last] == OPEN)
-        if len(open_ones):
-            rings = polygon_offsets[first : last + 1]
-            before = summed(sizes[rings[0] : rings[-1]])[rings - rings[0]]  # vertices that the kernel left
-            found, taken = [], 0
-            for i in open_ones:
-                budget.check()
-                found += [settled[taken : before[i - first]], settle(int(i))]
-                taken = int(before[i - first])
-            settled = np.concatenate([*found, settled[taken:]])
-        parts[first] = settled
+        parts[first] = clip_chunk(batch, first, last, budget)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
-    vertices = np.concatenate([parts[first] for first in sorted(parts)]) if parts else np.zeros((0, dimension))
-    clipped = _gathered(vertices, sizes, polygon_offsets, status, may_have_bridges)
+    left = np.concatenate([np.zeros((0, d)), *(parts[first] for first in sorted(parts))])
+    clipped = _gathered(left, sizes, polygon_offsets, status, may_have_bridges)
     return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))
+
+
+def _clip_few(
+    vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
+) -> tuple[ClippedPolygons, int] | None:
+    """Clip few polygons, vertices as one row; return the result, and how many needed more than the filter.
+
+    None where one is left open, or there is no room.
+    """
+    d = tables.high.shape[1] - 1
+    n, n_rings, clip = len(polygon_offsets) - 1, len(ring_offsets) - 1, entry_of(clip_rings, d)
+    if clip is clip_rings:
+        vertices = read_only(vertices)  # of the kind that it is compiled for
+    out = np.empty(4 * len(vertices) + d * (4 * len(tables.high) + 64))  # spikes are cut many times
+    sizes, status = np.empty(n_rings, np.int64), np.zeros(n, np.int8)
+    state, bridges = np.empty(n, np.uint8), np.empty(n, np.bool_)
+    reached, written = clip(
+        vertices, ring_offsets, polygon_offsets, tables, 0, n, budget.flag, out, sizes, state, bridges, _AXES[d]
+    )
+    if budget is not UNLIMITED:
+        budget.check()
+    if reached < n or OPEN in (states := state.tolist()):
+        return None
+    left, each, n_beyond = out[: written * d].reshape(-1, d), sizes.tolist(), n - states.count(CLIPPED)
+    if n == n_rings and all(each):
+        ends, contours = np.array([0, *accumulate(each)], np.int64), np.zeros(n, np.int64)
+        return ClippedPolygons(left, ends, polygon_offsets, contours, status, bridges), n_beyond
+    return _gathered(left, sizes, polygon_offsets, status, bridges), n_beyond
+
+
+def _gathered(
+    vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
+) -> ClippedPolygons:
+    """Return what is left of polygons; sizes: the vertices of each ring, those that vanished with none."""
+    left = np.flatnonzero(sizes)
+    owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
+    contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
+    return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from itertools import starmap
-from typing import Final, NamedTuple, cast
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -54,29 +54,33 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
     return signs
 
 
-def planes_of(region: Solid, check: Check) -> list[Row]:
-    """Return the planes of a region as integer rows in clipping order, repeated ones once: they cut nothing twice.
+class Plan(NamedTuple):
+    """What polygons are clipped by, kept with the region: its planes as integer rows in clipping order, repeated ones
+    once, since they cut nothing twice; and as the kernel takes them, None where numbers lie too far apart for it."""
+
+    rows: list[Row]
+    tables: PlaneTables | None
+
+
+def plan_of(region: Solid, check: Check) -> Plan:
+    """Return the plan kept with a region.
 
     Raises: UnsupportedSolidError, where a polyhedron is not convex naming a face and a vertex beyond it.
     """
-    kept = region.kept("clipping_planes") if isinstance(region, Solid) else None
-    if kept is not None:
-        return cast(list[Row], kept)
-
     planes = row_of(region).planes
     if planes is None:
         more = " that is convex, or use overlay for polygons in the plane"
         raise refused(region, "clip_polygons does not take", lambda row: row.planes, more, ("region",))
 
-    def build() -> list[Row]:
+    def build() -> Plan:
         found: dict[Row, None] = {}
         for turn, row in enumerate(planes(region, check)):
             if turn % _CHECK_EVERY == 0:
                 check()
             found[reduced(row)] = None
-        return list(found)
+        return Plan(list(found), _plane_tables(list(found), 0, check))
 
-    return region.prepared("clipping_planes", build, check)
+    return region.prepared("clipping_plan", build, check)
 
 
 def planes_of_rows(region: HalfSpace | Aabb | Convex, _: Check) -> Iterable[Row]:
@@ -97,26 +101,24 @@ class KernelScene(NamedTuple):
     tables: PlaneTables
 
 
-def kernel_scene(
-    region: Solid, vertices: FloatArray, largest: float, planes: list[Row], check: Check
-) -> KernelScene | None:
+def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check) -> KernelScene | None:
     """Return a scene as the kernel takes it, None where numbers lie too far apart for it.
 
-    largest: magnitude of any coordinate. planes: those of the region.
+    largest: magnitude of any coordinate.
     """
     exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
-    if points is None or exponent < _DEEPEST or not planes:
+    if points is None or exponent < _DEEPEST:
         return None
-    if exponent:
-        tables = _plane_tables(planes, exponent, check)
-    else:
-        tables = region.prepared("clipping_tables", lambda: _plane_tables(planes, 0, check), check)
+    tables = _plane_tables(plan.rows, exponent, check) if exponent else plan.tables
     return None if tables is None else KernelScene(points, exponent, tables)
 
 
 def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
-    """Return planes as the kernel takes them, for vertices times 2^-exponent; None where numbers lie too far apart."""
+    """Return planes as the kernel takes them, for vertices times 2^-exponent; None where numbers lie too far apart, or
+    there are no planes."""
+    if not planes:
+        return None
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
     axes, at = np.full(len(planes), -1, np.int64), np.zeros(len(planes))
     rows: list[list[int]] = []

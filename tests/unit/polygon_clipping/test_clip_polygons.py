@@ -21,14 +21,14 @@ from engine.errors import (
 )
 from engine.polygon_clipping import clip_polygons as polygons_module
 from engine.polygon_clipping.clip_polygons import (
+    Batch,
     ClippedPolygons,
     PolygonStatus,
     as_contours,
     clip_chunk,
     clip_polygons,
 )
-from engine.polygon_clipping.planes import kernel_scene
-from engine.polygon_clipping.planes import planes_of as planes_of_solid
+from engine.polygon_clipping.planes import kernel_scene, plan_of
 from engine.running.budget import Budget, Cancel
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
@@ -258,9 +258,17 @@ def test_a_raised_flag_ends_a_chunk() -> None:
     """The kernel stopping for it does not pass for a lack of room, of which more and more would be made."""
     region, budget, offsets = Aabb([-1, -1], [1, 1]), Budget(), np.arange(6)
     contours = as_contours(np.ones((5, 3, 2)), 2)
-    scene = kernel_scene(region, contours.vertices, 1.0, planes_of_solid(region, budget.check), budget.check)
+    plan = plan_of(region, budget.check)
+    scene = kernel_scene(plan, contours.vertices, 1.0, budget.check)
     assert scene is not None
     budget.flag[0] = 1
-    found = np.zeros(5, np.int64), np.zeros(5, np.uint8), offsets > 9
+    found = np.zeros(5, np.int64), np.zeros(5, np.uint8), offsets[1:] > 9, np.zeros(5, np.int8)
     with pytest.raises(CancelledError):
-        clip_chunk(scene, contours.ring_offsets, offsets, 0, 5, budget, *found)
+        clip_chunk(Batch(contours, plan, scene, *found), 0, 5, budget)
+
+
+def test_large_numbers_are_clipped_without_a_warning() -> None:
+    rings = np.random.default_rng(7).uniform(-1e200, 1e200, (2, 5, 2))
+    for _ in range(2):  # with nothing kept, and with a plan
+        check(rings, box := Aabb([-1e199, -1e199], [1e199, 1e199]), clip_polygons(rings, box))
+        clip_polygons(rings, box)

@@ -9,7 +9,7 @@ import pytest
 
 from engine import Polyhedron, UnsupportedSolidError
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, clip_polygons
-from engine.polygon_clipping.planes import planes_of
+from engine.polygon_clipping.planes import plan_of
 from engine.polygon_clipping.rings import Cutting, PlaneTables, has_bridges, plane_of
 from tests.unit.polygon_clipping.test_clip_polygons import regions_of, rings_of
 
@@ -18,7 +18,7 @@ CORNERS = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], float)
 
 
 def planes(faces: list[list[int]], vertices: np.ndarray = CORNERS) -> list:
-    return planes_of(Polyhedron(vertices, faces), lambda: None)
+    return plan_of(Polyhedron(vertices, faces), lambda: None).rows
 
 
 def test_a_cube_has_six_planes_whichever_way_its_faces_are_turned() -> None:
