@@ -256,7 +256,7 @@ def _cut(
 
 def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
     """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t, and which of them took rational
-    arithmetic, all where some did and it is not told which; and whether the others are of touching_cut.py."""
+    arithmetic, all where some did and it is not told which; and whether the others are of boundary_cut.py."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)

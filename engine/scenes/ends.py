@@ -18,7 +18,7 @@ from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
 from engine.compiling.direct import entry_of
 from engine.compiling.jit import inline, kernel
 from engine.running.budget import UNLIMITED, Budget, concatenated
-from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare
+from engine.segment_clipping.exact_pieces import ONE, ZERO, Parameter, compare
 from engine.types import UNDECIDED
 
 

@@ -25,11 +25,10 @@ from engine.predicates.cut_point import T_BOUND
 from engine.predicates.double_double import dd_div, dd_sub
 from engine.scenes.posed_cut import in_frame
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
+from engine.segment_clipping.on_boundary.boundary_cut import sort_crossings
 from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
-from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts
-from engine.segment_clipping.on_boundary.touching_cut import sort_crossings
-from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
+from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts, corner, triangle_at
 from engine.segment_clipping.pieces import put_point, slack_of
 from engine.types import UNDECIDED, Point3
 

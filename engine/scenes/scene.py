@@ -27,7 +27,7 @@ from engine.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_
 from engine.scenes.ends import ScenePieces, in_order, joined
 from engine.scenes.locate import SceneLocations, locate_all
 from engine.scenes.standing import Standing
-from engine.segment_clipping.parameters import ONE, ZERO
+from engine.segment_clipping.exact_pieces import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, as_points, shown
 from engine.solids.pose import Pose

@@ -12,7 +12,7 @@ from engine.arrays import IntArray
 from engine.bounding.bvh import STACK, WIDTH
 from engine.compiling.jit import merged
 from engine.lanes.addresses import array_at
-from engine.segment_clipping.on_boundary.touching_cut import Crossings
+from engine.segment_clipping.on_boundary.boundary_cut import Crossings
 from engine.segment_clipping.pieces import Pieces
 
 MOST_MET: Final = 512

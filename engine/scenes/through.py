@@ -34,10 +34,9 @@ from engine.scenes.near_boxes import (
 from engine.scenes.posed_cut import between_planes, in_ball
 from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
 from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
-from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, emit
+from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, Crossings, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import Way
-from engine.segment_clipping.on_boundary.touching_cut import Crossings
 from engine.segment_clipping.pieces import Pieces, put_piece
 from engine.types import OPEN
 

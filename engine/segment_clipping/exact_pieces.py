@@ -8,6 +8,10 @@ on the boundary, else it is asked for. Contacts are kept as points. Pieces are w
 
 All coordinates of a segment and of the elements it meets are integers over one denominator, parameters are Fractions.
 Cost: n log n for n elements.
+
+Balls are met at roots of quadratics: such a `Parameter` is (u + v sqrt(w)) / z, compared exactly with others. Rounding
+to nearest keeps order, so only numbers that round alike are looked at closer; then signs of a + b sqrt(m) + c sqrt(n)
+decide, by squaring.
 """
 
 from __future__ import annotations
@@ -17,11 +21,12 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Final, NamedTuple
 
-from engine.predicates.rational import cross, dot, minus, nearest
+from engine.predicates.rational import cross, dot, minus, nearest, nearest_with_root, sign_of
 from engine.predicates.ties import tie_sign_exact
 
 Integers = Sequence[int]
-ZERO, ONE = Fraction(0), Fraction(1)
+FIRST, LAST = Fraction(0), Fraction(1)
+"""The parameters of the ends of a segment."""
 _CHECK_EVERY: Final = 64
 
 
@@ -55,7 +60,7 @@ def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
         return None  # parallel, not on one line
     length = dot(u, u)
     ends = sorted(Fraction(dot(minus(end, p), u), length) for end in (a, b))
-    first, last = max(ends[0], ZERO), min(ends[1], ONE)
+    first, last = max(ends[0], FIRST), min(ends[1], LAST)
     return (first, last, True) if first <= last else None
 
 
@@ -84,7 +89,7 @@ def triangle_stretch(
         return t, t, False
     if from_p:
         return None
-    first, last = ZERO, ONE
+    first, last = FIRST, LAST
     for corner, following in ((a, b), (b, c), (c, a)):
         inward = cross(normal, minus(following, corner))
         v_p, v_q = dot(inward, minus(p, corner)), dot(inward, minus(q, corner))
@@ -127,7 +132,7 @@ def contacts_of(
 
 def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]]:
     """Return the parameters at which contacts begin or end, 0 and 1 too, in order, and these contacts."""
-    events: list[tuple[Fraction, Contact | None]] = [(ZERO, None), (ONE, None)]
+    events: list[tuple[Fraction, Contact | None]] = [(FIRST, None), (LAST, None)]
     events += [(contact.first, contact) for contact in contacts]
     events += [(contact.last, contact) for contact in contacts if contact.first < contact.last]
     # rounding keeps order: Fractions are compared where doubles tie only
@@ -163,3 +168,44 @@ def nodes_with_locations(
         is_first_in = (locate((nodes[i][0] + nodes[i + 1][0]) / 2) > 0) ^ have_turned[i]
     for (t, met), is_along, turned in zip(nodes, are_along, have_turned):
         yield t, met, is_along, is_first_in ^ turned
+
+
+class Parameter(NamedTuple):
+    """The number (u + v sqrt(w)) / z of integers, w >= 0 and z > 0, and the double nearest to it."""
+
+    u: int
+    v: int
+    w: int
+    z: int
+    near: float
+
+
+def parameter(u: int, v: int, w: int, z: int) -> Parameter:
+    """Return (u + v sqrt(w)) / z, z not 0."""
+    if z < 0:
+        u, v, z = -u, -v, -z
+    return Parameter(u, v, w, z, nearest_with_root(u, v, w, z))
+
+
+ZERO: Final = parameter(0, 0, 0, 1)
+ONE: Final = parameter(1, 0, 0, 1)
+
+
+def compare(a: Parameter, b: Parameter) -> int:
+    """Return the sign of a - b."""
+    if a.near != b.near:
+        return 1 if a.near > b.near else -1
+    top, root = a.u * b.z - b.u * a.z, _sign_with_root(a.u * b.z - b.u * a.z, a.v * b.z, a.w)
+    other = sign_of(-b.v) * sign_of(b.w)
+    if root * other >= 0:
+        return root or other
+    square = top**2 + (a.v * b.z) ** 2 * a.w - (b.v * a.z) ** 2 * b.w
+    return root * _sign_with_root(square, 2 * top * a.v * b.z, a.w)
+
+
+def _sign_with_root(a: int, b: int, m: int) -> int:
+    """Return the sign of a + b sqrt(m)."""
+    first, second = sign_of(a), sign_of(b) * sign_of(m)
+    if first * second >= 0:
+        return first or second
+    return first * sign_of(a * a - b * b * m)

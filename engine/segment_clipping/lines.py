@@ -19,6 +19,7 @@ from engine.compiling.jit import inline, kernel
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.clip_segments import plan_for
+from engine.segment_clipping.on_boundary.contacts import are_same
 from engine.segment_clipping.pieces import Pieces
 from engine.solids.base import Solid
 from engine.solids.ragged import Ragged, as_lines
@@ -179,12 +180,12 @@ def join_parts(
                 head, out.source[n], out.heads[n] = part, line, part
                 n_made = _put(out.vertices, n_made, starts, part)
             else:
-                is_kept = before != head or faces[head, 0] < 0 or not _are_same(starts, head, starts, part)
+                is_kept = before != head or faces[head, 0] < 0 or not are_same(starts, head, starts, part)
                 n_made = _put(out.vertices, n_made, starts, part) if is_kept else n_made
             before = part
             if place + 1 < moved + size and (after == begin or _goes_on(faces, at, part, after)):
                 continue
-            if part != head and is_kept and faces[part, 1] >= 0 and _are_same(starts, part, ends, part):
+            if part != head and is_kept and faces[part, 1] >= 0 and are_same(starts, part, ends, part):
                 n_made -= 1
             n_made, head, out.tails[n] = _put(out.vertices, n_made, ends, part), -1, part
             n += 1
@@ -205,7 +206,7 @@ def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: Floa
     are one, both within, and not all parts are connected."""
     if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
         return 0
-    if not _are_same(vertices, first, vertices, last):
+    if not are_same(vertices, first, vertices, last):
         return 0
     for part in range(begin + 1, end):
         if not _goes_on(faces, at, part - 1, part):
@@ -219,11 +220,3 @@ def _put(rows: FloatArray, row: int, points: FloatArray, point: int) -> int:
     for k in range(points.shape[1]):
         rows[row, k] = points[point, k]
     return row + 1
-
-
-@inline
-def _are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> bool:
-    are_same = True
-    for k in range(points.shape[1]):
-        are_same &= points[point, k] == others[other, k]
-    return are_same

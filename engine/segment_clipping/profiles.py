@@ -26,10 +26,18 @@ from engine.containment.methods.rational_locate import (
 from engine.errors import UnsupportedSolidError
 from engine.predicates.rational import Number, common_integers, nearest_with_root
 from engine.running.budget import Budget
-from engine.segment_clipping.exact_pieces import Contact, contacts_of, nodes_with_locations
-from engine.segment_clipping.on_boundary.chords import contacts_with
+from engine.segment_clipping.exact_pieces import (
+    ONE,
+    ZERO,
+    Contact,
+    Parameter,
+    compare,
+    contacts_of,
+    nodes_with_locations,
+    parameter,
+)
+from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
-from engine.segment_clipping.parameters import ONE, ZERO, Parameter, compare, parameter
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
 from engine.solids.aabb import Aabb
 from engine.solids.base import Solid

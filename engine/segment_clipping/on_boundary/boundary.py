@@ -1,7 +1,7 @@
 """Segments on polygons and polyhedra: contacts by a box tree, pieces between them; several for each segment.
 
 The locator of the region tells the location of each first end. A kernel cuts segments at what they cross
-(boundary_cut.py) and touch (touching_cut.py); what it leaves, those in the plane of a face above all, is cut in exact
+and touch (boundary_cut.py); what it leaves, those in the plane of a face above all, is cut in exact
 arithmetic (exact_pieces.py). Zero-length segments are points.
 """
 
@@ -11,16 +11,19 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
+from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
 from engine.compiling.direct import entry_of
+from engine.compiling.jit import kernel
 from engine.containment.at_once import located_at_once
 from engine.containment.locators import Locator, locator_of
+from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.vectors import as_point2
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.decide_then_cut import FEW, Clipped, Plan
 from engine.segment_clipping.on_boundary.boundary_cut import cut_on_mesh, cut_on_outline
-from engine.segment_clipping.on_boundary.chords import look_before
-from engine.segment_clipping.on_boundary.contacts import GROUP
+from engine.segment_clipping.on_boundary.contacts import GROUP, INSIDE_BEFORE, OUTSIDE_BEFORE, Bit, Kind, Place
+from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with, corner, triangle_at
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline, boundary_of
 from engine.segment_clipping.pieces import Pieces, completed, first_of, joined, room_for
 from engine.segment_clipping.profiles import settled
@@ -116,12 +119,12 @@ def cut_at_crossings(
 ) -> tuple[list[Pieces], FlagArray]:
     """Return the pieces of those segments that the kernel settles, and the state of each."""
     n, _, dimension = segments.shape
-    kernel: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
+    cut: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
     room, least, reached, parts = _LEAST_ROOM + n, _LEAST_ROOM + _CONTACTS * min(GROUP, n), 0, []
     counted, done, state = least, np.array([0, 0, least]), np.empty(n, np.uint8)
     while reached < n:
         before, pieces = reached, room_for(room, dimension)
-        entry_of(kernel)(segments, locations, boundary, budget.flag, pieces, state, done)
+        entry_of(cut)(segments, locations, boundary, budget.flag, pieces, state, done)
         budget.check()
         reached, m, n_contacts = done.tolist()
         if reached == before:
@@ -132,3 +135,80 @@ def cut_at_crossings(
     if counted > least:
         budget.take(_CONTACT_BYTES * (least - counted))
     return parts or [room_for(0, dimension)], state
+
+
+_AT_END: Final = 2 * Place.END + 5
+"""The code of what is crossed there; one less, of what is not."""
+_AT_ONCE: Final = 64
+"""Chords whose contacts are held together."""
+_PLACES: Final = (0.5, 0.3125, 0.8125)
+"""Where along a segment a point beside it is tried; the next where one is on the boundary, or elements part it."""
+
+
+def look_before(
+    segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
+) -> None:
+    """Set the second of locations (n, 2) where both are 0 and it can be told, see `INSIDE_BEFORE`."""
+    if not boundary.are_safe:  # signs of the line beside the segment are exact only then
+        return
+    chords = np.flatnonzero((locations == 0).all(axis=1))
+    for begin in range(0, len(chords), _AT_ONCE):
+        some = chords[begin : begin + _AT_ONCE]
+        locations[some, 1] = _before(segments[some], boundary, locator, budget)
+
+
+def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
+    """Return what `look_before` sets for chords (n, 2, dim), 0 where it cannot be told."""
+    found = np.zeros(len(segments), np.int8)
+    is_odd, is_left, met, owners = _turns(segments, boundary, budget)
+    for place in _PLACES:
+        if not is_left.any():
+            break
+        inner = segments.copy()
+        inner[:, 0] = (1.0 - place) * segments[:, 0] + place * segments[:, 1]
+        locator.fill(inner[:, 0].copy(), of_inner := np.empty(len(segments), np.int8), budget)
+        turns_odd, is_told, _, _ = _turns(inner, boundary, budget)
+        entry_of(leave_parted)(boundary.elements, met, owners, segments, inner, is_told)
+        is_told &= is_left & (of_inner != 0)
+        is_in = (of_inner > 0) ^ turns_odd ^ is_odd
+        found[is_told] = np.where(is_in, INSIDE_BEFORE, OUTSIDE_BEFORE)[is_told]
+        is_left &= ~is_told
+    return found
+
+
+def _turns(
+    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
+) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
+    """Return of each segment whether the location turns over an odd number of times before its end, and whether that is
+    sure and no edge runs there; then the elements that hold its end, and whose they are."""
+    met, kinds, offsets = contacts_with(segments, boundary, budget)
+    owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
+    holds_end = kinds | Bit.CROSSES == _AT_END
+    turning = owners[(kinds & Bit.CROSSES != 0) & ~holds_end]
+    is_sure = np.ones(len(segments), np.bool_)
+    is_sure[owners[kinds == Kind.DEGENERATE]] = False
+    along = np.flatnonzero(kinds == Kind.ALONG)
+    edges, ends = boundary.elements[met[along]], segments[owners[along], 1]
+    reaches = ((edges.min(axis=1) <= ends) & (ends <= edges.max(axis=1))).all(axis=1)
+    is_sure[owners[along[reaches]]] = False
+    is_odd = np.bincount(turning, minlength=len(segments)) & 1 == 1
+    return is_odd, is_sure, met[holds_end], owners[holds_end]
+
+
+@kernel
+def leave_parted(
+    elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_told: BoolArray
+) -> None:
+    """Set is_told (n,) False where an element met does not have the first ends of a segment and of the one beside it
+    strictly on one side."""
+    for place in range(met.size):
+        element, item = met[place], owners[place]
+        if elements.shape[1] == 2:
+            a, b = as_point2(elements[element], 0), as_point2(elements[element], 1)
+            side = orient2d(a, b, as_point2(segments[item], 0))
+            other = orient2d(a, b, as_point2(inner[item], 0))
+        else:
+            c, d, e = triangle_at(elements, element)
+            side, other = orient3d(c, d, e, corner(segments, item, 0)), orient3d(c, d, e, corner(inner, item, 0))
+        if side != other or abs(side) != 1:
+            is_told[item] = False

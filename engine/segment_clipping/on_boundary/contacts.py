@@ -31,7 +31,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray
+from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.compiling.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
@@ -66,6 +66,9 @@ class Bit(IntEnum):
 
 CROSSED: Final = 2 * Place.WITHIN + 5
 """The code of what is met in its open interior, no end of the segment."""
+INSIDE_BEFORE: Final = 2
+OUTSIDE_BEFORE: Final = -2
+"""Locations of a second end that say where the line beside the segment is before its first contact."""
 GROUP: Final = 2048
 """Segments that are looked at together at most."""
 NO_ROOM: Final = -1
@@ -83,24 +86,29 @@ _TOO_LARGE: Final = 2.0**500
 """Beyond this products may overflow, and only the boxes are compared."""
 
 
-class EdgeContacts(NamedTuple):
+class Contacts(NamedTuple):
     """Room for the contacts of a group of segments: elements and kinds one segment after another, and offsets."""
 
     met: Any
     kinds: Any
     offsets: Any
     """(m + 1,) where those of each segment begin."""
-    stack: Any
-    """(_DEEPEST,) int64, nodes that wait."""
+    waiting: Any
+    """What a traversal works in: (_DEEPEST,) int64, nodes that wait; of a mesh see `Waiting`."""
 
 
 @allocating
-def edge_contacts_for(n_segments: int, n_contacts: int) -> EdgeContacts:
+def contacts_for(n_segments: int, n_contacts: int, waiting: Any) -> Contacts:
     """Return room for groups of so many segments at most, and so many contacts of a group."""
-    return EdgeContacts(
-        np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64),
-        np.empty(_DEEPEST, np.int64),
-    )  # fmt: skip
+    return Contacts(
+        np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64), waiting
+    )
+
+
+@allocating
+def edges_waiting() -> IntArray:
+    """Return what a traversal of edges works in."""
+    return np.empty(_DEEPEST, np.int64)
 
 
 @merged
@@ -127,6 +135,15 @@ def axis_of(segments: FloatArray, item: int) -> int:
 
 
 @inline
+def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> bool:
+    """Tell whether a row of one array (n, dim) and one of another are equal."""
+    are_same = True
+    for k in range(points.shape[1]):
+        are_same &= points[point, k] == others[other, k]
+    return are_same
+
+
+@inline
 def are_one(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
     """Tell whether what two codes say of two elements is one point: an end, or a corner or one side of both."""
     n, m = place_of(code), place_of(other)
@@ -135,20 +152,10 @@ def are_one(elements: FloatArray, first: int, code: int, second: int, other: int
     if (n < 3) != (m < 3):
         return False
     if n < 3:
-        return _are_equal(elements, first, n, second, m)
+        return are_same(elements[first], n, elements[second], m)
     a, b, c, d = n - 3, (n - 2) % 3, m - 3, (m - 2) % 3
-    return (_are_equal(elements, first, a, second, c) and _are_equal(elements, first, b, second, d)) or (
-        _are_equal(elements, first, a, second, d) and _are_equal(elements, first, b, second, c)
-    )
-
-
-@inline
-def _are_equal(elements: FloatArray, first: int, place: int, second: int, other: int) -> bool:
-    """Tell whether a corner of one element is one of another."""
-    are_equal = True
-    for k in range(elements.shape[2]):
-        are_equal &= elements[first, place, k] == elements[second, other, k]
-    return are_equal
+    p, q = elements[first], elements[second]
+    return (are_same(p, a, q, c) and are_same(p, b, q, d)) or (are_same(p, a, q, d) and are_same(p, b, q, c))
 
 
 @called
@@ -216,9 +223,9 @@ def may_meet(segment: FloatArray, box: FloatArray) -> bool:
 
 
 @inline
-def append_edges(contacts: EdgeContacts, outline: Any, segment: FloatArray, found: int) -> int:
+def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, found: int) -> int:
     """Append the contacts of a segment (2, 2) to the `found` first ones; return how many these are then, or NO_ROOM."""
-    n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.stack
+    n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
@@ -241,17 +248,8 @@ def append_edges(contacts: EdgeContacts, outline: Any, segment: FloatArray, foun
     return found
 
 
-@inline
-def is_point(segment: FloatArray) -> bool:
-    """Tell whether a segment has no length."""
-    are_equal = True
-    for k in range(segment.shape[1]):
-        are_equal &= segment[0, k] == segment[1, k]
-    return are_equal
-
-
 @called
-def gather_edges(contacts: EdgeContacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
+def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
 
     Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
@@ -259,7 +257,7 @@ def gather_edges(contacts: EdgeContacts, outline: Any, segments: FloatArray, n: 
     found = 0
     contacts.offsets[0] = 0
     for i in range(n):
-        if not is_point(segments[i]):
+        if not are_same(segments[i], 0, segments[i], 1):
             found = append_edges(contacts, outline, segments[i], found)
         contacts.offsets[i + 1] = found
         if found < 0:
@@ -276,6 +274,6 @@ def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: 
     elements met and kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each
     begin. NO_ROOM where there are more than `room`. stop: one uint8, polled.
     """
-    contacts = edge_contacts_for(segments.shape[0], room)
+    contacts = contacts_for(segments.shape[0], room, edges_waiting())
     found = gather_edges(contacts, outline, segments, segments.shape[0], stop)
     return found, contacts.met, contacts.kinds, contacts.offsets

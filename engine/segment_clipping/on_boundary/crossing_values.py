@@ -28,7 +28,7 @@ from engine.predicates.double_double import U2, dd_div
 from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, add_scaled, grow, is_safe, magnitude
 from engine.predicates.parameters import minor as exact_minor
-from engine.segment_clipping.on_boundary.triangle_contact import corner, triangle_at
+from engine.segment_clipping.on_boundary.mesh_contacts import corner, triangle_at
 from engine.segment_clipping.pieces import Triple
 from engine.types import Point3
 

@@ -17,7 +17,7 @@ from engine.containment.methods.polyhedron_ray_parity import CROSSED, meet_upwar
 from engine.predicates.ties import tie_sign, tie_sign_exact
 from engine.segment_clipping.exact_pieces import is_crossed
 from engine.segment_clipping.on_boundary.contacts import Bit, Kind
-from engine.segment_clipping.on_boundary.triangle_contact import exact_contact
+from engine.segment_clipping.on_boundary.mesh_contacts import exact_contact
 from engine.types import Point3
 
 EPS = Fraction(1, 10**6)  # far below what differences of coordinates up to 4 could be taken over by

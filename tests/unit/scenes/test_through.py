@@ -14,7 +14,7 @@ from engine.scenes.posed_mesh import WANTS_BODY
 from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import BodyKind, cut_near
-from engine.segment_clipping.parameters import compare
+from engine.segment_clipping.exact_pieces import compare
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
 from engine.segment_clipping.profiles import exact_pieces
 from tests.unit.scenes.scenes import FACES, OCTAHEDRON

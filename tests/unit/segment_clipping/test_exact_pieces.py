@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.running.budget import Budget, Cancel
 from engine.segment_clipping.exact_pieces import (
-    ZERO,
+    FIRST,
     Contact,
     edge_stretch,
     is_crossed,
@@ -63,7 +63,7 @@ def test_what_holds_in_the_spans_between_contacts() -> None:
         found = nodes_with_locations(contacts, (p, q), lambda at: {t[1]: asked}[at])
         return [(at, is_along, is_in) for at, _, is_along, is_in in found]
 
-    outside_first = [(ZERO, False, False), (t[2], True, False), (t[4], False, True), (t[6], False, True)]
+    outside_first = [(FIRST, False, False), (t[2], True, False), (t[4], False, True), (t[6], False, True)]
     inside_first = [(at, is_along, not is_in) for at, is_along, is_in in outside_first]
     for case in ((-1, 0), (0, 1), (0, 0, -1)):
         assert spans(*case)[:-1] == outside_first

@@ -12,8 +12,8 @@ from engine.predicates.rational import orient2d_rational
 from engine.segment_clipping.exact_pieces import triangle_stretch
 from engine.segment_clipping.on_boundary.contacts import NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
+from engine.segment_clipping.on_boundary.mesh_contacts import contact_filter, exact_contact
 from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
-from engine.segment_clipping.on_boundary.triangle_contact import contact_filter, exact_contact
 from engine.types import UNDECIDED, Point3
 
 
