@@ -27,6 +27,7 @@ from engine.lanes.lanes import move
 from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
 from engine.polygon_clipping.rings import (
     CLIPPED,
+    DONE,
     NO_ROOM,
     Clipped,
     Cutting,
@@ -331,7 +332,7 @@ def clip_plainly(
 ) -> tuple[int, int, int, int]:  # fmt: skip
     """Clip polygons from `first` on, up to one that needs care; `written` vertices are there already.
 
-    Returns the polygon reached, the vertices written, 0, DOUBT or NO_ROOM, and how many planes may cut the polygon
+    Returns the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut the polygon
     reached.
     """
     d, offsets = len(s.vertices.names), polygons.ring_offsets
@@ -362,4 +363,4 @@ def clip_plainly(
             clipped.sizes[ring], written = end - written, end
         if written > begun:
             clipped.may_have_bridges[polygon] = has_bridges(s.cutting, n_cutting)
-    return last, written, 0, 0
+    return last, written, DONE, 0

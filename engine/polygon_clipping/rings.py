@@ -10,6 +10,8 @@ from engine.compiling.jit import merged
 CLIPPED: Final = 0
 EXACT: Final = 1
 """States of a polygon, beside OPEN: settled by doubles, by whole numbers."""
+DONE: Final = 0
+"""Outcome of a run that reached its last polygon."""
 NO_ROOM: Final = -2
 """Instead of a number of vertices: they have no room, or the kernel was stopped."""
 
