@@ -69,7 +69,7 @@ class ClippedPolygons(Ragged):
 
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
-_FEW: Final = 2048
+_FEW: Final = 3072
 """Coordinates of vertices that are clipped in the time that it takes to plan more."""
 _USUAL: Final = (2.0**-100, 2.0**120)
 """Sums of the squares of so few between which nothing is scaled: the largest coordinate lies between the root of such a

@@ -125,11 +125,12 @@ def cut_at_crossings(
     while reached < n:
         before, pieces = reached, room_for(room, dimension)
         entry_of(cut)(segments, locations, boundary, budget.flag, pieces, state, done)
-        budget.check()
         reached, m, n_contacts = done.tolist()
         if reached == before:
             room *= 2  # of rows, if not of contacts
-        budget.take(_BYTES * m + _CONTACT_BYTES * (n_contacts - counted))
+        if budget is not UNLIMITED:
+            budget.check()
+            budget.take(_BYTES * m + _CONTACT_BYTES * (n_contacts - counted))
         counted = n_contacts
         parts.append(first_of(pieces, m))
     if counted > least:
