@@ -38,8 +38,7 @@ from benchmarks.measure import interval
 from benchmarks.web_page import percent
 from benchmarks.workloads import Mesh, Rings, document
 from engine.errors import InvalidArrayError, InvalidInputError
-from engine.files.solids import from_json, read_solid, read_solids
-from engine.files.tables import read_rows
+from engine.files.solids import from_json, read_rows, read_solid, read_solids
 from engine.textbook import methods
 
 QUESTIONS = ("contains", "segments", "collide", "overlay")

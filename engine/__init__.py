@@ -39,9 +39,8 @@ from engine.files.meshes import read_mesh
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.compiled.workspace import release
-from engine.polygon_overlay.overlay import overlay
+from engine.polygon_overlay.overlay import filled, overlay, union_all
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
-from engine.polygon_overlay.union_all import filled, union_all
 from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of solids)
 from engine.running.budget import Cancel
 from engine.scenes.collide_scene import ScenePairs, collide_scene
@@ -51,21 +50,16 @@ from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.lines import LinePieces, clip_lines
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import Bounds, bounds
-from engine.solids.convex import Convex
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
+from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 from engine.solids.ragged import polygons
 from engine.solids.registry import solid_types
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
 from engine.types import Accuracy, Location, Rcc8, Relation
 from engine.version import __version__
 from engine.warmup import warm

@@ -32,8 +32,7 @@ from engine.compiling.kernel_cache import cache_folder, check_owner, seal
 from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
 from engine.errors import EngineError, InvalidInputError
-from engine.files.solids import read_features, read_solid, read_solids
-from engine.files.tables import read_rows, write_geojson, write_table
+from engine.files.solids import read_features, read_rows, read_solid, read_solids, write_geojson, write_table
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons

@@ -9,7 +9,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.collision.collide import collide
 from engine.containment.locate import locate
 from engine.errors import (
@@ -24,7 +23,7 @@ from engine.running.budget import Budget, Cancel
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, shown
-from engine.types import Accuracy, Relation
+from engine.types import Accuracy, BoolArray, FloatArray, IntArray, Relation
 
 Compared = Literal["contains", "collide", "clip_segments", "clip_polygons"]
 STEPS: Final = 1 << 19

@@ -21,7 +21,6 @@ import dask.config
 import numpy as np
 from distributed import Client, Future, as_completed
 
-from engine.arrays import BoolArray, FloatArray, Int8Array
 from engine.collision import collide_poses as poses
 from engine.containment import locate as containment
 from engine.distance import clearance as clearances
@@ -36,6 +35,7 @@ from engine.scenes.scene import Keep, Scene
 from engine.segment_clipping import clip_segments as clipping
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, shown
+from engine.types import BoolArray, FloatArray, Int8Array
 
 PARTS_PER_THREAD = 3
 """Parts in flight: so many that no thread waits for the network, so few that a batch may be larger than a worker."""

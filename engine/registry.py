@@ -17,17 +17,12 @@ from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import profiles
 from engine.segment_clipping.on_boundary import boundary
 from engine.solids import bounds
-from engine.solids.aabb import Aabb
-from engine.solids.convex import Convex
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
+from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 from engine.solids.registry import Field, Row, register
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
 
 ROWS: Final = (
     Row(

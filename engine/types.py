@@ -1,14 +1,38 @@
-"""Small shared types: points and planes as named tuples, three-valued locations, five relations, signs, the report.
+"""Small shared types: the kinds of arrays that solids and kernels hold, points and planes as named tuples, three-valued
+locations, five relations, signs, the report.
 
 Named tuples carry one item through compiled code (a `Point3` is loaded from a row of an array at the head of a loop);
-many items are flat arrays. Nothing here computes.
+many items are flat arrays.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Float32Array = npt.NDArray[np.float32]
+IntArray = npt.NDArray[np.int64]
+Int32Array = npt.NDArray[np.int32]
+Int8Array = npt.NDArray[np.int8]
+"""Of locations, relations and statuses, for the most part."""
+FlagArray = npt.NDArray[np.uint8]
+BoolArray = npt.NDArray[np.bool_]
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+    """Return an array of the one kind that kernels are compiled for: itself, a read-only view, or a copy."""
+    flags = array.flags
+    if flags.c_contiguous and not flags.writeable:
+        return array
+    array = array.view() if flags.c_contiguous else np.ascontiguousarray(array)
+    array.setflags(write=False)
+    return array
 
 
 class Point2(NamedTuple):

@@ -31,19 +31,14 @@ from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.lines import clip_lines
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
 from engine.solids.checks import as_points, shown
-from engine.solids.convex import Convex
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
+from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 
 _MANY = 50_000  # points: some milliseconds of work, and above what makes cells pay for solids this small
 

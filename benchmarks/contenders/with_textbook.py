@@ -13,7 +13,7 @@ from benchmarks.contenders import Couple, NotApplicable, Prepared, each_or_nan, 
 from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
-from engine.solids.convex import rows_of as planes_of
+from engine.solids.primitives import rows_of as planes_of
 from engine.textbook import clip_polygons, greiner_hormann, methods, polyhedra
 
 NAMES = {

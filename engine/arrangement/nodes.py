@@ -15,9 +15,9 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from math import gcd, hypot, inf, lcm, nextafter
 
-from engine.arrays import FloatArray
 from engine.errors import NotRepresentableError
 from engine.running.budget import Budget
+from engine.types import FloatArray
 
 Homogeneous = tuple[int, int, int]
 """(x, y, w), w > 0, without a common factor."""

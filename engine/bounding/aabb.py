@@ -6,14 +6,24 @@ With u = 2^-53, centre c and half widths h of a box, and m its largest coordinat
 2^-49 (3 m + |t|) + 2^-1060 covers them, the rounding of c and h, and its own. Distances grow by 2^-38: a rotation may
 stretch lengths by up to 1.5e-12 (`engine.solids.pose.TOLERANCE`), and a ball under the pose of another body counts as
 unposed.
+
+The flat cylinders around the faces below each child of a tree's inner nodes: what `lanes/boxes.py` asks.
+
+A disc stands on the axis through the middle of the child's box along the sum of the normals of its faces; it is as
+thick and as wide as their corners reach along that axis and away from it.
 """
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
-from engine.compiling.jit import kernel
+from engine.compiling.jit import allocating_kernel, inline, kernel
+from engine.lanes.boxes import EMPTY
+from engine.lanes.tracing import LANES
+from engine.predicates.vectors import as_point3, cross, dot, length, minus
+from engine.types import Float32Array, FloatArray, Int32Array, IntArray, Point3
 
 
 def box_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -72,3 +82,93 @@ def place_boxes(
             for axis in range(dimension):
                 low[body, axis] = np.nextafter(low[body, axis] - radius, -np.inf)
                 high[body, axis] = np.nextafter(high[body, axis] + radius, np.inf)
+
+
+_ENLARGED: Final = 2.0**-20
+
+
+@allocating_kernel
+def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array) -> None:
+    """Fill discs (n_nodes, 8, 8), of inner nodes only, from blocks (`lanes/faces.py`) and boxes of the same tree."""
+    n_nodes = child.shape[0]
+    parents = np.full(n_nodes, -1, np.int64)  # 8 times the parent, and the lane
+    for node in range(n_nodes):
+        for lane in range(LANES):
+            if child[node, lane] >= 0:
+                parents[child[node, lane]] = LANES * node + lane
+    normals = np.zeros((n_nodes, 3))
+    _set_normals(blocks, child, parents, normals)
+    reached = np.zeros((n_nodes, 3))
+    reached[:, 0], reached[:, 1] = np.inf, -np.inf
+    _set_reached(blocks, child, boxes, parents, normals, reached)
+    for node in range(n_nodes):
+        if child[node, 0] < 0:
+            continue
+        for lane in range(LANES):
+            below = child[node, lane]
+            if below == EMPTY:
+                discs[node, :, lane] = 0.0
+                continue
+            middle = 0.5 * (reached[below, 0] + reached[below, 1])
+            for k in range(3):
+                discs[node, k, lane] = boxes[node, k, lane] + normals[below, k] * middle
+                discs[node, 3 + k, lane] = normals[below, k]
+            radius, half = np.sqrt(max(0.0, reached[below, 2])), 0.5 * (reached[below, 1] - reached[below, 0])
+            discs[node, 6, lane] = radius * (1.0 + _ENLARGED) + _ENLARGED
+            discs[node, 7, lane] = half * (1.0 + _ENLARGED) + _ENLARGED
+
+
+@inline
+def _corner(rows: Float32Array, node: int, lane: int, corner: int) -> Point3:
+    """Return a corner of a triangle of a block; of boxes the first is the centre."""
+    x, y, z = rows[node, 3 * corner, lane], rows[node, 3 * corner + 1, lane], rows[node, 3 * corner + 2, lane]
+    return Point3(float(x), float(y), float(z))
+
+
+@inline
+def _set_normals(blocks: Float32Array, child: Int32Array, parents: IntArray, normals: FloatArray) -> None:
+    """Set normals (n_nodes, 3), zeros, to the direction of the sum of the normals of all faces below a node."""
+    for node in range(len(child)):
+        if child[node, 0] >= 0:
+            continue
+        x = y = z = 0.0
+        for lane in range(LANES):
+            if child[node, lane] == EMPTY:
+                continue
+            p = _corner(blocks, node, lane, 0)
+            n = cross(minus(_corner(blocks, node, lane, 1), p), minus(_corner(blocks, node, lane, 2), p))
+            x, y, z = x + n.x, y + n.y, z + n.z
+        above = node
+        while above >= 0:  # bound: the depth of the tree
+            normals[above, 0] += x
+            normals[above, 1] += y
+            normals[above, 2] += z
+            above = parents[above] >> 3  # of the root -1
+    for node in range(len(child)):
+        size = length(as_point3(normals, node))
+        for k in range(3):
+            normals[node, k] = normals[node, k] / size if size > 1e-100 else (1.0 if k == 2 else 0.0)
+
+
+@inline
+def _set_reached(
+    blocks: Float32Array, child: Int32Array, boxes: Float32Array, parents: IntArray, normals: FloatArray,
+    reached: FloatArray,
+) -> None:  # fmt: skip
+    """Set reached (n_nodes, 3) to the least and largest product of a corner below with the normal, and the largest
+    squared distance from the axis, counted from the middle of the node's box."""
+    for node in range(len(child)):
+        if child[node, 0] >= 0:
+            continue
+        for lane in range(LANES):
+            if child[node, lane] == EMPTY:
+                continue
+            for corner in range(3):
+                p, below, up = _corner(blocks, node, lane, corner), node, parents[node]
+                while up >= 0:  # bound: the depth of the tree
+                    v = minus(p, _corner(boxes, up >> 3, up & 7, 0))
+                    along = dot(v, as_point3(normals, below))
+                    reached[below, 0] = min(reached[below, 0], along)
+                    reached[below, 1] = max(reached[below, 1], along)
+                    reached[below, 2] = max(reached[below, 2], dot(v, v) - along * along)
+                    below, up = up >> 3, parents[up >> 3]

@@ -17,20 +17,51 @@ meets everything that its finite bounds allow.
 
 Source: C. Ericson, Real-Time Collision Detection, 2005, section 7.1 (uniform grids); here by one sort, for one instant;
 D. Baraff, Dynamic simulation of non-penetrating rigid bodies, 1992 (sweep and prune), for one instant too.
+
+Uniform grids: which cell a value is in.
+
+It is ``int((x / 2 - low / 2) * cells_per_unit)``, cut off at the last cell. Each of these steps is monotone in floating
+point, so what is listed from the cell of its lower side to the cell of its upper side is found from every value between
+them, ties and roundings included. Halving keeps the difference finite for every input (for subnormal values it rounds,
+monotonically too).
 """
 
 from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating_kernel, inline, kernel
+from engine.compiling.jit import allocating_kernel, entry_of, inline, kernel
 from engine.running.budget import Budget
+from engine.types import FlagArray, FloatArray, IntArray
+
+_FASTEST: Final = 1e300
+"""Most cells per unit: keeps the product finite where all values of an axis lie within some subnormals."""
+
+
+class Axis(NamedTuple):
+    """The cells along one axis."""
+
+    low: float
+    high: float
+    cells_per_unit: float
+    n_cells: int
+
+
+@inline
+def cell_of(value: float, low: float, cells_per_unit: float, n_cells: int) -> int:
+    """Return the cell of a value that is not below `low`."""
+    return int(min((value * 0.5 - low * 0.5) * cells_per_unit, n_cells - 1.0))
+
+
+def make_axis(low: float, high: float, n_cells: int) -> Axis:
+    """Return `n_cells` cells from low to high, one where there is no extent."""
+    extent = high * 0.5 - low * 0.5
+    return Axis(low, high, 0.0, 1) if extent <= 0.0 else Axis(low, high, min(n_cells / extent, _FASTEST), n_cells)
+
 
 BLOCK: Final = 1 << 18
 """Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block

@@ -27,11 +27,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.compiling.jit import allocating, allocating_kernel, inline, kernel
 from engine.lanes.boxes import EMPTY, exchange, fill, join
 from engine.lanes.lanes import aligned
 from engine.running.budget import poll
+from engine.types import Float32Array, FloatArray, Int32Array, IntArray, read_only
 
 WIDTH = 8
 N_BINS = 16

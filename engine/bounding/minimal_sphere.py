@@ -30,11 +30,11 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.errors import NotRepresentableError
 from engine.predicates.error_free import two_sum
 from engine.predicates.rational import determinant, nearest_float
 from engine.running.budget import Budget
+from engine.types import FloatArray
 
 Rational = tuple[Fraction, ...]
 IntPoint = tuple[int, ...]

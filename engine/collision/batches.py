@@ -12,7 +12,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import TAKEN, check_pose, details_of_boxes, details_where_proven, pair_function
@@ -21,14 +20,15 @@ from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline_batch import outline_pool, relate_outline_pairs
 from engine.collision.simple.form_relations import relate_box_pairs
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.pose import Pose, motions_of
+from engine.solids.primitives import Aabb
 from engine.solids.registry import own_box
+from engine.types import BoolArray, FloatArray, Int8Array, IntArray
 
 _LEAST_POSES: Final = 32
 """What a batch of poses needs is made in the time that it spares on so many."""

@@ -14,7 +14,6 @@ from typing import Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.collision import result
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.meshes.mesh_arrays import mesh_body_of
@@ -32,14 +31,12 @@ from engine.errors import (
 )
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.checks import spell
-from engine.solids.half_space import HalfSpace
+from engine.solids.mesh import Surface
 from engine.solids.pose import Pose
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.types import Accuracy, Rcc8, Relation
+from engine.solids.primitives import Aabb, HalfSpace, Sphere
+from engine.types import Accuracy, FloatArray, Int8Array, IntArray, Rcc8, Relation
 
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
 

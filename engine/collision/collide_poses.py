@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.collision import collide as one_pair
 from engine.collision.batches import posed_batch
 from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
@@ -23,15 +22,15 @@ from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLE
 from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work, has_faces
 from engine.collision.simple.against_ball import centers_in_frame, named, relate_balls
 from engine.collision.simple.closed_forms import told_by_forms
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
 from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of
-from engine.solids.sphere import Sphere
-from engine.types import Accuracy
+from engine.solids.primitives import Sphere
+from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 
 _Answers = (
     tuple[Int8Array, one_pair.Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, one_pair.Witnesses, Int8Array]

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.mesh_arrays import BOX_TRIANGLES
 from engine.compiling.jit import kernel, merged
 from engine.predicates.vectors import cross, length, minus
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.convexity import convexity
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.sphere import Sphere
-from engine.types import Point3
+from engine.solids.mesh import Polyhedron
+from engine.solids.primitives import Aabb, Sphere
+from engine.types import FloatArray, IntArray, Point3
 
 MOST_FACES = 1 << 16
 """Beyond this many triangles the question whether a polyhedron is convex is not asked: milliseconds, mostly for no."""

@@ -34,13 +34,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
 from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned, turned_back
 from engine.compiling.jit import inline, kernel, merged
 from engine.predicates.vectors import as_point3, cross, dot, largest_of, length, minus, negative
-from engine.types import UNDECIDED, Point3
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point3
 
 _OUT, _WITHIN = 0, 1
 _POLL_EVERY = 256

@@ -11,8 +11,8 @@ from fractions import Fraction
 
 from engine.containment.methods.rational_locate import adjugate, to_world_frame
 from engine.predicates.rational import dot
-from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Pose
+from engine.solids.primitives import HalfSpace
 
 Vector = tuple[Fraction, ...]
 Point = Iterable[float | Fraction]

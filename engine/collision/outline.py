@@ -19,18 +19,17 @@ import numpy as np
 from engine.arrangement.arrange import Arrangement, arrange
 from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
-from engine.arrays import FloatArray, IntArray
 from engine.collision import outline_batch as batch
 from engine.collision import result
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import image_point, rounded
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
 from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose, motion_of
-from engine.types import Location, Relation
+from engine.types import FloatArray, IntArray, Location, Relation
 
 Point = tuple[Fraction, ...]
 _CHECK_EVERY = 64

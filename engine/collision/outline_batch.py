@@ -15,23 +15,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray, read_only
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import PoseArrays, orient2d_near
 from engine.collision.result import (
     Kind,
     has_faces,
 )
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating_kernel, called, inline, kernel
+from engine.compiling.jit import allocating_kernel, called, entry_of, inline, kernel
 from engine.predicates.error_free import two_sum
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
+from engine.solids.primitives import Aabb
 from engine.solids.ragged import next_in_rings
-from engine.types import UNDECIDED, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point2, read_only
 
 MOST_EDGES = 1024
 """Beyond, pairs of edges are too many to look at all of them."""

@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from engine.arrays import FloatArray
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
 from engine.solids.registry import row_of
-from engine.types import Rcc8, Relation
+from engine.types import FloatArray, Rcc8, Relation
 
 Kind = Literal[
     "vertex_vertex", "vertex_edge", "vertex_face", "edge_edge", "edge_face", "face_face", "containment", "surface"

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.exact_body import classify_exact
 from engine.collision.meshes.mesh_arrays import NO_AREA, UNKNOWN_AXIS, axis_of
@@ -29,8 +28,8 @@ from engine.predicates.vectors import as_point2
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.checks import as_point_groups
-from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED, Accuracy, Point2, Relation
+from engine.solids.primitives import Triangle
+from engine.types import UNDECIDED, Accuracy, FloatArray, Int8Array, Point2, Relation
 
 
 @inline

@@ -11,34 +11,27 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray, read_only
 from engine.containment.cells.build import cells_of
 from engine.containment.cells.locate import locate_by_cells
-from engine.containment.methods.ball import locate_in_ball
-from engine.containment.methods.filters import NOT_FINITE, locate_by_polynomial, locate_in_box
+from engine.containment.methods.filters import NOT_FINITE, locate_by_polynomial, locate_in_ball, locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.rational_locate import combine, is_located, over_tree, rational_location, unsupported
 from engine.containment.policy import LONG_PASS, Choice, choose_for_mesh, choose_for_rings
-from engine.containment.prepared.rings import edges_of, ring_cells_of, rings_of
-from engine.containment.prepared.triangle_tree import EXACT, prism_rows, tree_of
+from engine.containment.prepared import EXACT, edges_of, prism_rows, ring_cells_of, rings_of, tree_of
 from engine.errors import InvalidArrayError, NotFiniteError
 from engine.running.budget import Budget
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex, rows_of
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle, rows_of
 from engine.solids.registry import row_of
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray, read_only
 
 Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 

@@ -13,10 +13,9 @@ from typing import Final
 import numpy as np
 
 from engine.containment.cells.lattice import can_have_cells
-from engine.containment.prepared.rings import edges_met
-from engine.containment.prepared.triangle_tree import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, faces_over
+from engine.containment.prepared import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, edges_met, faces_over
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 
 
 class Choice(IntEnum):

@@ -16,30 +16,30 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, read_only
 from engine.containment.locators import Counts, Fill, Locator, by_kernel, csg_locator, locator_of, rational_half, settle
-from engine.containment.methods.ball import locate_in_ball
-from engine.containment.methods.filters import locate_by_polynomial, locate_in_box, locate_in_rows_blurred
-from engine.containment.methods.frames import Frames, frames_of, move_to_body_frame
+from engine.containment.methods.filters import (
+    Frames,
+    frames_of,
+    locate_by_polynomial,
+    locate_in_ball,
+    locate_in_box,
+    locate_in_rows_blurred,
+    move_to_body_frame,
+)
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.rational_locate import Check, to_world_frame
-from engine.containment.prepared.rings import rings_of
-from engine.containment.prepared.triangle_tree import prism_rows, tree_of
+from engine.containment.prepared import prism_rows, rings_of, tree_of
 from engine.running.budget import Budget
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex, rows_in_space, rows_of
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle, rows_in_space, rows_of
 from engine.solids.registry import row_of
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FloatArray, Int8Array, read_only
 
 
 def posed_locator(solid: Solid, pose: Pose | None) -> Locator:

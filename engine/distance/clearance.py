@@ -7,7 +7,6 @@ from typing import Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, read_only
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
 from engine.collision.collide import Answers, check_pose, collide_pair, pair_function
 from engine.collision.collide_poses import as_poses, batch_of
@@ -22,7 +21,7 @@ from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.pose import Pose
-from engine.types import Accuracy, Relation
+from engine.types import Accuracy, BoolArray, FloatArray, Relation, read_only
 
 
 class ClearanceOptions(Options, total=False):

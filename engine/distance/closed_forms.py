@@ -1,4 +1,4 @@
-"""Double-doubles as one value (`double_double.py` has bounds); clearance of boxes along the axes, balls, half-spaces.
+"""Double-doubles as one value (`error_free.py` has bounds); clearance of boxes along the axes, balls, half-spaces.
 
 A box is an interval on each axis, a ball one without length and a radius about it. On each axis two of them are apart,
 or share an interval: the distance is the root of the squares of what parts them, less the radii. Where they share
@@ -15,11 +15,21 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.collision.simple.form_relations import IS_BALL, RADIUS
 from engine.compiling.jit import called, inline, kernel
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
-from engine.predicates.error_free import fast_two_sum, two_prod, two_sum, workspace
+from engine.predicates.error_free import (
+    U2,
+    dd_add,
+    dd_div,
+    dd_mul,
+    dd_sub,
+    fast_two_sum,
+    surely_rounded,
+    two_prod,
+    two_sum,
+    workspace,
+)
+from engine.types import FloatArray
 
 
 class Wide(NamedTuple):

@@ -18,7 +18,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.convex_body import ASIDE, CENTER, REACH, ConvexArrays, point_of
 from engine.collision.convex_pair import PlacedBody, farthest, inner_point, largest, placed_body
 from engine.collision.meshes.near_triangles import FACE
@@ -27,10 +26,9 @@ from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.distance.closed_forms import Wide, Wide3, dot3, gap_of_forms, less, less3, root
 from engine.distance.refined import ROUNDING, corner_of, ends_of, height_above
-from engine.predicates.double_double import surely_rounded
-from engine.predicates.error_free import two_diff, two_sum, workspace
+from engine.predicates.error_free import surely_rounded, two_diff, two_sum, workspace
 from engine.predicates.vectors import dot, largest_of, length, minus, negative
-from engine.types import Point3
+from engine.types import FlagArray, FloatArray, IntArray, Point3
 
 _TURNS: Final = 40
 _SMALLEST, _LARGEST = 2.0**-140, 2.0**200

@@ -12,12 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.collision.exact_images import Vector, image_half_space, image_point, value_at
 from engine.collision.result import Clearance, Feature, Poses
 from engine.collision.simple.boundary import pulled_back
 from engine.collision.simple.closed_forms import FORMS, form_of
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.distance.closed_forms import UNSURE, nearest_of_forms, nearest_of_plane
 from engine.distance.exact import Gap, Rational, ScaledGap
 from engine.distance.outlines import nearest_under_poses
@@ -25,9 +24,9 @@ from engine.distance.spreads import BALL, feature_of, outline_of, radius_of, spr
 from engine.predicates.rational import minus, squared_length
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
-from engine.solids.half_space import HalfSpace
 from engine.solids.pose import motion_of
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import HalfSpace, Sphere
+from engine.types import FloatArray
 
 _MOST_PAIRS: Final = 1 << 18
 """Of edges of two outlines: to look at all of them takes some milliseconds, where boxes part none."""

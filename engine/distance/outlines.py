@@ -10,18 +10,16 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.outline_batch import BLOCK, inside, n_blocks, relate_placed
 from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, measure, minus2, place, point
-from engine.predicates.double_double import U2, surely_rounded
-from engine.predicates.error_free import two_sum, workspace
+from engine.predicates.error_free import U2, surely_rounded, two_sum, workspace
 from engine.predicates.orientation import lower
 from engine.predicates.parameters import compare_differences
 from engine.predicates.vectors import as_point2
-from engine.types import Point2
+from engine.types import FlagArray, FloatArray, IntArray, Point2
 
 MOST_NEAR: Final = 64
 """Vertices and edges that may be the nearest; where there are more, their tie is not settled here."""

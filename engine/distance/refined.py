@@ -27,7 +27,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import Placement
@@ -35,11 +34,10 @@ from engine.collision.meshes.triangle_triangle import Facet, corner
 from engine.compiling.jit import called, inline, merged
 from engine.distance.closed_forms import Wide, Wide3, along3, dot3, less, less3, over, plus, product, root, times
 from engine.lanes.boxes import FRAME_ROWS
-from engine.lanes.gaps import FIXED_ROWS, GAP_ROWS
+from engine.lanes.faces import FIXED_ROWS, GAP_ROWS
 from engine.lanes.tracing import LANES
-from engine.predicates.double_double import surely_rounded
-from engine.predicates.error_free import two_diff
-from engine.types import Point3
+from engine.predicates.error_free import surely_rounded, two_diff
+from engine.types import FloatArray, Point3
 
 ROOT: Final = -1
 """In place of a lane: the whole tree."""
@@ -62,7 +60,7 @@ Candidates = namedtuple("Candidates", "pairs bounds")
 Room = namedtuple("Room", "heap found limits points frames work fixed")
 """Work space of searches, one at a time.
 
-limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, work, fixed: of `lanes/gaps.py`.
+limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, work, fixed: of `lanes/faces.py`.
 """
 
 

@@ -14,7 +14,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import corners_of_box
 from engine.collision.meshes.exact_body import exact_pair, on_lattice
 from engine.collision.meshes.mesh_arrays import (
@@ -29,16 +28,16 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline_batch import outline_arrays
 from engine.collision.result import Clearance, Feature, Poses
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
 from engine.distance.refined import Room, new_room
 from engine.distance.traversal import BEYOND, DONE, TOLD, Asked, find_nearest
 from engine.running.budget import Budget
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
 from engine.solids.pose import Pose
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Aabb, Sphere
+from engine.types import FloatArray, IntArray, read_only
 
 _ROOM: Final = 4096
 

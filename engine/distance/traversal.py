@@ -1,6 +1,6 @@
 """The pairs of triangles of two placed bodies that may be the nearest, by a best-first descent of both trees.
 
-A pair of boxes, each with the disc of what it holds, is bounded from below by `lanes/gaps.py`. Pairs wait in a heap,
+A pair of boxes, each with the disc of what it holds, is bounded from below by `lanes/faces.py`. Pairs wait in a heap,
 the least bound first; the larger box of a pair is opened, its eight children are bounded at once. Of two blocks the
 pairs of triangles that may be near are told eight at once and bounded from both sides (near_triangles.py); the least
 upper bound so far ends the search once no pair that waits is below it. What is returned are all pairs of triangles
@@ -19,18 +19,17 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, Float32Array, FloatArray
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
 from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import inline, kernel, merged
 from engine.distance.refined import ROOT, Heap, Room, Search, View, certify, keep_below, refine, scaled
-from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
-from engine.lanes.discs import DISC_ROWS, inverse_ratio
-from engine.lanes.gaps import FIXED_ROWS, child_bounds, near_triangle, place_triangles
+from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, EMPTY, FRAME_ROWS, inverse_ratio
+from engine.lanes.faces import FIXED_ROWS, child_bounds, near_triangle, place_triangles
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
+from engine.types import FlagArray, Float32Array, FloatArray
 
 
 @inline

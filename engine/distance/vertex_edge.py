@@ -15,11 +15,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.collision.outline_batch import box_blocks
 from engine.compiling.jit import called, inline
 from engine.distance.closed_forms import Wide, less, over, plus, product, root, times
 from engine.predicates.vectors import as_point2
+from engine.types import FloatArray, IntArray
 
 LARGEST: Final = 2.0**200
 """Of coordinates that the bounds hold for."""

@@ -10,13 +10,12 @@ from typing import IO, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.errors import EmptyGeometryError, FaceNotSimpleError, IndexOutOfRangeError, InvalidInputError
 from engine.running.budget import UNLIMITED
 from engine.solids.checks import as_points, frozen, shown
 from engine.solids.ear_cutting import cut_faces
-from engine.solids.mesh import Mesh, first_equal
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.mesh import Mesh, Polyhedron, first_equal
+from engine.types import FloatArray, IntArray
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 _SOUPS: Final = ("stl",)

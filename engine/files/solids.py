@@ -1,21 +1,130 @@
-"""Solids from files: meshes, GeoJSON polygons, and the JSON of the HTTP interface."""
+"""Solids from files: meshes, GeoJSON polygons, and the JSON of the HTTP interface.
+
+Arrays of numbers from and to .npy, .csv and GeoJSON files.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TextIO
 
 import numpy as np
+import numpy.typing as npt
 
-from engine.errors import InvalidInputError
+from engine.errors import InvalidArrayError, InvalidInputError
 from engine.files.meshes import FORMATS, read_mesh
 from engine.layers.geojson import polygon_of
 from engine.solids.base import Solid
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.registry import solid_types
+from engine.types import FloatArray
+
+POSITIONS: Final = {
+    "Point": lambda at: [at], "MultiPoint": list, "LineString": lambda at: [at], "MultiLineString": list,
+}  # fmt: skip
+"""What makes a list of items of the coordinates of a GeoJSON geometry."""
+
+
+def read_rows(source: str, shape: tuple[int, ...]) -> FloatArray:
+    """Return an array ``(n, *shape)``; in `shape` a -1 stands for the dimension that the file tells.
+
+    .npy: any array of that many numbers a row. .csv: a row a line, a header is skipped. .geojson: points, or line
+    strings of two positions.
+    """
+    path = Path(source)
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        array = np.load(path, allow_pickle=False)
+    elif suffix == ".csv":
+        array = _read_csv(path)
+    elif suffix in (".json", ".geojson"):
+        array = np.array(_positions(json.loads(path.read_text("utf-8"))))
+    else:
+        raise InvalidInputError(f"{source}: numbers are read from .npy, .csv or .geojson", ("file",))
+    if not array.size:
+        return np.zeros((0, *map(abs, shape)))
+    try:
+        return array.reshape((len(array), *shape)) if array.ndim else array.reshape(shape)
+    except ValueError:
+        wanted = " x ".join("dimension" if size < 0 else str(size) for size in shape)
+        raise InvalidArrayError(
+            f"{source}: rows of {wanted} numbers expected, the shape is {array.shape}", ()
+        ) from None
+
+
+def _read_csv(path: Path) -> FloatArray:
+    with path.open(encoding="utf-8") as file:
+        try:
+            [float(cell) for cell in file.readline().split(",")]
+            header = 0
+        except ValueError:
+            header = 1
+            if not file.readline():
+                return np.zeros((0, 0))
+    try:
+        return np.loadtxt(path, delimiter=",", skiprows=header, ndmin=2, encoding="utf-8")
+    except ValueError as error:
+        raise InvalidArrayError(f"{path}: {error}", ("file",)) from None
+
+
+def _positions(value: Any) -> list[Any]:
+    kind = value.get("type") if isinstance(value, dict) else None
+    if kind == "FeatureCollection":
+        return [item for feature in value["features"] for item in _positions(feature)]
+    if kind == "Feature":
+        return _positions(value["geometry"])
+    if kind in POSITIONS:
+        return POSITIONS[kind](value["coordinates"])
+    raise InvalidInputError(f"points and line strings are read from GeoJSON, got {kind!r}", ("type",))
+
+
+def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> None:
+    """Write columns of equal length, ``(n,)`` or ``(n, k)`` each: .npz by name, .npy if there is one column, else .csv.
+
+    target: a path; None writes .csv to the standard output. Doubles are written so that they read back the same.
+    """
+    suffix = "" if target is None else Path(target).suffix.lower()
+    if suffix == ".npy" and len(columns) == 1:
+        np.save(str(target), next(iter(columns.values())))
+    elif suffix == ".npz":
+        np.savez(str(target), **columns)  # type: ignore[arg-type]
+    elif suffix in ("", ".csv"):
+        with _opened(target) as file:
+            file.write(_csv(columns))
+    else:
+        several = "" if len(columns) == 1 else " (one .npy array cannot hold several columns)"
+        raise InvalidInputError(f"{target}: this answer is written to .csv, .npy or .npz{several}", ("output",))
+
+
+def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
+    names, lists = [], []
+    for name, column in columns.items():
+        flat = column.reshape(len(column), -1)
+        names += [name] if flat.shape[1] == 1 else [f"{name}_{i}" for i in range(flat.shape[1])]
+        lists += [map(repr, flat[:, i].tolist()) if column.dtype.kind != "U" else flat[:, i].tolist()
+                  for i in range(flat.shape[1])]  # fmt: skip
+    return "\n".join([",".join(names), *map(",".join, zip(*lists, strict=True))]) + "\n"
+
+
+def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
+    """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if there is one."""
+    with _opened(target) as file:
+        told = "" if crs is None else f'"crs": {json.dumps(crs)}, '
+        file.write(f'{{"type": "FeatureCollection", {told}"features": [')
+        for number, feature in enumerate(features):
+            file.write(",\n" if number else "\n")
+            file.write(json.dumps(feature, default=lambda array: array.tolist()))
+        file.write("\n]}\n")
+
+
+def _opened(target: str | None) -> AbstractContextManager[TextIO]:
+    return nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8")
+
 
 Note = Callable[[str], object]
 

@@ -30,11 +30,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import Float32Array
 from engine.compiling.jit import inline, merged
 from engine.lanes.lanes import aligned, any_of, bits_of, count_bits, dot, greater, lesser, load, prefetch
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, Float32Array
 
 _UNSURE: Final = 2.0**-24
 _ROUNDING: Final = 16.0 * 2.0**-53

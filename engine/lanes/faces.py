@@ -11,18 +11,142 @@ so only the corners and the products have errors. In the tree of w a corner is o
 (frames.py: the sums there are those of `boxes.meeting`, with room to spare), a product w . x by 2^-22 |w|_1 |x|,
 which is below a quarter of margin |w|_1; both bodies together: `margin` |w|_1. What underflows is below `_TINY`.
 Normals are taken from a tree's own coordinates, at most 2, so nothing overflows where the other tree is large.
+
+A segment or a point against eight triangles at once, one to a lane: which of a block's triangles a segment may meet,
+and which lie over a point.
+
+Seen along the segment, from its middle m, a triangle that the segment meets covers the origin. With k the longest axis
+of the half e, i and j the others, and r = e_i / e_k, s = e_j / e_k,
+
+    x = (v_i - m_i) - r (v_k - m_k)          y = (v_j - m_j) - s (v_k - m_k)          for each corner v.
+
+The origin is outside where two edges a b, b c have x_a y_b - y_a x_b of different signs, and the segment ends before
+the triangle where all v_k - m_k are beyond |e_k| to one side.
+
+**The bound.** Let u = 2^-24 and S + 2 bound all coordinates (`local_segment`). Where a segment and a triangle meet,
+the common point z lies within 2 u (S + 2) of m + t e on each axis, so its x within 4 u (S + 2), and 1 u more for the
+rounding of r; a corner is rounded, which moves x by 2 u (S + 2), and x is computed within 10 u (S + 2). So a point
+within 17 u (S + 2) of the origin lies in the triangle of the computed corners, and the sign of an edge is what it is
+there where it exceeds 17 u (S + 2) times the edge's length in |x| + |y|, and 8.4 u (S + 2) times the corners' for its
+own rounding. `slack` = 32 u (S + 2) times the sum of |x| + |y| of all corners is more than both. Products that
+underflow are far below: no sign exceeds the bound unless that sum exceeds 2^-18.
+
+What is no number separates nothing.
+
+**Over a point**, seen from above, in single precision, with a band.
+A block is (8, 8) float32, a triangle to a lane: x and y of its three corners less the block's centre, the band, and its
+growth with the blur b of the point. Let R >= 2^-50 bound the corners and the point about the centre, u = 2^-24, and
+S = 2 R + b: no difference of corner and point is larger. It is off by 2 u S at most (each rounded once, and their
+difference), a product of two by 5 u S^2, and orient2d by 12 u S^2, below 108 u max(R, b)^2 < 2^-17 (R^2 + b^2); what
+underflows is far below 2^-117. The blur itself moves it by 4 R b, so the growth is 8 R.
+
+Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997; the shear is that of S. Woop,
+C. Benthin, I. Wald, Watertight ray/triangle intersection, 2013. Changed: conservative, exact signs decide behind it.
+
+Lower bounds on distances, eight at once: of eight children of a node and a child of another tree, of triangles.
+
+The children are those of an inner node (`bvh.py`), boxes with flat cylinders (`boxes.py`), the triangles those of a
+block (`faces.py`); what they are held against is of another body. `frames` (`boxes.py`) take either tree to the other.
+Distances are counted in the units of a tree: that of the eight children, for triangles that of the first body.
+
+**Directions.** Along any direction the gap between two bodies, over the direction's length, is below their distance.
+Boxes: the axes of either tree, whose gaps are put together. Discs, which hold a patch of surface far closer: the line
+of their middles and either normal; along d a disc reaches |g| t + sqrt(1 - g^2) r from its middle, g the product of d
+and its normal. Triangles: the line of their middles.
+
+**margin.** Triangles: as derived in `faces.py`, margin |w|_1 along a direction w. Boxes are enlarged by the margin
+where they are taken to the other tree, as in `boxes.py`. Discs: both sides of a comparison along a normal are off by
+less than twice the margin (`boxes.py`); along another direction g is off by no more for either of them. Four of both
+margins are left out of each bound, and 2^-18 of it for what the last operations round and for rotations that are not
+quite orthogonal.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Any, Final
 
-from engine.arrays import Float32Array
 from engine.compiling.jit import inline
-from engine.lanes.boxes import FRAME_ROWS, MARGIN_ROW, SHIFT_ROW, Bounds, are_parted
-from engine.lanes.lanes import any_above, bits_of, bytes_of, dot, greater, lane_of, lesser, load, load_lane, sift, store
-from engine.lanes.tracing import LANES, Lanes, Rows, traced
-from engine.lanes.triangles import CORNER_ROWS
+from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, FRAME_ROWS, MARGIN_ROW, ROUND, SHIFT_ROW, Bounds, are_parted
+from engine.lanes.lanes import (
+    any_above,
+    bits_of,
+    bytes_of,
+    dot,
+    greater,
+    lane_of,
+    lesser,
+    load,
+    load_lane,
+    root,
+    sift,
+    store,
+)
+from engine.lanes.tracing import LANES, Lanes, Number, Rows, Triple, traced
+from engine.types import Float32Array
+
+CORNER_ROWS: Final = 9
+"""ax ay az bx by bz cx cy cz."""
+AXES_BEFORE: Final = (1, 2, 0, 1, 2)
+"""The other two of axis k: AXES_BEFORE[k], AXES_BEFORE[k + 1]."""
+
+
+@inline
+def longest_axis(half: tuple[float, ...]) -> int:
+    """Return the axis along which a half is longest."""
+    x, y, z = abs(half[0]), abs(half[1]), abs(half[2])
+    if x >= y and x >= z:
+        return 0
+    return 1 if y >= z else 2
+
+
+@traced
+def near_triangles(
+    corners: Rows, node: int, i: int, j: int, k: int, middle: Triple, r: Number, s: Number, reach: Number, slack: Number
+) -> int:
+    """Return the lanes of a block, a bit each, that the segment may meet. All numbers are float32.
+
+    middle: on the axes i, j, k; reach: |e_k| + slack.
+    """
+
+    def away(axis: int, place: int) -> Any:
+        return [load(corners, CORNER_ROWS * node + axis + 3 * corner) - middle[place] for corner in range(3)]
+
+    z = away(k, 2)
+    x = [along - r * z[corner] for corner, along in enumerate(away(i, 0))]
+    y = [along - s * z[corner] for corner, along in enumerate(away(j, 1))]
+    sizes = [abs(x[corner]) + abs(y[corner]) for corner in range(3)]
+    bound = slack * (sizes[0] + sizes[1] + sizes[2])
+    edges = [x[a] * y[b] - y[a] * x[b] for a, b in ((0, 1), (1, 2), (2, 0))]
+    is_left = (edges[0] > bound) | (edges[1] > bound) | (edges[2] > bound)
+    is_right = (edges[0] < -bound) | (edges[1] < -bound) | (edges[2] < -bound)
+    is_before = (z[0] < -reach) & (z[1] < -reach) & (z[2] < -reach)
+    is_beyond = (z[0] > reach) & (z[1] > reach) & (z[2] > reach)
+    return bits_of(~((is_left & is_right) | is_beyond | is_before))
+
+
+OVERHEAD_ROWS: Final = 8
+BAND: Final = 2.0**-17
+GROWTH: Final = 8.0
+LEAST_REACH: Final = 2.0**-50
+
+
+@traced
+def overhead(blocks: Rows, boxes: Rows, node: int, x: Number, y: Number, z: Number, blur: Number) -> tuple[int, int]:
+    """Return the lanes of a node whose triangles surely lie over a point, and those that it is surely beside.
+
+    x, y: less the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
+    """
+    rows = [load(blocks, OVERHEAD_ROWS * node + row) for row in range(OVERHEAD_ROWS)]
+    u, v = [rows[k] - x for k in (0, 2, 4)], [rows[k] - y for k in (1, 3, 5)]
+    turns = [u[i] * v[j] - v[i] * u[j] for i, j in ((0, 1), (1, 2), (2, 0))]
+    least, most = lesser(lesser(turns[0], turns[1]), turns[2]), greater(greater(turns[0], turns[1]), turns[2])
+    band = rows[6] + rows[7] * blur + blur * blur * BAND
+    is_above = load(boxes, BOX_ROWS * node + 2) - load(boxes, BOX_ROWS * node + 5) > z
+    is_within = (least - band > 0.0) | (most + band < 0.0)
+    is_beside = (least + band < 0.0) & (most - band > 0.0)
+    return bits_of(is_within & is_above), bits_of(is_beside)
+
 
 NOWHERE: Final = 1e30
 """Coordinate of the corners of a lane that is not used: beyond every image and every margin."""
@@ -120,3 +244,104 @@ def beside_planes(lane: int, work: Rows) -> int:
         products = dot(w, image[0:3]), dot(w, image[3:6]), dot(w, image[6:9])
         pairs += [(_least(*products), w[4]), (w[3], _greatest(*products))]
     return bits_of(~any_above(pairs))
+
+
+FIXED_ROWS: Final = BOX_ROWS + DISC_ROWS
+GAP_ROWS: Final = 12
+"""Of work space: the corners of eight triangles, and three times their middles."""
+_MIDDLES: Final = 9
+_LEAST_SIZE: Final = 2.0**-120
+_BELOW_ONE: Final = 1.0 - 2.0**-18
+_MOST: Final = 2.0**60
+"""A bound beyond, in the units of either tree, is told as this: squares of more overflow."""
+
+
+def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
+    return [abs(x) for x in v]
+
+
+def _gaps(v: Sequence[Lanes], reach: Sequence[Lanes]) -> Lanes:
+    """Return the square of the vector of gaps between two boxes along three axes."""
+    gaps = [greater(abs(x) - r, 0.0) for x, r in zip(v, reach)]
+    return dot(gaps, gaps)
+
+
+def _width(disc: Sequence[Lanes], cosine: Lanes) -> Lanes:
+    """Return how far a disc, its radius and half thickness, reaches from its middle along a direction not longer than 1
+    whose product with its normal is given."""
+    radius, half = disc
+    return abs(cosine) * half + root(greater((1.0 + ROUND) - cosine * cosine, ROUND)) * radius
+
+
+@traced
+def child_bounds(
+    boxes: Rows, discs: Rows, node: int, fixed: Rows, frames: Rows, own: int, theirs: int, ratio: Number,
+    inverse: Number, work: Rows,
+) -> None:  # fmt: skip
+    """Write lower bounds on the distances of the eight children of a node and what is fixed to the first row of work.
+
+    fixed (FIXED_ROWS, 8): in its first column a box and a disc, in the tree of the other body. own, theirs: the rows of
+    frames where the maps begin to the tree of the node and from it; ratio: the other tree's scale over this one's, and
+    its inverse.
+    """
+    box, disc = (
+        [load(rows, n * node + row) for row in range(n)] for rows, n in ((boxes, BOX_ROWS), (discs, DISC_ROWS))
+    )
+    other = [load_lane(fixed, row, 0) for row in range(FIXED_ROWS)]
+    their_box, their_disc = other[:BOX_ROWS], other[BOX_ROWS:]
+    margin, their_margin = load(frames, own + MARGIN_ROW), load(frames, theirs + MARGIN_ROW)
+    v, w, reach, their_reach, d, normal = [], [], [], [], [], []
+    for k in range(3):
+        turn = [load(frames, own + 3 * k + column) for column in range(3)]
+        back = [load(frames, theirs + 3 * k + column) for column in range(3)]
+        shift = load(frames, own + SHIFT_ROW + k)
+        v.append(dot(turn, their_box[:3]) + shift - box[k])
+        reach.append(dot(_sizes(turn), their_box[3:]) + margin + box[3 + k])
+        w.append(dot(back, box[:3]) + load(frames, theirs + SHIFT_ROW + k) - their_box[k])
+        their_reach.append(dot(_sizes(back), box[3:]) + their_margin + their_box[3 + k])
+        d.append(dot(turn, their_disc[:3]) + shift - disc[k])
+        normal.append(dot(turn, their_disc[3:6]) * inverse)
+    flat, their_flat = disc[6:], [number * ratio for number in their_disc[6:]]
+    size, g = root(dot(d, d)), dot(disc[3:6], normal)
+    on_own, on_their = dot(disc[3:6], d), dot(normal, d)
+    bound = greater(root(_gaps(v, reach)), ratio * lesser(root(_gaps(w, their_reach)), _MOST))
+    for level, cosine, their_cosine in (
+        (size, on_own / greater(size, _LEAST_SIZE), on_their / greater(size, _LEAST_SIZE)),
+        (abs(on_own) - flat[1], None, g),
+        (abs(on_their) - their_flat[1], g, None),
+    ):
+        level = level if cosine is None else level - _width(flat, cosine)
+        bound = greater(level if their_cosine is None else level - _width(their_flat, their_cosine), bound)
+    bound = greater(bound * _BELOW_ONE - (margin + ratio * their_margin) * 4.0, 0.0)  # what is no number is 0
+    store(work, 0, lesser(bound, _MOST))
+
+
+def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]:
+    """Return the least and the greatest product of a direction with three corners."""
+    p, q, r = (dot(way, corners[3 * k : 3 * k + 3]) for k in range(3))
+    return lesser(p, lesser(q, r)), greater(p, greater(q, r))
+
+
+@traced
+def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
+    """Write the triangles of a block of the second body, in the tree of the first, to work."""
+    own, corners = [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)], []
+    for corner in range(3):
+        for k in range(3):
+            turn = [load(frames, 3 * k + column) for column in range(3)]
+            corners.append(dot(turn, own[3 * corner : 3 * corner + 3]) + load(frames, SHIFT_ROW + k))
+            store(work, 3 * corner + k, corners[-1])
+    for k in range(3):
+        store(work, _MIDDLES + k, corners[k] + corners[3 + k] + corners[6 + k])
+
+
+@traced
+def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number, work: Rows) -> int:
+    """Return the triangles in work, a bit each, that may be as near as `most` to one in a lane of a block; lanes that
+    are not used count as near."""
+    own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
+    theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
+    d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]
+    x, y, z = _sizes(d)
+    gap = _ends(d, theirs)[0] - _ends(d, own)[1] - margin * (x + y + z)
+    return bits_of(~(gap * _BELOW_ONE > most * root(dot(d, d)) + _LEAST_SIZE))

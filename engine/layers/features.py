@@ -16,17 +16,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import CancelledError, DeadlineExceededError, EngineError, InvalidInputError
-from engine.layers.geojson import checked_each, collection_of, polygons_of
+from engine.layers.geojson import checked_each, collection_of, crs_of, groups_of, members_of, polygons_of, texts_of
 from engine.layers.json_text import text_of
-from engine.layers.members import crs_of, groups_of, members_of, texts_of
 from engine.layers.rows import NONE, LayerRows, Limits, dissolved, held, overlay_rows, with_alone
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
 from engine.solids.checks import as_points, shown
 from engine.solids.ragged import summed
-from engine.types import Accuracy
+from engine.types import Accuracy, FloatArray, IntArray, read_only
 
 _CHECKED: Final = 1000
 """Features made at once."""

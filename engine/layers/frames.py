@@ -20,7 +20,7 @@ from engine.layers.rows import (
     overlay_rows,
     with_alone,
 )
-from engine.polygon_overlay.polygon_arrays import PolygonArrays, arrays_of
+from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
 from engine.polygon_overlay.touching import Touching
 from engine.running.budget import Cancel
 from engine.solids.checks import shown

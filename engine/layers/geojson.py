@@ -1,33 +1,181 @@
-"""FeatureCollections of GeoJSON (RFC 7946) read: what a layer holds, and errors that name the feature at fault."""
+"""FeatureCollections of GeoJSON (RFC 7946) read: what a layer holds, and errors that name the feature at fault.
+
+What rows copy of features: properties, ids and the `crs`, each written as JSON once; and groups by properties.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
     EngineError,
     InvalidArrayError,
     InvalidInputError,
+    NotFiniteError,
     RingTooShortError,
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.layers.json_text import Path
-from engine.layers.rows import Layer, Limits, layer_of
-from engine.polygon_overlay.polygon_arrays import arrays_of
-from engine.polygon_overlay.union_all import union_all
+from engine.layers.json_text import NotJsonError, Path, key_of, text_of
+from engine.layers.rows import NONE, Layer, Limits, layer_of
+from engine.polygon_overlay.overlay import union_all
+from engine.polygon_overlay.pair_arrays import arrays_of
 from engine.running.budget import polled
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
+from engine.types import FloatArray, IntArray
+
+_NAME_BYTES: Final = 200
+"""Bytes that a name and the sets it is in hold."""
+_NOUNS: Final = {"properties": "a property", "id": "an id", "geometry": "a geometry"}
+_TOLD: Final = 2**20
+"""Bytes of texts after which the budget hears of them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Copied:
+    """What rows copy of the features of a layer, as JSON: the inside of their properties, and of an object with their
+    id, if any; n_bytes, id_bytes: (n + 1,) how long both are, and the second alone; 0 stands last, for -1, none."""
+
+    properties: list[bytes]
+    ids: list[bytes]
+    n_bytes: IntArray
+    id_bytes: IntArray
+
+
+def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
+    """Return the `crs` of the layers as JSON; they may not differ."""
+    there = [side for side in sides if side.crs is not None]
+    texts = []
+    with limits.budget() as budget:
+        for side in there:
+            try:
+                texts.append(text_of(side.crs))
+                budget.take(len(texts[-1]))
+            except NotJsonError as error:
+                what = "holds infinity or NaN" if error.is_number else f"has no JSON ({error})"
+                kind = NotFiniteError if error.is_number else InvalidInputError
+                raise kind(
+                    f"the crs of {side.where[0]} {what}; correct it", (*side.where, "crs", *error.path)
+                ) from None
+        if len(there) == 2 and key_of(there[0].crs) != key_of(there[1].crs):
+            raise InvalidInputError("the crs of left and right differ; bring both layers into one", ("right", "crs"))
+    return texts[0] if texts else None
+
+
+def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limits) -> list[bytes]:
+    """Return a value of each feature as JSON, which stands in this member of it."""
+    texts: list[bytes] = []
+    taken = 0
+    with limits.budget() as budget:
+        for number, value in enumerate(values):
+            budget.check()
+            try:
+                text = text_of(value)
+            except NotJsonError as error:
+                why = "is infinite or NaN, which JSON cannot hold" if error.is_number else f"JSON cannot hold: {error}"
+                what = f"has {_NOUNS[member]} that {why}"
+                kind = NotFiniteError if error.is_number else InvalidInputError
+                raise refused(
+                    kind, side, number, what, error.path if member == "id" else (member, *error.path)
+                ) from None
+            taken += len(text)
+            if taken > _TOLD:
+                budget.take(taken)
+                taken = 0
+            texts.append(text)
+        budget.take(taken)
+    return texts
+
+
+def members_of(
+    sides: list[Collection], names: tuple[str, str], limits: Limits
+) -> tuple[Callable[[int, int], bytes], Callable[[IntArray, IntArray], IntArray]]:
+    """Return what makes the members beside type and geometry of a row from both features' numbers, -1 for none, and
+    what says of many rows how many bytes these are at least."""
+    columns: list[set[str]] = [set(), set()]
+    with limits.budget() as budget:
+        for side, column in zip(sides, columns):
+            for each in polled(side.properties):
+                n_before = len(column)
+                column.update(each)
+                budget.take(_NAME_BYTES * (len(column) - n_before))
+        shared = columns[0] & columns[1]
+        made: set[str] = set()
+        twice: set[str] = set()
+        for column, end in zip(columns, ("_1", "_2")):
+            for name in polled(column):
+                name += end * (name in shared)
+                (twice if name in made else made).add(name)
+    if twice:
+        raise InvalidInputError(
+            f"two properties would be named {min(twice)!r:.200}, as names that both layers have get _1 and _2; rename "
+            "one",
+            (),
+        )
+    left, right = (_copied(side, shared, end, limits) for side, end in zip(sides, ("_1", "_2")))
+
+    def told(first: int, second: int) -> bytes:
+        inside, sources, ids = [], b"", b""
+        for name, number, copied in zip(names, (first, second), (left, right)):
+            if number != NONE:
+                inside += [copied.properties[number]] if copied.properties[number] else []
+                ids = copied.ids[number]
+                sources += b',"%b":{"index":%d%b}' % (name.encode(), number, ids)
+        alone = ids[1:] + b"," if ids and NONE in (first, second) else b""
+        return b'%b"properties":{%b}%b' % (alone, b",".join(inside), sources)
+
+    def n_bytes(first: IntArray, second: IntArray) -> IntArray:
+        alone = np.where((first == NONE) | (second == NONE), left.id_bytes[first] + right.id_bytes[second], 0)
+        return alone + left.n_bytes[first] + right.n_bytes[second]
+
+    return told, n_bytes
+
+
+def _copied(side: Collection, shared: set[str], end: str, limits: Limits) -> _Copied:
+    """Return what rows copy of a layer; names that both layers have get an ending."""
+
+    def renamed() -> Iterator[dict[str, Any]]:
+        for each in side.properties:
+            is_free = not shared or shared.isdisjoint(each)
+            yield each if is_free else {name + end * (name in shared): value for name, value in each.items()}
+
+    properties = [text[1:-1] for text in texts_of(side, renamed(), "properties", limits)]
+    ids = texts_of(side, ({"id": each["id"]} if "id" in each else {} for each in side.features), "id", limits)
+    ids = [b"," + text[1:-1] if len(text) > 2 else b"" for text in ids]
+    id_bytes = np.array([*map(len, ids), 0], np.int64)
+    return _Copied(properties, ids, np.array([*map(len, properties), 0], np.int64) + id_bytes, id_bytes)
+
+
+def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntArray, list[dict[int, bytes]]]:
+    """Return the group of each feature by its properties of these names, and the values of each group as JSON, by the
+    places of the names; the first group has the first feature in it, and so on."""
+    places = {name: place for place, name in enumerate(names)}
+    order: dict[Any, int] = {} if names else {(): 0}
+    values: list[dict[int, bytes]] = [] if names else [{}]
+    groups = np.zeros(len(side.features), np.int64)
+    with limits.budget() as budget:
+        for number, each in enumerate(polled(side.properties if names else ())):
+            few, many = (each, places) if len(each) < len(places) else (places, each)
+            given = sorted((places[name], each[name]) for name in few if name in many and each[name] is not None)
+            try:
+                key = tuple((place, key_of(value)) for place, value in given)
+            except (TypeError, RecursionError) as error:
+                raise InvalidInputError(f"by compares a value that JSON cannot hold: {error}", ("by",)) from None
+            groups[number] = order.setdefault(key, len(values))
+            if groups[number] == len(values):
+                values.append({place: text_of(value) for place, value in given})
+                budget.take(_NAME_BYTES * (1 + len(given)) + sum(map(len, values[-1].values())))
+    return groups, values
+
 
 AREAS: Final = ("Polygon", "MultiPolygon")
 

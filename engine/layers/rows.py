@@ -15,23 +15,20 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
-from engine.polygon_overlay.found import chained, places_of
-from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, joined_arrays
+from engine.polygon_overlay.overlay import less_all, overlay, union_all
+from engine.polygon_overlay.pair_arrays import Chosen, PolygonArrays, chained, joined_arrays, places_of
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, joined_touching, touching
-from engine.polygon_overlay.union_all import less_all, union_all
 from engine.running.budget import Budget, Cancel
 from engine.scenes.locate_scene import locate_scene
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings, summed
-from engine.types import Accuracy
+from engine.types import Accuracy, BoolArray, FloatArray, IntArray
 
 HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
     "intersection": (True, False, False),

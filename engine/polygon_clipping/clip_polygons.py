@@ -13,21 +13,20 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple, Unpack, overload
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.errors import EmptyGeometryError, InvalidArrayError, TooComplexError
 from engine.polygon_clipping.in_integers import clip_polygon
 from engine.polygon_clipping.planes import KernelScene, Plan, kernel_scene, plan_of
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
-from engine.predicates.scaling import largest_of, scaled_back
+from engine.predicates.rational import largest_of, scaled_back
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import Ragged, summed
-from engine.types import OPEN, Accuracy
+from engine.types import OPEN, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 
 class PolygonStatus(IntEnum):
@@ -129,7 +128,7 @@ def clip_polygons(
         UnsupportedSolidError (a sphere would change the type of the result), InvalidArrayError, WrongDimensionError,
         NotFiniteError, EmptyGeometryError, DeadlineExceededError, CancelledError.
 
-    >>> from engine.solids.half_space import HalfSpace
+    >>> from engine.solids.primitives import HalfSpace
     >>> clipped = clip_polygons([[[[0, 0], [4, 0], [0, 4]]]], HalfSpace(normal=[-1.0, 0.0], offset=1.0))
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]

@@ -21,8 +21,7 @@ from typing import Final, NamedTuple
 from engine.compiling.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
 from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND, point_along
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, surely_rounded
-from engine.predicates.error_free import fma, two_diff, two_prod, two_sum
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, fma, surely_rounded, two_diff, two_prod, two_sum
 
 VALUE_BOUND: Final = 16.0 * 2.0**-53
 """Signs in doubles: a term loses the low parts of row and vertex, a product, three sums; its size as much again."""

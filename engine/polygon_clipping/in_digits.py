@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.compiling.jit import allocating, called, inline
 from engine.polygon_clipping.cut_vertices import VALUE_BOUND
 from engine.polygon_clipping.rings import (
@@ -31,7 +30,7 @@ from engine.polygon_clipping.rings import (
     plane_of,
 )
 from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, put_double, sign_of, sum_products
-from engine.types import OPEN
+from engine.types import OPEN, FlagArray, FloatArray, IntArray
 
 TOO_LONG = -1
 """Instead of a number of vertices: exact numbers are too long for digits.py."""

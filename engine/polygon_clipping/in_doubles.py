@@ -21,7 +21,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.compiling.jit import allocating, called, merged
 from engine.lanes.lanes import move
 from engine.polygon_clipping.cut_vertices import TINY, VALUE_BOUND, Vertices, are_same, cut_edge
@@ -37,6 +36,7 @@ from engine.polygon_clipping.rings import (
     has_bridges,
     plane_of,
 )
+from engine.types import FlagArray, FloatArray, Int32Array
 
 DOUBT: Final = -1
 """Instead of a number of vertices: doubles do not prove something."""

@@ -17,24 +17,20 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array, IntArray
 from engine.containment.methods.rational_locate import rational_location
 from engine.errors import UnsupportedSolidError
 from engine.polygon_clipping.in_integers import Row, integer_row, plane_through
 from engine.polygon_clipping.rings import PlaneTables
 from engine.predicates.digits import packed_numbers
 from engine.predicates.orientation import orient3d_batch
-from engine.predicates.rational import nearest_pair, orient3d_rational, reduced
-from engine.predicates.scaling import are_all_safe, exponent_above, shifted
-from engine.solids.aabb import Aabb
+from engine.predicates.rational import are_all_safe, exponent_above, nearest_pair, orient3d_rational, reduced, shifted
 from engine.solids.base import Solid
 from engine.solids.checks import digits
-from engine.solids.convex import Convex, rows_of
 from engine.solids.convexity import convexity
-from engine.solids.half_space import HalfSpace
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.mesh import Polyhedron
+from engine.solids.primitives import Aabb, Convex, HalfSpace, rows_of
 from engine.solids.registry import refused, row_of
-from engine.types import UNDECIDED, Location
+from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray, Location
 
 Check = Callable[[], object]
 

@@ -8,14 +8,22 @@ from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, taken
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of, check_sources
 from engine.polygon_overlay.overlay import accuracy_of, check_operation, overlay_rings, rings_of, ulps_moved
-from engine.polygon_overlay.polygon_arrays import Chosen, PolygonArrays, gathered
+from engine.polygon_overlay.pair_arrays import (
+    NO_PAIRS,
+    Chosen,
+    Found,
+    PolygonArrays,
+    chained,
+    gathered,
+    joined,
+    one_pair,
+    taken,
+)
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
@@ -25,7 +33,7 @@ from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import Ragged, closed_rings, summed
-from engine.types import OPEN, Accuracy
+from engine.types import OPEN, Accuracy, BoolArray, FloatArray, Int8Array, IntArray, read_only
 
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8

@@ -17,18 +17,18 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int32Array, IntArray, read_only
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
 from engine.polygon_overlay.compiled.snapping import FOLDS, scale, snap
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
-from engine.polygon_overlay.found import Found, one_pair, ring_numbers
 from engine.polygon_overlay.implicit_rings import ImplicitRings, rings_alone
+from engine.polygon_overlay.pair_arrays import Found, one_pair, ring_numbers
 from engine.polygon_overlay.result import Overlay, made_overlay
 from engine.running.budget import Budget
 from engine.solids.checks import shown
 from engine.solids.ragged import next_in_rings, summed
+from engine.types import FloatArray, Int32Array, IntArray, read_only
 
 _MOST: Final = 2.0**51
 """Cells from zero up to which halves of cells are doubles, with room for sums."""

@@ -15,14 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.arrangement.arrange import crossing, line_through
-from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import Homogeneous, float_nodes
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
-from engine.compiling.direct import entry_of
+from engine.arrangement.rings import ExactRings
+from engine.compiling.jit import entry_of
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.ring_area import sum_areas
 from engine.solids.checks import as_nested_offsets, as_points
+from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 _NEVER: Final = np.zeros(1, np.uint8)
 

@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 
 from engine.arrangement.arrange import Arrangement, arrange_rings
-from engine.arrangement.exact_area import ExactRings
-from engine.arrangement.rings import Piece, trace_pieces
+from engine.arrangement.rings import ExactRings, Piece, trace_pieces
 from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
-from engine.arrays import FloatArray, IntArray
 from engine.errors import TooComplexError
-from engine.polygon_overlay.compiled.boundary.ring_nesting import (
+from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.loading import RingArrays
+from engine.polygon_overlay.compiled.ring_nesting import (
     FIRST_ALONE,
     NEGATIVE,
     NON_ZERO,
@@ -27,14 +27,13 @@ from engine.polygon_overlay.compiled.boundary.ring_nesting import (
     POSITIVE,
     Nesting,
 )
-from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.found import Found, one_pair, ring_sizes
 from engine.polygon_overlay.grid import snapped_to_units
+from engine.polygon_overlay.pair_arrays import Found, one_pair, ring_sizes
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.rounds import settle_rings
 from engine.polygon_overlay.run import KEPT, UNNAMED, Operation
 from engine.running.budget import Budget, polled
+from engine.types import FloatArray, IntArray
 
 _Sources = frozenset[int]
 

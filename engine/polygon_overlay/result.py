@@ -12,14 +12,14 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient
-from engine.arrays import FloatArray, IntArray
+from engine.arrangement.rings import ExactRings
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.running.budget import Budget
 from engine.running.parallel import Options
 from engine.solids.checks import as_nested_offsets
 from engine.solids.ragged import as_geojson
+from engine.types import FloatArray, IntArray
 
 
 class OverlayOptions(Options, total=False):

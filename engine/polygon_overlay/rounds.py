@@ -21,15 +21,14 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrangement.snap_rounding import snap_rings
+from engine.arrangement.arrange import snap_rings
 from engine.arrangement.union_find import UnionFind
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
-from engine.polygon_overlay.found import NO_PAIRS, Found, joined, one_pair, places_of, taken
 from engine.polygon_overlay.implicit_rings import edges_along
+from engine.polygon_overlay.pair_arrays import NO_PAIRS, Found, joined, one_pair, places_of, taken
 from engine.polygon_overlay.result import Exact, Lost, Overlay, made_overlay
 from engine.running.budget import Budget
-from engine.types import OPEN
+from engine.types import OPEN, BoolArray, FloatArray, IntArray, read_only
 
 MAX_ROUNDS: Final = 12
 """Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""

@@ -13,12 +13,11 @@ from typing import Any, Final, Literal, cast
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray, read_only
-from engine.compiling.direct import entry_of
-from engine.polygon_overlay.compiled.boundary.ring_nesting import AGAIN, PAIR, Nesting
+from engine.compiling.jit import entry_of
 from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
+from engine.polygon_overlay.compiled.ring_nesting import AGAIN, PAIR, Nesting
 from engine.polygon_overlay.compiled.workspace import (
     FEW_VERTICES,
     Outcomes,
@@ -29,17 +28,16 @@ from engine.polygon_overlay.compiled.workspace import (
     scratch_for_few,
     spare,
 )
-from engine.polygon_overlay.found import Found, put_together, ring_sizes
 from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings, one_polygon
-from engine.polygon_overlay.polygon_arrays import PolygonArrays
+from engine.polygon_overlay.pair_arrays import Found, PolygonArrays, put_together, ring_sizes
 from engine.polygon_overlay.result import Overlay, made_overlay
 from engine.polygon_overlay.rounds import settle_rings
-from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.predicates.rational import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
-from engine.types import OPEN
+from engine.types import OPEN, FlagArray, FloatArray, IntArray, read_only
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
 

@@ -22,17 +22,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.found import Found, chained, places_of, ring_numbers, taken
 from engine.polygon_overlay.in_integers import parts_exactly
-from engine.polygon_overlay.polygon_arrays import Chosen
+from engine.polygon_overlay.pair_arrays import Chosen, Found, chained, places_of, ring_numbers, taken
 from engine.polygon_overlay.run import EACH_PART, run_kernel
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
 from engine.solids.ragged import next_in_rings, summed
-from engine.types import OPEN
+from engine.types import OPEN, BoolArray, FloatArray, IntArray
 
 _FIRST: Final = 1
 _SECOND: Final = 2

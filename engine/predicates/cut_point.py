@@ -27,11 +27,20 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.compiling.jit import called, inline, merged
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_scale, even_of, surely_rounded
-from engine.predicates.error_free import two_diff, two_prod, two_sum
+from engine.predicates.error_free import (
+    U2,
+    dd_add,
+    dd_div,
+    dd_scale,
+    even_of,
+    surely_rounded,
+    two_diff,
+    two_prod,
+    two_sum,
+)
 from engine.predicates.expansion import LARGEST, Components, grow_product, sign
+from engine.types import FloatArray
 
 CUT_BOUND: Final = 64.0 * U2
 POINT_BOUND: Final = 48.0 * U2

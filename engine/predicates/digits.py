@@ -20,9 +20,9 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import IntArray
 from engine.compiling.jit import inline
-from engine.predicates.double_double import U2, dd_add, dd_div, even_of, surely_rounded
+from engine.predicates.error_free import U2, dd_add, dd_div, even_of, surely_rounded
+from engine.types import IntArray
 
 BITS: Final = 28
 MOST: Final = 60

@@ -25,20 +25,37 @@ exact, zero too.
 
 Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997.
 Changed: the sign of orient3d is opposite, underflow and overflow are covered, the exact stage drops zeros and scales.
+
+Simulation of simplicity: a zero of orient2d is decided as for a point moved by (eps, eps^2).
+
+Seen along a ray, or along the line beside a segment, that line is a point q, and an edge a b of the boundary has it on
+its left or right by the sign of orient2d(a, b, q). For every eps > 0 that is small enough, the sign for
+q + (eps, eps^2) is
+
+    sign orient2d(a, b, q)   where that is not 0
+    sign (a.y - b.y)         else where that is not 0: the derivative of orient2d(a, b, q) by q.x
+    sign (b.x - a.x)         else: the derivative by q.y; 0 where a = b alone
+
+So moved, q lies on no vertex and no edge. Two elements at a common edge decide its zero alike, and so do all that count
+crossings by this rule, in whichever arithmetic: containment/methods/polyhedron_ray_parity.py and rational_locate.py,
+collision/meshes/parity.py and exact_regions.py, segment_clipping/exact_pieces.py and on_boundary/mesh_contacts.py.
+tests/unit/predicates/test_ties.py compares them. In the plane a ray to the right is moved up by eps
+(polygon_ray_parity.py).
+
+Source: H. Edelsbrunner, E. P. Muecke, Simulation of simplicity, 1990.
 """
 
 from __future__ import annotations
 
 from math import frexp, ldexp
+from typing import Any
 
-from engine.arrays import FloatArray, Int8Array
 from engine.compiling.jit import called, inline, kernel, merged
-from engine.predicates.double_double import U2, dd_add, dd_mul, dd_sub
-from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.error_free import U2, dd_add, dd_mul, dd_sub, two_diff, workspace
 from engine.predicates.expansion import Components, add_scaled, sign
 from engine.predicates.parameters import compare_differences, compare_in_pairs, minor
 from engine.predicates.vectors import as_point3, minus
-from engine.types import UNDECIDED, Point2, Point3
+from engine.types import UNDECIDED, FloatArray, Int8Array, Point2, Point3
 
 BOUND_2D = 2.0**-51  # 4u
 BOUND_3D = 2.0**-50  # 8u
@@ -258,3 +275,14 @@ def orient3d_batch(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, s
     """Fill sides (n,) int8 with orient3d of the rows of a, b, c, d (n, 3) float64."""
     for item in range(sides.shape[0]):
         sides[item] = orient3d(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))
+
+
+def tie_sign_exact(ax: Any, ay: Any, bx: Any, by: Any) -> int:
+    """Return the sign of orient2d(a, b, q + (eps, eps^2)) where orient2d(a, b, q) is 0; for numbers of any kind."""
+    if ay != by:
+        return 1 if ay > by else -1
+    return 1 if bx > ax else -1 if bx < ax else 0
+
+
+tie_sign: Any = inline(tie_sign_exact)
+"""The same, compiled for float64."""

@@ -17,12 +17,11 @@ from __future__ import annotations
 
 from math import frexp, ldexp
 
-from engine.arrays import FloatArray, IntArray
 from engine.compiling.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, scale, sign
 from engine.predicates.side import NO_TERM
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FloatArray, IntArray
 
 MAX_DEGREE = 16  # total degree of a term; `Implicit` takes no more
 MAX_TERMS = 1000

@@ -22,7 +22,6 @@ from __future__ import annotations
 from math import frexp, ldexp
 from typing import NamedTuple
 
-from engine.arrays import FloatArray
 from engine.compiling.jit import called, inline
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, add_scaled, compress, grow_product, sign
@@ -36,7 +35,7 @@ from engine.predicates.orientation import (
     rounded_determinant,
 )
 from engine.predicates.vectors import minus
-from engine.types import UNDECIDED, Point3
+from engine.types import UNDECIDED, FloatArray, Point3
 
 UNPOSED = -1
 """Number of the pose that leaves a point where it is."""

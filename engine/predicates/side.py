@@ -18,8 +18,7 @@ from __future__ import annotations
 from math import frexp, ldexp
 
 from engine.compiling.jit import called, inline
-from engine.predicates.double_double import U2
-from engine.predicates.error_free import two_prod, two_sum, workspace
+from engine.predicates.error_free import U2, two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, grow, grow_product, sign
 from engine.types import UNDECIDED, HalfSpace3, Point3
 

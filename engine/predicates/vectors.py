@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.compiling.jit import inline, merged
-from engine.types import Point2, Point3
+from engine.types import FloatArray, IntArray, Point2, Point3
 
 
 @inline

@@ -12,8 +12,8 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from engine.arrays import FlagArray
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
+from engine.types import FlagArray
 
 
 class Cancel:

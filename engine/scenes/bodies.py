@@ -14,13 +14,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.containment.locators import Locator, locator_of
-from engine.containment.methods.frames import frames_of
+from engine.containment.methods.filters import frames_of
 from engine.containment.methods.rational_locate import Check, is_located, over_tree
 from engine.containment.posed_locators import posed_locator
 from engine.errors import EngineError
@@ -34,8 +33,9 @@ from engine.solids.base import Preparing, Solid
 from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit
 from engine.solids.pose import Pose, motions_of
+from engine.solids.primitives import Sphere
 from engine.solids.registry import own_box, row_of
-from engine.solids.sphere import Sphere
+from engine.types import FloatArray, IntArray, read_only
 
 _LISTED: Final = 4
 """Bodies that have no tree: their boxes are looked at sooner than one is built."""

@@ -12,14 +12,13 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray, read_only
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.containment.locators import locator_of
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import run_chunks
 from engine.scenes.bodies import order_of
 from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
-from engine.scenes.scratch import MOST_MET, scratch_for
+from engine.scenes.near_boxes import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import plan_for
@@ -30,7 +29,7 @@ from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
 from engine.solids.base import Solid
 from engine.solids.checks import is_ready
 from engine.solids.pose import Pose
-from engine.types import OPEN, UNDECIDED
+from engine.types import OPEN, UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray, read_only
 
 _BYTES: Final = 400
 """Of a piece, in its part, joined and in order."""

@@ -14,7 +14,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray, read_only
 from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.collision.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.codes import UNSETTLED
@@ -24,7 +23,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Witness, Work
 from engine.collision.simple.closed_forms import form_of
 from engine.collision.simple.form_relations import N_NUMBERS
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.distance.clearance import checked_distance, has_plane
 from engine.distance.convex_gaps import gaps_of_pairs
 from engine.distance.forms import are_small, gap_of_planes, told_under_poses
@@ -34,7 +33,7 @@ from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
-from engine.types import Accuracy, Relation
+from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
 
 _FEW_PAIRS: Final = 8
 """Pairs that are sooner decided one by one than put into arrays."""

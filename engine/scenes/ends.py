@@ -14,12 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, IntArray
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.running.budget import UNLIMITED, Budget, concatenated
 from engine.segment_clipping.exact_pieces import ONE, ZERO, Parameter, compare
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,23 +11,20 @@ from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import kernel
-from engine.containment.at_once import located_at_once
+from engine.compiling.jit import entry_of, kernel
 from engine.containment.cells.build import MOST_FACES, sides_if_they_pay
+from engine.containment.locate import located_at_once
 from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
-from engine.containment.prepared.triangle_tree import tree_of
+from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.scenes.located import MESH, LocateTables, locate_in_body
-from engine.scenes.near_boxes import Where, bodies_in
-from engine.scenes.scratch import scratch_at, scratch_for
+from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.standing import Standing
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.mesh import Polyhedron
 from engine.solids.ragged import Ragged
-from engine.types import UNDECIDED, Accuracy
+from engine.types import UNDECIDED, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 _BYTES: Final = 72
 """Of a body and point that it may hold: its key in its part and with the others, sorted, its point, body, location."""

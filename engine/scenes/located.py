@@ -10,31 +10,23 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.bounding.aabb import place_boxes
 from engine.compiling.jit import merged
 from engine.containment.cells.locate import side_in_cell
-from engine.containment.methods.ball import located
-from engine.containment.methods.filters import in_space, side_of_box, side_of_rows
-from engine.containment.methods.frames import Frames, frames_of, to_frame
+from engine.containment.methods.filters import Frames, frames_of, in_space, located, side_of_box, side_of_rows, to_frame
 from engine.containment.methods.polygon_ray_parity import locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.posed_locators import posed_locator
-from engine.containment.prepared.rings import closed_rings
-from engine.containment.prepared.triangle_tree import tree_at, tree_line
+from engine.containment.prepared import closed_rings, tree_at, tree_line
 from engine.errors import EngineError
 from engine.running.budget import Budget
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex, rows_in_space, rows_of
-from engine.solids.half_space import HalfSpace
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle, rows_in_space, rows_of
 from engine.solids.ragged import summed
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
-from engine.types import UNDECIDED, Point3
+from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point3, read_only
 
 BY_ITSELF, BOX, BALL, ROWS, RINGS, MESH = range(6)
 """How a candidate is decided: by the locator of the body, or by the tables."""

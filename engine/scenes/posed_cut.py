@@ -18,15 +18,13 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.compiling.jit import inline
-from engine.lanes.addresses import array_at
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub
-from engine.predicates.error_free import two_diff
+from engine.lanes.lanes import array_at
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub, two_diff
 from engine.segment_clipping.ball_cut import Pair, between_roots, difference, meets_ball, sign_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector
 from engine.segment_clipping.pieces import OWN_END, OWN_START, End, point_of, slack_of
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FloatArray, IntArray
 
 _FRAME_BOUND: Final = 32.0 * U2
 

@@ -12,25 +12,24 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import WIDTH
 from engine.compiling.jit import inline
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
-from engine.containment.prepared.triangle_tree import tree_at
-from engine.lanes.addresses import array_at
+from engine.containment.prepared import tree_at
 from engine.lanes.boxes import BOX_ROWS
+from engine.lanes.faces import CORNER_ROWS
+from engine.lanes.lanes import array_at
 from engine.lanes.tracing import LANES
-from engine.lanes.triangles import CORNER_ROWS
 from engine.predicates.cut_point import T_BOUND
-from engine.predicates.double_double import dd_div, dd_sub
+from engine.predicates.error_free import dd_div, dd_sub
+from engine.scenes.near_boxes import MOST_MET, Scratch, scratch_at
 from engine.scenes.posed_cut import in_frame
-from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.boundary_cut import sort_crossings
 from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_one, place_of
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts, corner, triangle_at
 from engine.segment_clipping.pieces import put_point, slack_of
-from engine.types import UNDECIDED, Point3
+from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
 
 UNSURE: Final = -1
 WANTS_BODY: Final = -2

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import check_pose
 from engine.distance.clearance import checked_distance
@@ -31,7 +30,7 @@ from engine.segment_clipping.exact_pieces import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, as_points, shown
 from engine.solids.pose import Pose
-from engine.types import Accuracy
+from engine.types import Accuracy, BoolArray, FloatArray
 
 _BYTES_OF_POSE: Final = 1000
 Keep = Literal["all", "first", "any"]

@@ -13,19 +13,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.locators import Locator
 from engine.running.budget import UNLIMITED, Budget
 from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, body_tree, words_of
 from engine.scenes.located import LocateTables, both
-from engine.scenes.near_boxes import PLACED, Where, bodies_in, place_in
-from engine.scenes.scratch import scratch_at, scratch_for
+from engine.scenes.near_boxes import PLACED, Where, bodies_in, place_in, scratch_at, scratch_for
 from engine.scenes.table import unready
 from engine.solids.base import Preparing, Solid
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.mesh import Polyhedron
 from engine.solids.pose import Pose
+from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 
 _FEW: Final = 64
 _PART: Final = 4

@@ -8,23 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.containment.methods.rational_locate import exact_inverse, to_world_frame
-from engine.containment.prepared.triangle_tree import tree_line, tree_of
+from engine.containment.prepared import tree_line, tree_of
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.rational import nearest_pair
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
 from engine.scenes.through import BodyKind
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex, rows_in_space, rows_of
-from engine.solids.half_space import HalfSpace
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, rows_in_space, rows_of
 from engine.solids.registry import own_box
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
+from engine.types import FloatArray, IntArray
 
 
 class Table:

@@ -14,31 +14,31 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.compiling.jit import inline, kernel
-from engine.lanes.addresses import array_at
-from engine.lanes.lanes import prefetch
-from engine.lanes.triangles import longest_axis
+from engine.lanes.faces import longest_axis
+from engine.lanes.lanes import array_at, prefetch
 from engine.scenes.near_boxes import (
+    MOST_MET,
     N_BODIES,
     PLACED,
     BodyTree,
+    Scratch,
     begin_way,
     has_moved,
     name_in,
     near_bodies,
     next_body,
+    scratch_at,
     tree_in,
     way_of,
 )
 from engine.scenes.posed_cut import between_planes, in_ball
 from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
-from engine.scenes.scratch import MOST_MET, Scratch, scratch_at
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, Crossings, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import Way
 from engine.segment_clipping.pieces import Pieces, put_piece
-from engine.types import OPEN
+from engine.types import OPEN, FlagArray, FloatArray, IntArray
 
 
 class BodyKind(IntEnum):

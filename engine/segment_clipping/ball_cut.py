@@ -20,10 +20,8 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import called, inline, kernel
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub
-from engine.predicates.error_free import fma, two_diff, two_prod
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_sub, fma, two_diff, two_prod
 from engine.segment_clipping.on_boundary.crossing_values import Vector
 from engine.segment_clipping.pieces import (
     OWN_END,
@@ -35,7 +33,7 @@ from engine.segment_clipping.pieces import (
     put_piece,
     slack_of,
 )
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 _LOST: Final = 2.0**-1060
 """What sums of products lose where these underflow."""

@@ -8,8 +8,7 @@ from typing import Any, Literal, Unpack, overload
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import FloatArray, IntArray
-from engine.predicates.scaling import balanced_rows
+from engine.predicates.rational import balanced_rows
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.ball_cut import decide_on_sphere, fill_on_sphere
@@ -17,14 +16,11 @@ from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import Method, Plan, Scaled, clip_on_convex, scaled
 from engine.segment_clipping.planes_cut import fill_on_boxes, fill_on_rows
-from engine.solids.aabb import Aabb, rows_between
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
-from engine.solids.convex import Convex, rows_of
-from engine.solids.half_space import HalfSpace
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, rows_between, rows_of
 from engine.solids.registry import refused, row_of
-from engine.solids.sphere import Sphere
-from engine.types import Accuracy
+from engine.types import Accuracy, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +98,7 @@ def clip_segments(
         UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError, DeadlineExceededError,
         CancelledError.
 
-    >>> from engine.solids.aabb import Aabb
+    >>> from engine.solids.primitives import Aabb
     >>> pieces = clip_segments([[[-1.0, 1.0], [3.0, 1.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])

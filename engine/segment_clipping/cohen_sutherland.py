@@ -35,13 +35,11 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import kernel, merged
-from engine.predicates.double_double import U2
-from engine.predicates.error_free import fma, two_diff, two_prod, workspace
+from engine.predicates.error_free import U2, fma, two_diff, two_prod, workspace
 from engine.segment_clipping.cyrus_beck import coordinate_limit, decide_alone
 from engine.segment_clipping.pieces import BLOCK, KEPT, Triple, is_plain, point_of
-from engine.types import OPEN
+from engine.types import OPEN, FlagArray, FloatArray, Int32Array, IntArray
 
 T_GAP: Final = 16.0 * 2.0**-53
 """Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""

@@ -21,13 +21,12 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import allocating_kernel, called, inline, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
 from engine.segment_clipping.pieces import BLOCK, DROPPED, KEPT, is_plain, point_of
-from engine.types import OPEN, UNDECIDED
+from engine.types import OPEN, UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 VALUE_BOUND: Final = 8.0 * 2.0**-53
 """Bound of a plane value a x + b y + c z + d in doubles, relative to the sum of absolute terms.

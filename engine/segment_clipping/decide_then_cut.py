@@ -18,15 +18,15 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int32Array, IntArray
-from engine.compiling.direct import entry_of
-from engine.predicates.scaling import exponent_of, scaled_back, shifted
+from engine.compiling.jit import entry_of
+from engine.predicates.rational import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.pieces import Pieces, completed, first_of, room_for
 from engine.segment_clipping.profiles import settled
 from engine.solids.base import Solid
 from engine.solids.checks import check_finite
+from engine.types import FloatArray, Int32Array, IntArray
 
 Clipped = tuple[Pieces, int, int]
 """Pieces, how many items needed more than the filter, and how many rational arithmetic."""

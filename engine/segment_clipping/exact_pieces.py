@@ -2,7 +2,7 @@
 
 The segment's contacts with the boundary cut [0, 1] into open spans. A span along which the segment lies in an element
 is kept (the boundary counts as in). Any other meets no element, so one location holds for all of it, and for the line
-beside it, moved by (eps, eps^2) (predicates/ties.py): from span to span it turns over as often as that line crosses
+beside it, moved by (eps, eps^2) (orientation.py): from span to span it turns over as often as that line crosses
 elements, which signs tell, through vertices and along edges too. The location of one span is that of an end that is not
 on the boundary, else it is asked for. Contacts are kept as points. Pieces are what hangs together.
 
@@ -21,8 +21,8 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Final, NamedTuple
 
+from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import cross, dot, minus, nearest, nearest_with_root, sign_of
-from engine.predicates.ties import tie_sign_exact
 
 Integers = Sequence[int]
 FIRST, LAST = Fraction(0), Fraction(1)

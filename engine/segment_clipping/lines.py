@@ -13,9 +13,7 @@ from typing import ClassVar, Final, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray, read_only
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.clip_segments import plan_for
@@ -23,7 +21,7 @@ from engine.segment_clipping.on_boundary.contacts import are_same
 from engine.segment_clipping.pieces import Pieces
 from engine.solids.base import Solid
 from engine.solids.ragged import Ragged, as_lines
-from engine.types import Accuracy
+from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
 
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
 """Room for the pieces of lines: vertices (2 m, dim) of all, offsets (m + 1,) into them; the line of each (m,), and the

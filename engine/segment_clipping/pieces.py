@@ -8,10 +8,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.compiling.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
 from engine.running.budget import concatenated
+from engine.types import FloatArray
 
 Triple = tuple[float, float, float]
 End = tuple[float, float, float, int]

@@ -8,16 +8,15 @@ block of pieces are made at once, cut or not, without branches. In the plane z i
 
 from __future__ import annotations
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import called, kernel, merged
 from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
-from engine.predicates.double_double import dd_add, dd_div
-from engine.predicates.error_free import workspace
+from engine.predicates.error_free import dd_add, dd_div, workspace
 from engine.predicates.expansion import is_safe, magnitude
 from engine.predicates.side import dd_value
 from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, meeting
 from engine.segment_clipping.cyrus_beck import are_safe, expand_value
 from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_end, put_own_end
+from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 
 @called

@@ -14,7 +14,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.containment.methods.rational_locate import (
     combine,
     over_tree,
@@ -39,16 +38,13 @@ from engine.segment_clipping.exact_pieces import (
 from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex, rows_of
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
+from engine.solids.mesh import Surface
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle, rows_of
 from engine.solids.registry import refused, row_of
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
+from engine.types import FloatArray, IntArray
 
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 _BYTES: Final = 1000

@@ -8,7 +8,6 @@ from typing import Literal, TypeAlias, Unpack, overload
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.bounding.double_description import corners_of_half_spaces
 from engine.bounding.minimal_sphere import MinimalSphere, minimal_sphere, minimal_sphere_of_rationals
@@ -16,15 +15,12 @@ from engine.errors import EmptyGeometryError, NotRepresentableError, Unsupported
 from engine.predicates.rational import nearest_float
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
+from engine.solids.primitives import Aabb, Convex, Sphere, Triangle
 from engine.solids.registry import Box, refused, row_of, unbounded
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
-from engine.types import Accuracy
+from engine.types import Accuracy, FloatArray
 
 Check: TypeAlias = Callable[[], object] | None
 

@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
 from engine.running.budget import poll, polled
+from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 Where = tuple[str | int, ...]
 

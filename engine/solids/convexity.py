@@ -19,12 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray, read_only
 from engine.compiling.jit import inline, kernel
 from engine.predicates.orientation import orient3d
 from engine.predicates.vectors import as_point3, corners_of
-from engine.solids.polyhedron import Polyhedron
-from engine.types import Point3
+from engine.solids.mesh import Polyhedron
+from engine.types import FloatArray, IntArray, Point3, read_only
 
 _TRIES = 8
 

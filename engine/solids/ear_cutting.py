@@ -31,15 +31,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.errors import FaceNotSimpleError
 from engine.predicates.orientation import orient2d
 from engine.predicates.rational import orient2d_rational, scaled_integers
 from engine.running.budget import Budget
 from engine.solids.checks import digits
-from engine.types import UNDECIDED, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point2
 
 SIMPLE, TURNS_BACK, MEETS, ENDED_EARLY = 0, 1, 2, 3
 CONVEX, UNSURE = 0, 4

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import FloatArray, IntArray, read_only
 from engine.errors import InvalidArrayError, InvalidPolynomialError, WrongDimensionError
 from engine.predicates.polynomial import MAX_DEGREE, MAX_TERMS
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, as_number, check_given_dimension, check_not_empty, frozen, shown, spell
+from engine.types import FloatArray, IntArray, read_only
 
 PointFunction = Callable[[FloatArray], npt.ArrayLike]
 """Takes points ``(n, dimension)`` float64 and returns n numbers, not negative inside."""

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, Int8Array, IntArray
 from engine.compiling.jit import allocating, allocating_kernel, called, inline
+from engine.types import FlagArray, Int8Array, IntArray
 
 _POLL: Final = 0x3FFF
 """Items between two looks at the flag, one less than a power of two: a fraction of a millisecond."""

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.errors import InvalidArrayError, RingTooShortError
 from engine.solids.base import Solid, T
 from engine.solids.checks import as_nested_offsets, as_points, check_finite, check_not_empty, frozen, is_ready
+from engine.types import FloatArray, IntArray
 
 _NO_VERTICES = np.zeros((0, 2))
 _LEAST: Final = 3

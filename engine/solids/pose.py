@@ -8,9 +8,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, read_only
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import kernel
+from engine.compiling.jit import entry_of, kernel
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.predicates.rational import cross, determinant, scaled_integers
 from engine.solids.base import Immutable
@@ -24,6 +22,7 @@ from engine.solids.checks import (
     frozen,
     spell,
 )
+from engine.types import BoolArray, FloatArray, read_only
 
 TOLERANCE: Final = Fraction(1, 10**12)
 """Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""

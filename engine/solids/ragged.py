@@ -9,10 +9,10 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray, read_only
 from engine.errors import EngineError, InvalidArrayError
 from engine.solids.checks import Where, as_nested_offsets, as_offsets, as_point_groups, as_points, frozen, shown, spell
 from engine.solids.polygon import Polygon
+from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
 class Ragged:

@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.errors import UnsupportedSolidError
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
+from engine.types import FloatArray
 
 Where = tuple[str | int, ...]
 Box = tuple[FloatArray, FloatArray, float]

@@ -28,9 +28,9 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.compiling.jit import allocating, allocating_kernel, inline, merged
 from engine.textbook.solids import signed_distance
+from engine.types import BoolArray, FloatArray, IntArray
 
 REJECTED, ACCEPTED, UNFINISHED = 0, 1, 2
 MAX_TURNS = 64  # six would do in exact arithmetic: each turn settles one plane

@@ -13,13 +13,12 @@ from math import sqrt
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.aabb import box_of_points, corners_of_box
 from engine.compiling.jit import allocating_kernel, inline, kernel
 from engine.predicates.vectors import along, as_point3, cross, dot, minus
 from engine.textbook.polyhedra import IN, parity_of
-from engine.textbook.triangles import is_in_prism
-from engine.types import Point3
+from engine.textbook.solids import is_in_prism
+from engine.types import BoolArray, FloatArray, IntArray, Point3
 
 BOX_TRIANGLES: IntArray = np.array(
     [

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray
-from engine.solids.convex import rows_of
+from engine.solids.primitives import rows_of
 from engine.textbook import clip_polygons, clip_segments, collision, polygons, polyhedra, solids, triangles
+from engine.types import BoolArray, FloatArray
 
 Methods = dict[str, tuple[Callable[..., Any], int]]
 """For each name how to ask, and how many steps an item takes."""

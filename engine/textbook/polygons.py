@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.compiling.jit import allocating, allocating_kernel, inline
+from engine.types import BoolArray, FloatArray, IntArray
 
 
 @allocating_kernel

@@ -14,10 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.compiling.jit import allocating_kernel, inline
 from engine.predicates.vectors import as_point3, cross, dot, minus
-from engine.types import Point3
+from engine.types import BoolArray, FloatArray, IntArray, Point3
 
 OUT, IN, CLOSE_TO_AN_EDGE = 0, 1, 2
 

@@ -2,6 +2,14 @@
 
 Source: section 22.4.1 of the chapter on computer graphics in Algorithms of Informatics (figure 22.22, left), for
 clipping points section 22.4.2, for CSG trees exercise 22.4-2.
+
+Points in a triangle of space: in the prism over it, or in its projection on a coordinate plane.
+
+    ((b - a) x (p - a)) . n >= 0,  ((c - b) x (p - b)) . n >= 0,  ((a - c) x (p - c)) . n >= 0,  n = (b - a) x (c - a)
+
+Source: section 22.4.1 of the chapter on computer graphics in Algorithms of Informatics (figures 22.23 and 22.24). The
+textbook calls the prism robust since the point need not lie in the plane exactly. For the projection the vertices are
+put in an order with c on the left of ab; then the point must be on the left of ab, bc and ca.
 """
 
 from __future__ import annotations
@@ -11,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.compiling.jit import allocating_kernel, inline
+from engine.predicates.vectors import as_point3, cross, dot, minus
+from engine.types import BoolArray, FloatArray, IntArray, Point2, Point3
 
 Leaf = Callable[[FloatArray], BoolArray]
 
@@ -92,3 +101,71 @@ def in_csg_tree(points: FloatArray, tree: Leaf | tuple[str, Any, Any]) -> BoolAr
     if operation == "difference":
         return a & ~b
     raise ValueError(f"operation must be union, intersection or difference, got {operation!r}")
+
+
+@inline
+def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
+    """Tell whether p is in the prism over abc, its side faces included."""
+    n = cross(minus(b, a), minus(c, a))
+    return (
+        dot(cross(minus(b, a), minus(p, a)), n) >= 0.0
+        and dot(cross(minus(c, b), minus(p, b)), n) >= 0.0
+        and dot(cross(minus(a, c), minus(p, c)), n) >= 0.0
+    )
+
+
+@allocating_kernel
+def by_products(points: FloatArray, triangle: FloatArray) -> BoolArray:
+    """Tell of each point (n, 3) whether it is in the prism over the triangle (3, 3).
+
+    What goes wrong: near the side faces the sign is rounding's; n underflows for small triangles (all is inside).
+    """
+    contained = np.zeros(len(points), np.bool_)
+    a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
+    for i in range(len(points)):
+        contained[i] = is_in_prism(as_point3(points, i), a, b, c)
+    return contained
+
+
+@inline
+def is_left(a: Point2, b: Point2, p: Point2) -> bool:
+    """Tell whether p is on the left of the line from a to b, or on it."""
+    return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) >= 0.0
+
+
+@inline
+def project(p: Point3, axis: int) -> Point2:
+    """Return p without the coordinate `axis`."""
+    if axis == 0:
+        return Point2(p.y, p.z)
+    if axis == 1:
+        return Point2(p.z, p.x)
+    return Point2(p.x, p.y)
+
+
+@inline
+def axis_of_largest_area(a: Point3, b: Point3, c: Point3) -> int:
+    """Return the axis on which the normal has its largest component."""
+    n = cross(minus(b, a), minus(c, a))
+    if abs(n.x) >= abs(n.y) and abs(n.x) >= abs(n.z):
+        return 0
+    return 1 if abs(n.y) >= abs(n.z) else 2
+
+
+@allocating_kernel
+def by_projection(points: FloatArray, triangle: FloatArray) -> BoolArray:
+    """Tell of each point (n, 3) whether its projection is in that of the triangle (3, 3): meant for its plane.
+
+    What goes wrong: near an edge the sign is rounding's, less often than in space since fewer terms are added; points
+    off the plane are answered by their projection.
+    """
+    contained = np.zeros(len(points), np.bool_)
+    corners = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
+    axis = axis_of_largest_area(corners[0], corners[1], corners[2])
+    a, b, c = project(corners[0], axis), project(corners[1], axis), project(corners[2], axis)
+    if not is_left(a, b, c):
+        a, b = b, a
+    for i in range(len(points)):
+        p = project(as_point3(points, i), axis)
+        contained[i] = is_left(a, b, p) and is_left(b, c, p) and is_left(c, a, p)
+    return contained

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from engine import errors
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import kernel
+from engine.compiling.jit import entry_of, kernel
 from engine.errors import CancelledError, InvalidInputError
 from engine.running import budget
 from engine.running.budget import Budget, Cancel, concatenated, polled

@@ -65,7 +65,7 @@ import exact_geometry
 import engine
 assert engine.WHOSE == "another's" and not [name for name in sys.modules if name.startswith("engine.")]
 ball = pickle.loads(pickle.dumps(exact_geometry.Sphere((0, 0), 5)))
-assert type(ball).__module__ == "exact_geometry.engine.solids.sphere"
+assert type(ball).__module__ == "exact_geometry.engine.solids.primitives"
 assert isinstance(ball, exact_geometry.Solid)
 print(exact_geometry.locate([[3.0, 4.0], [3.1, 4.0]], ball).tolist())
 """
@@ -83,10 +83,10 @@ def test_ours_stands_beside_another_engine(tmp_path: Path, name: str) -> None:
         assert done.stdout == "[0, -1]\n", done.stderr
     assert (
         _run(
-            f"import sys; sys.path[:0] = [{str(ROOT)!r}]\nimport engine.solids.sphere as s; print(s.__name__)",
+            f"import sys; sys.path[:0] = [{str(ROOT)!r}]\nimport engine.solids.primitives as s; print(s.__name__)",
             tmp_path.parent,
         ).stdout
-        == "engine.solids.sphere\n"
+        == "engine.solids.primitives\n"
     )
 
 

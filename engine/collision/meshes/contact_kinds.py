@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray, Int8Array
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.triangle_triangle import (
     Facet,
@@ -35,7 +34,7 @@ from engine.collision.result import Kind
 from engine.compiling.jit import called, inline, merged
 from engine.predicates.posed import UNPOSED, PosedPoint3, surely_same
 from engine.predicates.vectors import cross, dot, largest_of, minus
-from engine.types import UNDECIDED, Point3
+from engine.types import UNDECIDED, FloatArray, Int8Array, Point3
 
 _CONTACTS: tuple[Kind, ...] = "face_face", "edge_face", "vertex_face", "edge_edge", "vertex_edge", "vertex_vertex"
 STRENGTH: tuple[Kind, ...] = (*_CONTACTS, "containment")

@@ -1,7 +1,7 @@
 """All pairs of faces of two placed bodies that have a common point, or the first pair that settles the question.
 
 Two trees are descended together: a pair of nodes is replaced by those pairs of their children whose boxes
-(`box_lanes.meeting`) and discs (`lanes/discs.py`) may meet, two blocks of faces by the pairs of faces that neither
+(`box_lanes.meeting`) and discs (`lanes/boxes.py`) may meet, two blocks of faces by the pairs of faces that neither
 boxes nor planes part (`lanes/faces.py`); those are classified by signs. All of these are conservative under a pose, so
 no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again,
 and of the faces that meet in a common corner only (`contact_kinds.py`) gets no more than say all.
@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray
 from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, keep_first
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
@@ -22,13 +21,12 @@ from engine.collision.meshes.parity import proves_overlap, state_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
 from engine.collision.meshes.triangle_triangle import APART, CORNER, CROSSING, Facet, classify, classify_near, with_pose
 from engine.compiling.jit import inline, merged
-from engine.lanes.boxes import FRAME_ROWS, meeting
-from engine.lanes.discs import discs_meeting
+from engine.lanes.boxes import FRAME_ROWS, discs_meeting, meeting
 from engine.lanes.faces import WORK_ROWS, faces_meeting
 from engine.lanes.lanes import lowest_bit
 from engine.lanes.tracing import LANES
 from engine.predicates.posed import UNPOSED, posed_error
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FlagArray, FloatArray
 
 SEEK_OVERLAP = 0
 SEEK_PIERCING_BY_FIRST = 1
@@ -51,7 +49,7 @@ Descent = namedtuple("Descent", "stack frames work poses signs")
 """Work space of a search.
 
 stack (STACK_ROWS, 2) int32: pairs of nodes waiting. frames (2, 22, 8) float32: see `lanes/boxes.py`. work (28, 8)
-float32: of `lanes/discs.py` and `lanes/faces.py`, for one pair of nodes. poses (2, 12) float64: rotation and
+float32: of `lanes/boxes.py` and `lanes/faces.py`, for one pair of nodes. poses (2, 12) float64: rotation and
 translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
 """
 

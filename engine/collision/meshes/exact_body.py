@@ -20,18 +20,17 @@ from itertools import combinations
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.bounding.bvh import STACK, WIDTH
 from engine.collision.exact_images import rounded_quotient
 from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind, Poses
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating_kernel, inline
+from engine.compiling.jit import allocating_kernel, entry_of, inline
 from engine.lanes.boxes import EMPTY
 from engine.predicates.rational import cross, dot, largest_axis, minus, sign_of
 from engine.solids.pose import Pose
+from engine.types import FloatArray, IntArray
 
 Vector = tuple[int, ...]
 Plane = tuple[int, ...]

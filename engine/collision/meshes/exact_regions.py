@@ -27,8 +27,8 @@ from engine.collision.meshes.exact_body import (
     value_at,
     without_axis,
 )
+from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import cross, dot, minus, sign_of
-from engine.predicates.ties import tie_sign_exact
 from engine.running.budget import Budget
 
 Rational = int | Fraction  # integers where they suffice: they are ten times faster

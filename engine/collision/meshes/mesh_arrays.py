@@ -13,26 +13,21 @@ from math import frexp, ldexp
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
-from engine.arrays import BoolArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
-from engine.bounding.aabb import corners_of_box
+from engine.bounding.aabb import corners_of_box, fill_discs
 from engine.bounding.bvh import WIDTH, build_bvh
-from engine.bounding.disc_tree import fill_discs
 from engine.collision.meshes.placement import Extent, PoseArrays
 from engine.collision.meshes.triangle_triangle import Facet, facet_at, projected
 from engine.compiling.jit import allocating_kernel, inline, kernel
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes
-from engine.lanes.boxes import EMPTY
-from engine.lanes.discs import DISC_ROWS
-from engine.lanes.faces import NOWHERE
-from engine.lanes.triangles import CORNER_ROWS
+from engine.lanes.boxes import DISC_ROWS, EMPTY
+from engine.lanes.faces import CORNER_ROWS, NOWHERE
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point3, cross, minus
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.mesh import Mesh
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.mesh import Mesh, Polyhedron
 from engine.solids.pose import Pose
-from engine.types import Point3
+from engine.solids.primitives import Aabb
+from engine.types import BoolArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, Point3, read_only
 
 NO_AREA = -1
 UNKNOWN_AXIS = -2
@@ -61,7 +56,7 @@ MeshArrays = namedtuple(
     "has_inside",
 )
 """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
-inner nodes (`lanes/discs.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels as
+inner nodes (`lanes/boxes.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels as
 needed, and `inner`, on which side of a face its body lies (`parity.py`), 0 unknown: any thread writes the same values.
 components: of triangles connected through vertices, one each, ascending. faces: the caller's face of each triangle;
 first_face: the least in the first component. has_inside: False for surfaces and flat boxes."""

@@ -24,7 +24,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.collision.codes import DISJOINT, OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes import exact_regions as regions
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
@@ -37,7 +36,7 @@ from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, RE
 from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Parts, Poses, Witness, Work
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
-from engine.types import Relation
+from engine.types import FloatArray, IntArray, Relation
 
 
 def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from engine.arrays import Int8Array, IntArray
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
@@ -19,8 +18,8 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Poses, Witness, Work
-from engine.compiling.direct import entry_of
-from engine.types import UNDECIDED
+from engine.compiling.jit import entry_of
+from engine.types import UNDECIDED, Int8Array, IntArray
 
 _BLOCK = 64
 

@@ -1,7 +1,7 @@
 """What half-lines and neighbours say of a body: is a point inside, how does a face lie among others, which side is in.
 
 **Points.** The half-line from q upward along the z axis of the body's own coordinates is moved by (eps, eps^2) in x and
-y, so that it meets no edge and no upright face (predicates/ties.py). A face that the half-line's line meets counts if
+y, so that it meets no edge and no upright face (orientation.py). A face that the half-line's line meets counts if
 it lies above q (orient3d); a zero there means q lies on it. Caller guarantees that no face holds q where INSIDE or
 OUTSIDE is to be relied on; UNDECIDED is settled with exact posed coordinates (`exact_regions.py`).
 
@@ -21,7 +21,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.meshes.mesh_arrays import (
     STATE_CLEAN,
@@ -53,15 +52,13 @@ from engine.collision.meshes.triangle_triangle import (
     separation,
     with_pose,
 )
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating, allocating_kernel, called, inline, kernel, merged
+from engine.compiling.jit import allocating, allocating_kernel, called, entry_of, inline, kernel, merged
 from engine.lanes.boxes import inside_box
 from engine.lanes.lanes import lowest_bit
-from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.orientation import orient2d, orient3d, tie_sign
 from engine.predicates.posed import orient3d_rounded
-from engine.predicates.ties import tie_sign
 from engine.predicates.vectors import as_point3, largest_of, minus
-from engine.types import UNDECIDED, Point2, Point3
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point2, Point3
 
 OUTSIDE = -1
 INSIDE = 1

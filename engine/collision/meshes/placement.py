@@ -30,11 +30,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.arrays import Float32Array, FloatArray
 from engine.compiling.jit import inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
-from engine.types import UNDECIDED, Point2, Point3
+from engine.types import UNDECIDED, Float32Array, FloatArray, Point2, Point3
 
 
 class PoseArrays(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from engine.arrays import FlagArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes import contact_kinds as contact
 from engine.collision.meshes import dual_traversal as dual
@@ -13,7 +12,7 @@ from engine.collision.meshes.touching import JUDGED, flush, relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.predicates.vectors import as_point3
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FlagArray, Int8Array, IntArray
 
 RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)
 N_COLUMNS = 5

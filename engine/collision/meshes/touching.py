@@ -22,7 +22,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes import parity
@@ -44,7 +43,7 @@ from engine.collision.meshes.triangle_triangle import (
 from engine.compiling.jit import allocating, called, inline
 from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.predicates.vectors import as_point3, largest_of, minus
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, BoolArray, FloatArray, IntArray
 
 N_FIRST = 2
 N_FACES = 32

@@ -20,12 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FloatArray
 from engine.compiling.jit import called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.posed import UNPOSED, PosedPoint3, orient3d_posed, posed_point
 from engine.predicates.vectors import as_point3, cross, dot, largest_of, minus
-from engine.types import UNDECIDED, Point2, Point3
+from engine.types import UNDECIDED, FloatArray, Point2, Point3
 
 APART = 0
 CROSSING = 1

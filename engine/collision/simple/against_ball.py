@@ -17,7 +17,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.exact_images import Vector, image_point, rounded
@@ -27,17 +26,16 @@ from engine.collision.meshes.near_triangles import nearest_points, rounding_of, 
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating, inline, kernel
+from engine.compiling.jit import allocating, entry_of, inline, kernel
 from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import minus as difference
 from engine.predicates.rational import squared_length
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
+from engine.solids.primitives import Sphere
 from engine.solids.registry import own_box
-from engine.solids.sphere import Sphere
-from engine.types import Location, Point3, Relation
+from engine.types import FlagArray, FloatArray, IntArray, Location, Point3, Relation
 
 _MANY = 4096
 _SPREAD = 64

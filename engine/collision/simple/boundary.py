@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_point, rounded, value_at
 from engine.collision.meshes.exact_body import ExactBody, exact_pair, faces_in
 from engine.collision.meshes.exact_regions import cells_of, sides_at
@@ -23,14 +22,13 @@ from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArra
 from engine.collision.meshes.parity import state_at
 from engine.collision.outline import is_clean, live_edges, outline_of
 from engine.collision.result import Work
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import kernel
+from engine.compiling.jit import entry_of, kernel
 from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import common_integers, cross, dot, minus, sign_of, squared_length
 from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.pose import Pose
-from engine.types import Location
+from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Location
 
 
 def box_distance_bounds(point: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:

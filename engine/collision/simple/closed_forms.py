@@ -17,7 +17,6 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray, read_only
 from engine.collision import result
 from engine.collision.codes import OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import HalfSpaceImage, as_vector, image_half_space, image_point, value_at
@@ -27,17 +26,14 @@ from engine.collision.meshes.parity import state_at
 from engine.collision.simple import form_relations as relations
 from engine.collision.simple.against_ball import collide_body_sphere
 from engine.collision.simple.boundary import Boundary, boundary_of, first_triangle_at, pulled_back
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.predicates.rational import largest_axis, minus, sign_of, squared_length
 from engine.predicates.vectors import as_point3, dot
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.half_space import HalfSpace
 from engine.solids.pose import Motion, motion_of
+from engine.solids.primitives import Aabb, HalfSpace, Sphere
 from engine.solids.registry import own_box
-from engine.solids.sphere import Sphere
-from engine.types import Point3, Relation
+from engine.types import FlagArray, FloatArray, IntArray, Point3, Relation, read_only
 
 FORMS: Final = ("aabb", "sphere")
 

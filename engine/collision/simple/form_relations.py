@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-from engine.arrays import BoolArray, FloatArray, Int8Array, IntArray
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import EDGE_EDGE, EDGE_FACE, FACE_FACE, VERTEX_VERTEX
 from engine.compiling.jit import called, inline, kernel
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import add, add_product, grow, grow_product, is_safe, sign
 from engine.predicates.vectors import as_point3, cross, dot, minus
-from engine.types import Point3
+from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Point3
 
 HIGH: Final = 3
 RADIUS: Final = 6

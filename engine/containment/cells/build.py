@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 from engine.compiling.jit import inline, kernel
 from engine.containment.cells.lattice import (
     PLACE,
@@ -26,13 +25,13 @@ from engine.containment.cells.lattice import (
     scaled_difference,
 )
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.prepared.triangle_tree import TriangleTree, cost_in_tree, tree_of
+from engine.containment.prepared import TriangleTree, cost_in_tree, tree_of
 from engine.lanes.cells import ROWS, groups_of, set_entry, set_nothing
 from engine.lanes.tracing import LANES
 from engine.predicates.vectors import corners_of
 from engine.running.budget import Budget
-from engine.solids.polyhedron import Polyhedron
-from engine.types import UNDECIDED
+from engine.solids.mesh import Polyhedron
+from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 
 MIXED_CELL: Final = -1
 """Code of a cell that is left to the tree: its side is not known, or its list costs more than the tree."""

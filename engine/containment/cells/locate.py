@@ -15,15 +15,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.compiling.jit import allocating_kernel, inline, merged
 from engine.containment.cells.build import MIXED_CELL
 from engine.containment.cells.lattice import index_of, reference_point, scaled_difference
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
-from engine.lanes.addresses import array_at
 from engine.lanes.cells import parity_across, prefetch_group
+from engine.lanes.lanes import array_at
 from engine.predicates.vectors import as_point3
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray
 
 _BLOCK: Final = 256
 """Points that pass through the first stage together."""

@@ -24,11 +24,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array
 from engine.compiling.jit import allocating_kernel, inline, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite, in_space
 from engine.predicates.side import side_of_plane, side_of_plane_filter
-from engine.types import UNDECIDED, HalfSpace3, Point3
+from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, Int8Array, Point3
 
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320

@@ -23,13 +23,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
-from engine.bounding.grid import Axis, cell_of
+from engine.bounding.box_grid import Axis, cell_of
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact, orient2d_filter
 from engine.predicates.vectors import as_point2
-from engine.types import UNDECIDED, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point2
 
 MISSED, CROSSED, ON_EDGE = 0, 1, 3
 """How a ray meets an edge."""

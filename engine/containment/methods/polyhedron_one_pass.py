@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, Int32Array, IntArray
-from engine.bounding.grid import Axis, cell_of
+from engine.bounding.box_grid import Axis, cell_of
 from engine.compiling.jit import allocating_kernel, inline
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite
 from engine.containment.methods.polyhedron_ray_parity import BEYOND, CROSSED, ON_FACE, meet_upwards
 from engine.predicates.vectors import as_point3, corners_of
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 
 _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
 """Bits of what is known of a point."""

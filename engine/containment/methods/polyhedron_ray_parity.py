@@ -4,7 +4,7 @@ The ray goes straight up from q = (x, y, z), moved by the symbolic (eps, eps^2, 
 vertical triangle lies over it, and every other triangle is passed in its interior or not at all:
 
 - q' is in the triangle's projection if orient2d(a, b, q), (b, c, q), (c, a, q) have one sign, that of its area. A zero
-  is decided by the move: see predicates/ties.py.
+  is decided by the move: see predicates/orientation.py.
 - orient3d(a, b, c, q) tells whether the triangle passes above q or below. Where it is zero and q is in the closed
   projection, q is on the triangle: BOUNDARY, whatever the parity.
 - The three signs add up to the area: all are zero where the triangle is vertical (or less) and q on its line. It is
@@ -27,18 +27,23 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray
 from engine.bounding.bvh import LEAST, STACK, WIDTH, Bvh
 from engine.compiling.jit import allocating_kernel, called, inline, kernel, merged
 from engine.containment.methods.filters import NOT_FINITE, has_not_finite, orient2d_blurred
 from engine.lanes.boxes import EMPTY, inside_box
+from engine.lanes.faces import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
 from engine.lanes.lanes import count_bits, lowest_bit
-from engine.lanes.triangles import BAND, GROWTH, LEAST_REACH, OVERHEAD_ROWS, overhead
-from engine.predicates.orientation import orient2d, orient2d_exact, orient2d_filter, orient3d_exact, orient3d_filter
+from engine.predicates.orientation import (
+    orient2d,
+    orient2d_exact,
+    orient2d_filter,
+    orient3d_exact,
+    orient3d_filter,
+    tie_sign,
+)
 from engine.predicates.posed import orient3d_rounded
-from engine.predicates.ties import tie_sign
 from engine.predicates.vectors import as_point3, corners_of
-from engine.types import UNDECIDED, Point2, Point3
+from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, Point2, Point3
 
 MISSED: Final = 0
 CROSSED: Final = 1

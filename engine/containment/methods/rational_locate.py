@@ -18,9 +18,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from engine.arrays import FloatArray, IntArray
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, list_unsure
 from engine.errors import UnsupportedSolidError
+from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import (
     Number,
     common_integers,
@@ -32,20 +32,16 @@ from engine.predicates.rational import (
     side_rational,
     sign_of,
 )
-from engine.predicates.ties import tie_sign_exact
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex, rows_of
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
 from engine.solids.implicit import Implicit
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from engine.solids.pose import Pose
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle, rows_of
 from engine.solids.ragged import next_in_rings
 from engine.solids.registry import Row, kind_of, names, row_of
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
+from engine.types import FloatArray, IntArray
 
 Check: TypeAlias = Callable[[], object]
 Integers: TypeAlias = tuple[int, ...]
@@ -289,7 +285,7 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
     check: called now and then in long work; whatever it raises ends the call.
 
     >>> from fractions import Fraction
-    >>> from engine.solids.aabb import Aabb
+    >>> from engine.solids.primitives import Aabb
     >>> rational_location([Fraction(1, 3), 0, 0], Aabb([0, 0, 0], [1, 1, 1]))
     0
     """

@@ -25,21 +25,41 @@ Distances are computed in floating point. Differences of rounded coordinates are
 line by less than 12 u more: `MARGIN` = 16 holds both. Before rounding an orientation is off by 3 u in each length that
 it multiplies, so a distance from a line by less than 12 u; with the two vertices that move that makes 14 u. `CLEARANCE`
 is four times as much.
+
+The double nearest to each coordinate of a crossing: double-double with a bound, else exact signs around it.
+
+With the weights w_a and w_b of the ends of the first edge (crossing_signs.py), known to a relative r,
+x = (a |w_b| + b |w_a|) / (|w_a| + |w_b|). Products add 2 u^2, their sum and the sum of weights 4 u^2 each, the quotient
+16 u^2: every coordinate is within (28 u^2 + 2 r) max(|a|, |b|) of its value; 40 u^2 + 2.5 r covers what is of higher
+order for r < 0.01. Where the bound leaves two doubles, or the value may be a double itself, signs of the exact
+difference to the double and to the middles between it and its neighbours decide. Where the value may be less than
+2^55 bounds, so that the double-double may miss its neighbours, it is first computed from expansions, whose sum loses
+nothing: quotients of their two leading components are within 2^-100 of it.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from collections import namedtuple
+from typing import Any, Final, NamedTuple
 
-from engine.arrays import FlagArray, FloatArray, Int32Array
-from engine.compiling.jit import inline, merged
-from engine.polygon_overlay.compiled.boundary.chain_rings import MEETS, Rings
-from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import is_far, segments_are_far
+import numpy as np
+
+from engine.compiling.jit import called, inline, merged
+from engine.polygon_overlay.compiled.chain_rings import MEETS, Rings
+from engine.polygon_overlay.compiled.crossing_signs import (
+    Edges,
+    Ends,
+    crossing_against,
+    exact_cross,
+    exact_weight,
+    weight_of,
+)
+from engine.polygon_overlay.compiled.edge_contacts import Events, is_far, segments_are_far
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import (
     ANYWHERE,
     FEW,
+    OFTEN,
     POLL,
     RUN,
     BoxTree,
@@ -47,9 +67,204 @@ from engine.polygon_overlay.compiled.edge_tree import (
     build_tree,
     next_pairs,
 )
-from engine.polygon_overlay.compiled.rounded_crossings import Rounded
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_scale, even_of, fast_two_sum, surely_rounded, workspace
+from engine.predicates.expansion import add_scaled, compress, is_safe, sign
 from engine.predicates.orientation import orient2d
-from engine.types import Point2
+from engine.types import FlagArray, FloatArray, Int32Array, Point2
+
+CUT_BOUND: Final = 40.0 * U2
+LOST: Final = -1.0
+"""An error that tells that the double was not found."""
+_NOT_YET: Final = -2.0
+"""Error of a crossing that is not rounded yet."""
+
+Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
+"""Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
+
+
+class _Cut(NamedTuple):
+    """Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
+    the relative error of a coordinate."""
+
+    e: int
+    f: int
+    ah: float
+    al: float
+    bh: float
+    bl: float
+    sum_h: float
+    sum_l: float
+    relative: float
+
+
+@merged
+def _abs2(h: float, low: float) -> tuple[float, float]:
+    return (h, low) if h >= 0.0 else (-h, -low)
+
+
+@called
+def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
+    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
+
+    An error of 0 says that the coordinate is that double exactly; LOST that it could not be found (the caller settles
+    it in rationals).
+    """
+    ends, others = _ends_of(edges, e), _ends_of(edges, f)
+    (x, knows_x), (y, knows_y) = common_places(ends, others)
+    if knows_x and knows_y:
+        return x, y, 0.0, 0.0
+    ah, al, bh, bl, relative = weights_of(ends, others)
+    sum_h, sum_l = dd_add(ah, al, bh, bl)
+    cut = _Cut(e, f, ah, al, bh, bl, sum_h, sum_l, relative)
+    x_error = y_error = 0.0
+    if not knows_x:
+        x, x_error = _coordinate(edges, cut, 0, ends[0], ends[2])
+    if not knows_y:
+        y, y_error = _coordinate(edges, cut, 1, ends[1], ends[3])
+    return x, y, x_error, y_error
+
+
+@merged
+def _ends_of(edges: Edges, e: int) -> Ends:
+    return edges.x[e], edges.y[e], edges.x[edges.after[e]], edges.y[edges.after[e]]
+
+
+@merged
+def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[float, bool]]:
+    """Return of each axis the coordinate that all of one of two edges has, and whether one has one."""
+    ax, ay, bx, by = first
+    cx, cy, dx, dy = second
+    return ((ax if ax == bx else cx), (ax == bx) | (cx == dx)), ((ay if ay == by else cy), (ay == by) | (cy == dy))
+
+
+@merged
+def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, float]:
+    """Return the weights of the ends of an edge as positive double-doubles, and 2.5 r, where both are known to r.
+
+    They come from expansions where the bound of one is not small beside it, if exponents allow.
+    """
+    ax, ay, bx, by = ends
+    cx, cy, dx, dy = others
+    ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
+    bh, bl, be = weight_of(cx, cy, dx, dy, bx, by)
+    ah, al = _abs2(ah, al)
+    bh, bl = _abs2(bh, bl)
+    if ae > 0.001 * ah or be > 0.001 * bh:
+        safe = True
+        for k in range(4):
+            safe &= is_safe(ends[k]) & is_safe(others[k])
+        if safe:
+            ah, al = _weight_from_expansion(ax, ay, others)
+            bh, bl = _weight_from_expansion(bx, by, others)
+            ae, be = 4.0 * U2 * ah, 4.0 * U2 * bh
+    return ah, al, bh, bl, 2.5 * max(ae / ah, be / bh)
+
+
+@called
+def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, float]:
+    """Return the weight of a point to twice 53 bits, as a positive double-double."""
+    e = workspace(16)
+    h, low = leading(e, exact_cross(others, (others[0], others[1], x, y), e))
+    return _abs2(h, low)
+
+
+@inline
+def leading(e: Any, n: int) -> tuple[float, float]:
+    n = compress(e, n)
+    if n == 0:
+        return 0.0, 0.0
+    return (e[0], 0.0) if n == 1 else fast_two_sum(e[n - 1], e[n - 2])
+
+
+@merged
+def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
+    """Return the double nearest to one coordinate, and a bound of its error; p and q are those of the ends of e."""
+    rh, rl = dd_scale(cut.bh, cut.bl, p)
+    sh, sl = dd_scale(cut.ah, cut.al, q)
+    nh, nl = dd_add(rh, rl, sh, sl)
+    h, low = dd_div(nh, nl, cut.sum_h, cut.sum_l)
+    bound = (CUT_BOUND + cut.relative) * max(abs(p), abs(q))
+    if abs(low) > bound and surely_rounded(h, low, bound):
+        return h + 0.0, abs(low) + bound
+    return _settle(edges, cut.e, cut.f, axis, h, bound)
+
+
+@called
+def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
+    """Return what `_coordinate` does, by exact signs around h."""
+    if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
+        h = _from_expansions(edges, e, f, axis)
+    side = crossing_against(edges, e, f, axis, h, 0.0)
+    if side == 0:
+        return h + 0.0, 0.0
+    # bound: h is the nearest double or a neighbour of it, else the double is lost
+    for _ in range(2):
+        other = np.nextafter(h, np.inf if side > 0 else -np.inf)
+        half = (other - h) / 2.0
+        beyond = crossing_against(edges, e, f, axis, h, half)
+        if beyond == 0:  # case: a tie; of two neighbours the one with an even last bit is nearer to nothing else
+            return even_of(h, other) + 0.0, abs(half)
+        if beyond != side:
+            return h + 0.0, abs(half)
+        h = other
+        side = crossing_against(edges, e, f, axis, h, 0.0)
+        if side == 0:
+            return h + 0.0, 0.0
+        if side != beyond:
+            return h + 0.0, abs(half)
+    return h, LOST
+
+
+@called
+def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
+    """Return a coordinate of a crossing, off by less than a unit in its own last place."""
+    z = edges.x if axis == 0 else edges.y
+    a, b, fb = e, edges.after[e], edges.after[f]
+    wa, wb = workspace(16), workspace(16)
+    na, nb = exact_weight(edges, f, fb, a, wa), exact_weight(edges, f, fb, b, wb)
+    factor = 1.0 if sign(wa, na) > 0 else -1.0  # the weights are of opposite signs
+    above, below = workspace(64), workspace(64)  # 2 * 16 components for each of two products
+    n = add_scaled(above, add_scaled(above, 0, wa, na, factor * z[b]), wb, nb, -factor * z[a])
+    m = add_scaled(below, add_scaled(below, 0, wa, na, factor), wb, nb, -factor)
+    nh, nl = leading(above, n)
+    dh, dl = leading(below, m)
+    h, _ = dd_div(nh, nl, dh, dl)
+    return h + 0.0
+
+
+@merged
+def distance_of(error_x: float, error_y: float) -> float:
+    """Return how far a point may have moved whose coordinates did by so much, rounded up."""
+    return np.sqrt(error_x * error_x + error_y * error_y) * (1.0 + 2.0**-50)  # two squares, their sum, a root
+
+
+@inline
+def round_points(
+    edges: Edges, events: Events, points: Int32Array, n: int, n_crossings: int, n_points: int, rounded: Rounded,
+    stop: FlagArray,
+) -> float:  # fmt: skip
+    """Round the points of all rings, vertices and crossings; return how far a point moved, or LOST."""
+    x, y, error = edges.x, edges.y, rounded.error
+    error[:n_crossings] = _NOT_YET
+    farthest = 0.0
+    lost = False
+    for k in range(n_points):
+        if k & OFTEN == 0 and stop[0]:
+            return LOST
+        point = points[k]
+        if point < n:
+            rounded.x[k], rounded.y[k], rounded.moved[k] = x[point] + 0.0, y[point] + 0.0, 0
+        else:
+            c = point - n
+            if error[c] == _NOT_YET:
+                cx, cy, ex, ey = round_crossing(edges, events.first[c], events.second[c])
+                lost = lost or ex < 0.0 or ey < 0.0
+                rounded.crossing_x[c], rounded.crossing_y[c], error[c] = cx, cy, distance_of(ex, ey)
+                farthest = max(farthest, error[c])
+            rounded.x[k], rounded.y[k] = rounded.crossing_x[c], rounded.crossing_y[c]
+            rounded.moved[k] = error[c] > 0.0
+    return LOST if lost else farthest
+
 
 CLEARANCE: Final = 64.0 * 2.0**-52
 MARGIN: Final = 16.0 * 2.0**-52

@@ -21,15 +21,15 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.compiling.jit import called, inline, merged
+from engine.polygon_overlay.compiled.clearance import distance_of, round_crossing
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import agree, smaller_of, turns
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
-from engine.polygon_overlay.compiled.rounded_crossings import distance_of, round_crossing
 from engine.predicates.expansion import is_safe
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.types import FlagArray, FloatArray, Int32Array
 
 GENERAL: Final = -1
 """In the place of a result: the pair goes the general way."""

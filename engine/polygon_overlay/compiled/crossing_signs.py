@@ -20,8 +20,7 @@ from collections import namedtuple
 from typing import Final
 
 from engine.compiling.jit import called, inline, merged
-from engine.predicates.double_double import U2, dd_mul, dd_sub
-from engine.predicates.error_free import two_diff, workspace
+from engine.predicates.error_free import U2, dd_mul, dd_sub, two_diff, workspace
 from engine.predicates.expansion import Components, add_product, grow, sign
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact
 from engine.predicates.parameters import minor

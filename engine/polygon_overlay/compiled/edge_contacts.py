@@ -24,11 +24,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrangement.union_find import root_of, unite
-from engine.arrays import FlagArray, FloatArray
 from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, orient
 from engine.polygon_overlay.compiled.edge_tree import BENT, BoxTree, begin_pairs, next_pairs
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.types import FlagArray, FloatArray
 
 
 @merged

@@ -9,11 +9,11 @@ from collections import namedtuple
 from typing import Final
 
 from engine.arrangement.union_find import unite
-from engine.arrays import FlagArray
 from engine.compiling.jit import called, inline
 from engine.polygon_overlay.compiled.crossing_signs import Edges, order_of_crossings, orient
 from engine.polygon_overlay.compiled.edge_contacts import Events, Turn, Unions
 from engine.polygon_overlay.compiled.edge_tree import POLL
+from engine.types import FlagArray
 
 _RUN: Final = 16
 """Events that are sorted by insertion; more are merged."""

@@ -22,8 +22,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray
 from engine.compiling.jit import allocating, inline, merged
+from engine.types import FlagArray, FloatArray
 
 POLL: Final = 0x3FFF
 """Steps of some 10 to 100 ns between two looks at the flag that ends a call, as a mask of their number."""

@@ -24,22 +24,24 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from engine.arrays import FlagArray, IntArray
 from engine.compiling.jit import kernel, merged
-from engine.polygon_overlay.compiled.boundary.chain_faces import number_cycles
-from engine.polygon_overlay.compiled.boundary.chain_rings import join_regions, mark_boundary, walk_rings
-from engine.polygon_overlay.compiled.boundary.chains import build_chains, build_stars
-from engine.polygon_overlay.compiled.boundary.components import join_faces
-from engine.polygon_overlay.compiled.boundary.crossing_walk import do_nothing_but_cross, walk_crossings
-from engine.polygon_overlay.compiled.boundary.ring_nesting import (
-    AGAIN,
-    NO_ROOM,
-    PAIR,
-    Nesting,
-    gather_evidence,
-    spread_sources,
+from engine.polygon_overlay.compiled.chain_faces import join_faces, number_cycles
+from engine.polygon_overlay.compiled.chain_rings import (
+    do_nothing_but_cross,
+    join_regions,
+    mark_boundary,
+    walk_crossings,
+    walk_rings,
 )
-from engine.polygon_overlay.compiled.clearance import CLEARANCE, certify, corners_are_clear, has_straight_point
+from engine.polygon_overlay.compiled.chains import build_chains, build_stars
+from engine.polygon_overlay.compiled.clearance import (
+    CLEARANCE,
+    LOST,
+    certify,
+    corners_are_clear,
+    has_straight_point,
+    round_points,
+)
 from engine.polygon_overlay.compiled.convex import GENERAL, Passages, Points, intersect_convex
 from engine.polygon_overlay.compiled.edge_contacts import Contacts, find_contacts
 from engine.polygon_overlay.compiled.edge_events import sort_events
@@ -58,6 +60,14 @@ from engine.polygon_overlay.compiled.loading import (
     mark_runs,
 )
 from engine.polygon_overlay.compiled.reducing import count_left_out
+from engine.polygon_overlay.compiled.ring_nesting import (
+    AGAIN,
+    NO_ROOM,
+    PAIR,
+    Nesting,
+    gather_evidence,
+    spread_sources,
+)
 from engine.polygon_overlay.compiled.ring_order import (
     Filled,
     has_room,
@@ -67,10 +77,9 @@ from engine.polygon_overlay.compiled.ring_order import (
     write_convex,
     write_rings,
 )
-from engine.polygon_overlay.compiled.rounded_crossings import LOST, round_points
 from engine.polygon_overlay.compiled.workspace import Outcomes, Workspace, output_at, rows_of
 from engine.predicates.expansion import LARGEST
-from engine.types import OPEN
+from engine.types import OPEN, FlagArray, IntArray
 
 DONE: Final = 0
 MAY_CROSS: Final = 1

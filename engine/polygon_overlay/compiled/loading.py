@@ -10,7 +10,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import (
@@ -23,6 +22,7 @@ from engine.polygon_overlay.compiled.edge_tree import (
 )
 from engine.predicates.expansion import SMALLEST
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 Box = tuple[float, float, float, float]
 """x_min, x_max, y_min, y_max."""

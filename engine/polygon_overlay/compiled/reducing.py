@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import inline, kernel
 from engine.polygon_overlay.compiled.clearance import CLEARANCE
 from engine.polygon_overlay.compiled.edge_tree import POLL, BoxTree, build_tree
@@ -44,6 +43,7 @@ from engine.polygon_overlay.compiled.ring_blocks import (
 )
 from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.expansion import LARGEST, is_safe
+from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 
 @inline

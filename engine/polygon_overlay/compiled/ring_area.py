@@ -20,13 +20,24 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import inline, kernel, merged
+from engine.polygon_overlay.compiled.clearance import common_places, weights_of
 from engine.polygon_overlay.compiled.crossing_signs import Ends
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.rounded_crossings import common_places, weights_of
-from engine.predicates.double_double import U2, dd_add, dd_div, dd_mul, dd_sub, surely_rounded
-from engine.predicates.error_free import fast_two_sum, fma, two_diff, two_sum, workspace
+from engine.predicates.error_free import (
+    U2,
+    dd_add,
+    dd_div,
+    dd_mul,
+    dd_sub,
+    fast_two_sum,
+    fma,
+    surely_rounded,
+    two_diff,
+    two_sum,
+    workspace,
+)
+from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 _TINY = 2.0**-1040
 """More than what an underflow may lose in a term."""

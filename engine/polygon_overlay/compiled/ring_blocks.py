@@ -18,11 +18,11 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.edge_tree import LEAF, BoxTree, leaves_of, push_children
 from engine.polygon_overlay.compiled.loading import Box, RingArrays, box_of
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.types import FlagArray, FloatArray, Int32Array
 
 NOT_RIGHT: Final = 2
 NOT_LEFT: Final = 4

@@ -12,16 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array
 from engine.compiling.jit import inline, merged
-from engine.polygon_overlay.compiled.boundary.chain_rings import Rings
-from engine.polygon_overlay.compiled.boundary.ring_nesting import NO_ROOM, write_evidence
+from engine.polygon_overlay.compiled.chain_rings import Rings
+from engine.polygon_overlay.compiled.clearance import Rounded
 from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
 from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, RUN, box_holds
 from engine.polygon_overlay.compiled.loading import LEFT_OUT
-from engine.polygon_overlay.compiled.rounded_crossings import Rounded
+from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, write_evidence
 from engine.predicates.orientation import orient2d
-from engine.types import Point2
+from engine.types import FlagArray, FloatArray, Int32Array, Point2
 
 Output = namedtuple("Output", "vertices sources rings pieces evidence")
 """Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,

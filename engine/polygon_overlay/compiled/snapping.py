@@ -21,14 +21,13 @@ from typing import Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int32Array, IntArray
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, is_before, load_rings
 from engine.polygon_overlay.compiled.workspace import rows_of
 from engine.predicates.orientation import BOUND_2D, orient2d
-from engine.types import Point2
+from engine.types import FlagArray, FloatArray, Int32Array, IntArray, Point2
 
 FOLDS: Final = -1
 

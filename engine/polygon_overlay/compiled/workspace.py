@@ -11,21 +11,20 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import IntArray
 from engine.compiling.jit import merged
-from engine.lanes.addresses import array_at
-from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
-from engine.polygon_overlay.compiled.boundary.chain_rings import Rings, Walk
-from engine.polygon_overlay.compiled.boundary.chains import Chains, Loose, Stars
-from engine.polygon_overlay.compiled.boundary.components import Components
-from engine.polygon_overlay.compiled.boundary.ring_nesting import Holders
+from engine.lanes.lanes import array_at
+from engine.polygon_overlay.compiled.chain_faces import Components, Faces
+from engine.polygon_overlay.compiled.chain_rings import Rings, Walk
+from engine.polygon_overlay.compiled.chains import Chains, Loose, Stars
+from engine.polygon_overlay.compiled.clearance import Rounded
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION, BoxTree
 from engine.polygon_overlay.compiled.loading import Given
+from engine.polygon_overlay.compiled.ring_nesting import Holders
 from engine.polygon_overlay.compiled.ring_order import Output, Ranking
-from engine.polygon_overlay.compiled.rounded_crossings import Rounded
+from engine.types import IntArray
 
 _kept: list[Scratch] = []
 """Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""

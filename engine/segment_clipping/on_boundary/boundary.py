@@ -11,10 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import kernel
-from engine.containment.at_once import located_at_once
+from engine.compiling.jit import entry_of, kernel
+from engine.containment.locate import located_at_once
 from engine.containment.locators import Locator, locator_of
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
@@ -28,9 +26,10 @@ from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline,
 from engine.segment_clipping.pieces import Pieces, completed, first_of, joined, room_for
 from engine.segment_clipping.profiles import settled
 from engine.solids.checks import check_finite
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.triangle import Triangle
+from engine.solids.primitives import Triangle
+from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
 
 Bounded = Polygon | Polyhedron | Triangle
 """What a boundary bounds; triangles of the plane."""

@@ -18,7 +18,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, Int8Array, IntArray
 from engine.compiling.jit import allocating, allocating_kernel, called, inline
 from engine.segment_clipping.on_boundary.contacts import (
     CROSSED,
@@ -39,7 +38,7 @@ from engine.segment_clipping.on_boundary.crossing_values import cross_exactly, c
 from engine.segment_clipping.on_boundary.mesh_contacts import blocks_waiting, gather_triangles
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.pieces import Pieces, put_own_end
-from engine.types import OPEN
+from engine.types import OPEN, FlagArray, FloatArray, Int8Array, IntArray
 
 SETTLED: Final = 0
 """State of a segment, beside OPEN."""

@@ -31,11 +31,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.compiling.jit import allocating, allocating_kernel, called, inline, merged
 from engine.predicates.orientation import orient2d
 from engine.predicates.vectors import as_point2
-from engine.types import UNDECIDED, Point2
+from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2
 
 
 class Kind(IntEnum):

@@ -21,16 +21,14 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from engine.arrays import FloatArray
 from engine.compiling.jit import called, inline, merged
 from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, point_at
-from engine.predicates.double_double import U2, dd_div
-from engine.predicates.error_free import two_diff, two_prod, two_sum, workspace
+from engine.predicates.error_free import U2, dd_div, two_diff, two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, add_scaled, grow, is_safe, magnitude
 from engine.predicates.parameters import minor as exact_minor
 from engine.segment_clipping.on_boundary.mesh_contacts import corner, triangle_at
 from engine.segment_clipping.pieces import Triple
-from engine.types import Point3
+from engine.types import FloatArray, Point3
 
 VALUE_BOUND: Final = 80.0 * U2
 

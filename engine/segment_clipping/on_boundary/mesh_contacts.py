@@ -42,14 +42,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrays import FlagArray, FloatArray, IntArray
 from engine.bounding.bvh import STACK, WIDTH
-from engine.compiling.direct import entry_of
-from engine.compiling.jit import allocating, allocating_kernel, called, inline, merged
+from engine.compiling.jit import allocating, allocating_kernel, called, entry_of, inline, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes
+from engine.lanes.faces import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
-from engine.lanes.triangles import AXES_BEFORE, CORNER_ROWS, longest_axis, near_triangles
 from engine.predicates.error_free import workspace
 from engine.predicates.orientation import orient3d
 from engine.predicates.parameters import compare_differences
@@ -66,7 +64,7 @@ from engine.segment_clipping.on_boundary.contacts import (
     find_contacts_2d,
 )
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
-from engine.types import UNDECIDED, Point3
+from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
 
 EDGE_BOUND: Final = 2.0**-48
 END_BOUND: Final = 2.0**-45
@@ -117,7 +115,7 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 @called
 def _beside(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
     """Return on which side of a side a b, which the line p q meets, that lies when it is moved: by eps along one axis,
-    by eps^2 along the next (predicates/ties.py). UNDECIDED where they are parallel."""
+    by eps^2 along the next (orientation.py). UNDECIDED where they are parallel."""
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
     if side == 0:
         side = -_slope(a, b, p, q, AXES_BEFORE[k], k)
@@ -229,7 +227,7 @@ def shear_of(way: Way) -> Any:
     """Return what `near_triangles` takes of a segment: axes, middle, r, s, reach and slack."""
     k, middle, half = longest_axis(way.half), way.middle, way.half
     i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
-    slack = np.float32(2.0) * way.slack  # 32 u (S + 2) of lanes/triangles.py, and twice what cutting loses
+    slack = np.float32(2.0) * way.slack  # 32 u (S + 2) of lanes/faces.py, and twice what cutting loses
     place = middle[i], middle[j], middle[k]
     return (i, j, k), place, half[i] / half[k], half[j] / half[k], abs(half[k]) + slack, slack
 

@@ -15,18 +15,17 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.arrays import Float32Array, FloatArray, Int32Array, IntArray, read_only
 from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
 from engine.containment.methods.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
+from engine.lanes.faces import CORNER_ROWS
 from engine.lanes.tracing import LANES
-from engine.lanes.triangles import CORNER_ROWS
-from engine.predicates.scaling import are_all_safe
+from engine.predicates.rational import are_all_safe
 from engine.segment_clipping.on_boundary.contacts import LEAF_SIZE
+from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
+from engine.solids.primitives import Triangle
+from engine.types import Float32Array, FloatArray, Int32Array, IntArray, read_only
 
 _BITS: Final = 20
 """Of each coordinate in the curve's order."""

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from engine.arrangement.arrange import arrange_rings
-from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import nearest_quotient, reduced
-from engine.arrangement.rings import trace_pieces
+from engine.arrangement.rings import ExactRings, trace_pieces
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.errors import NotRepresentableError
 

@@ -7,9 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from engine.arrangement.arrange import arrange_rings
+from engine.arrangement.arrange import arrange_rings, snap_rings
 from engine.arrangement.nodes import NodeTable, float_nodes, nearest_quotient, rational_nodes, reduced
-from engine.arrangement.snap_rounding import snap_rings
 from engine.errors import NotRepresentableError
 
 

@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
-from engine.bounding.grid import cell_of, make_axis
+from engine.bounding.box_grid import all_pairs_of_boxes, cell_of, make_axis, pairs_of_boxes
 from engine.errors import CancelledError
 from engine.running.budget import Budget, Cancel
 

@@ -10,9 +10,8 @@ from numba import config as numba_config
 
 import engine
 from engine import Surface, contains, locate, locate_scene
-from engine.containment.at_once import MOST, located_at_once
-from engine.containment.methods.ball import locate_in_ball
-from engine.containment.methods.filters import locate_by_polynomial, locate_in_box
+from engine.containment.locate import MOST, located_at_once
+from engine.containment.methods.filters import locate_by_polynomial, locate_in_ball, locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass

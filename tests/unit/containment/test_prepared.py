@@ -11,14 +11,13 @@ import pytest
 
 from engine.containment.locate import locate
 from engine.containment.locators import locator_of
-from engine.containment.prepared.rings import rings_of
-from engine.containment.prepared.triangle_tree import tree_of
+from engine.containment.prepared import rings_of, tree_of
 from engine.errors import DeadlineExceededError
 from engine.scenes.locate_scene import locate_scene
 from engine.solids.base import Solid
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.triangle import Triangle
+from engine.solids.primitives import Triangle
 from tests.unit.containment.scenes import box_mesh, made
 
 TETRAHEDRON = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from engine import Polygon, Triangle, locate
-from engine.arrays import read_only
 from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.polygon_ray_parity import MIXED, locate_in_rings
 from engine.containment.methods.rational_locate import no_check, rational_location
-from engine.containment.prepared.rings import closed_rings, edges_of, ring_cells_of, rings_of
+from engine.containment.prepared import closed_rings, edges_of, ring_cells_of, rings_of
 from engine.solids.checks import as_points
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, read_only
 
 FLAG = np.zeros(1, np.uint8)
 

@@ -12,10 +12,10 @@ from engine.collision.meshes.dual_traversal import new_descent, place_bodies
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.compiling.jit import kernel
-from engine.lanes.boxes import meeting
-from engine.lanes.discs import (
+from engine.lanes.boxes import (
     beside_disc,
     discs_meeting,
+    meeting,
     place_discs,
 )
 from tests.unit.bounding.test_trees import faces_below, surfaces

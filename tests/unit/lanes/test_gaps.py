@@ -9,9 +9,8 @@ import pytest
 
 from engine.collision.meshes.mesh_arrays import MeshArrays, mesh_body_of
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of, place_pair, set_frame
-from engine.lanes.boxes import BOX_ROWS, EMPTY, FRAME_ROWS
-from engine.lanes.discs import DISC_ROWS, inverse_ratio
-from engine.lanes.gaps import (
+from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, EMPTY, FRAME_ROWS, inverse_ratio
+from engine.lanes.faces import (
     FIXED_ROWS,
     GAP_ROWS,
     child_bounds,
@@ -19,7 +18,7 @@ from engine.lanes.gaps import (
     place_triangles,
 )
 from engine.lanes.tracing import LANES
-from engine.solids.surface import Surface
+from engine.solids.mesh import Surface
 
 
 def _soup(draw: np.random.Generator, size: float) -> MeshArrays:

@@ -12,10 +12,10 @@ from numba import config as numba_config
 from numba.core.errors import TypingError
 
 from engine.compiling.jit import kernel
-from engine.lanes.addresses import array_at, plain_array_at
 from engine.lanes.lanes import (
     any_above,
     any_of,
+    array_at,
     bits_of,
     bytes_of,
     count_bits,
@@ -27,6 +27,7 @@ from engine.lanes.lanes import (
     load_lane,
     lowest_bit,
     move,
+    plain_array_at,
     prefetch,
     root,
     select,

@@ -30,13 +30,10 @@ from engine.polygon_clipping.clip_polygons import (
 )
 from engine.polygon_clipping.planes import kernel_scene, plan_of
 from engine.running.budget import Budget, Cancel
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
-from engine.solids.half_space import HalfSpace
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere
 from tests.reference.sutherland_hodgman import clip_contour, planes_of, rounded, same_cycle
 from tests.unit.segment_clipping.scenes import as_json, nudged
 

@@ -12,9 +12,8 @@ import pytest
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.cut_vertices import Share, between, is_at, on_edge, share_of_edge
 from engine.polygon_clipping.in_integers import MOST_BITS, clip_polygon, integer_row, plane_through
-from engine.predicates.double_double import dd_add, dd_div
-from engine.solids.aabb import Aabb
-from engine.solids.convex import Convex
+from engine.predicates.error_free import dd_add, dd_div
+from engine.solids.primitives import Aabb, Convex
 from tests.unit.polygon_clipping.test_clip_polygons import check
 
 

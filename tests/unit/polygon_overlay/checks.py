@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.arrangement.exact_area import ExactRings
 from engine.arrangement.nodes import float_nodes
+from engine.arrangement.rings import ExactRings
 from engine.polygon_overlay.result import Overlay
 from tests.reference.exact import Q
 from tests.reference.overlay import overlay as reference_overlay

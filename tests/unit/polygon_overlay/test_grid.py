@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import engine
-from engine.arrangement.snap_rounding import snap_rings
-from engine.arrays import read_only
+from engine.arrangement.arrange import snap_rings
 from engine.polygon_overlay import grid as grids
 from engine.running.budget import Budget
+from engine.types import read_only
 from tests.reference import fast_overlay
 from tests.reference.exact import Q
 from tests.unit.polygon_overlay.checks import OPERATIONS, assert_counts_add_up, assert_valid

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay.compiled.kernel import DONE
-from engine.polygon_overlay.found import one_pair
 from engine.polygon_overlay.in_integers import arranged_again, overlay_exactly
+from engine.polygon_overlay.pair_arrays import one_pair
 from engine.running.budget import Budget
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.compiled.test_kernel import arrays

@@ -23,7 +23,7 @@ from engine.polygon_overlay.overlay import Operation, overlay
 from engine.polygon_overlay.result import Overlay
 from engine.running.budget import Cancel
 from engine.solids.polygon import Polygon
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Sphere
 from tests.unit.polygon_overlay.checks import (
     OPERATIONS,
     assert_area_close,

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.arrays import read_only
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.overlay import overlay_rings
 from engine.polygon_overlay.result import Overlay
 from engine.running.budget import Budget
+from engine.types import read_only
 from tests.conftest import DATA
 from tests.unit.polygon_overlay.checks import (
     OPERATIONS,

@@ -10,12 +10,11 @@ import pytest
 from engine.errors import InvalidArrayError, UnsupportedSolidError
 from engine.polygon_overlay.batch import join_batches, overlay_batch
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.found import NO_PAIRS, Found, chained, joined, one_pair, ring_sizes, taken
 from engine.polygon_overlay.implicit_rings import ImplicitRings
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.polygon_arrays import gathered
-from engine.solids.aabb import Aabb
+from engine.polygon_overlay.pair_arrays import NO_PAIRS, Found, chained, gathered, joined, one_pair, ring_sizes, taken
 from engine.solids.polygon import Polygon
+from engine.solids.primitives import Aabb
 from engine.solids.ragged import summed
 from tests.unit.polygon_overlay.families import star
 

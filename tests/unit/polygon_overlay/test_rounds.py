@@ -11,10 +11,9 @@ import pytest
 from engine.polygon_overlay import rounds as overlay_rounds
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.kernel import MAY_CROSS
-from engine.polygon_overlay.found import Found, joined, taken
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.polygon_arrays import gathered
+from engine.polygon_overlay.pair_arrays import Found, gathered, joined, taken
 from engine.polygon_overlay.rounds import settle_pairs
 from engine.polygon_overlay.run import KEPT_ARRAYS, arranged_again, overlay_compiled, run_kernel
 from engine.running.budget import Budget

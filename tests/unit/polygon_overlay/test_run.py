@@ -16,7 +16,7 @@ import pytest
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.polygon_arrays import gathered
+from engine.polygon_overlay.pair_arrays import gathered
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, overlay_few, run_kernel
 from engine.running.budget import Budget

@@ -14,7 +14,7 @@ from engine.errors import DeadlineExceededError
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import parts_exactly
-from engine.polygon_overlay.polygon_arrays import Chosen, gathered
+from engine.polygon_overlay.pair_arrays import Chosen, gathered
 from engine.polygon_overlay.run import EACH_PART, run_kernel
 from engine.polygon_overlay.touching import Touching, _read, touching
 from engine.running.budget import Budget

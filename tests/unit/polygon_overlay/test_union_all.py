@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import engine
-from engine.polygon_overlay.compiled.boundary.ring_nesting import ANY, NEGATIVE, NON_ZERO, POSITIVE, Nesting
+from engine.polygon_overlay.compiled.ring_nesting import ANY, NEGATIVE, NON_ZERO, POSITIVE, Nesting
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.union_all import less_all
+from engine.polygon_overlay.overlay import less_all
 from engine.running.budget import Budget
 from tests.reference import fast_overlay
 from tests.reference import overlay as reference

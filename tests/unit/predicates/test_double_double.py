@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from engine.compiling.jit import kernel
-from engine.predicates.double_double import (
+from engine.predicates.error_free import (
     U2,
     dd_add,
     dd_div,

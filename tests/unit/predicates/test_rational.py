@@ -15,11 +15,13 @@ import pytest
 from engine.errors import NotRepresentableError
 from engine.predicates.cut_point import nearest as nearest_cut
 from engine.predicates.cut_point import point_at
-from engine.predicates.double_double import dd_add, dd_div
+from engine.predicates.error_free import dd_add, dd_div
 from engine.predicates.rational import (
+    balanced_rows,
     common_integers,
     cross,
     dot,
+    exponent_of,
     largest_axis,
     minus,
     nearest,
@@ -28,11 +30,12 @@ from engine.predicates.rational import (
     orient2d_rational,
     orient3d_rational,
     polynomial_sign_rational,
+    scaled_back,
     scaled_integers,
+    shifted,
     side_rational,
     squared_length,
 )
-from engine.predicates.scaling import balanced_rows, exponent_of, scaled_back, shifted
 
 TINY, HUGE = 5e-324, 1.7976931348623157e308
 

@@ -14,7 +14,7 @@ from engine.collision.meshes.parity import half_line_crosses
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.containment.methods import rational_locate
 from engine.containment.methods.polyhedron_ray_parity import CROSSED, meet_upwards
-from engine.predicates.ties import tie_sign, tie_sign_exact
+from engine.predicates.orientation import tie_sign, tie_sign_exact
 from engine.segment_clipping.exact_pieces import is_crossed
 from engine.segment_clipping.on_boundary.contacts import Bit, Kind
 from engine.segment_clipping.on_boundary.mesh_contacts import exact_contact

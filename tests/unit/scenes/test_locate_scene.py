@@ -9,15 +9,15 @@ import pytest
 
 import engine
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Pose, Sphere, Triangle, locate, locate_scene
-from engine.arrays import read_only
 from engine.containment.methods.rational_locate import rational_location
-from engine.containment.prepared.triangle_tree import tree_of
+from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
 from engine.scenes import locate as locate_module
 from engine.scenes.bodies import Bodies
 from engine.scenes.locate import locate_all
 from engine.scenes.located import BALL, BOX, BY_ITSELF, MESH, RINGS, ROWS
 from engine.scenes.standing import Standing
+from engine.types import read_only
 from tests.reference.containment import locate as reference
 from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, merged, spelled
 

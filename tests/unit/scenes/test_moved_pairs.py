@@ -9,7 +9,7 @@ from engine import Aabb, Csg, HalfSpace, Polygon, Pose, Scene, Solid, Sphere, Tr
 from engine.containment.methods.rational_locate import no_check, to_world_frame
 from engine.running.budget import Budget
 from engine.scenes.bodies import body_box
-from engine.scenes.scratch import scratch_for
+from engine.scenes.near_boxes import scratch_for
 from engine.scenes.standing import PairRows, Placed, list_pairs
 from tests.unit.containment.scenes import box_mesh, made
 

@@ -10,8 +10,8 @@ import pytest
 from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Scene, Solid, Sphere, Surface
 from engine.running.budget import Budget
 from engine.scenes.bodies import Bodies
+from engine.scenes.near_boxes import MOST_MET, scratch_for
 from engine.scenes.posed_mesh import WANTS_BODY
-from engine.scenes.scratch import MOST_MET, scratch_for
 from engine.scenes.standing import Standing
 from engine.scenes.through import BodyKind, cut_near
 from engine.segment_clipping.exact_pieces import compare

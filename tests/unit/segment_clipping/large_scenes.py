@@ -12,14 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrays import FloatArray
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
-from engine.solids.half_space import HalfSpace
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere
+from engine.types import FloatArray
 from tests.unit.segment_clipping.scenes import nudged, through
 
 Random = np.random.Generator

@@ -14,16 +14,11 @@ from engine.running.budget import Budget
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.pieces import Piece
 from engine.segment_clipping.profiles import exact_pieces
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
 from engine.solids.csg import Csg
-from engine.solids.half_space import HalfSpace
+from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
-from engine.solids.sphere import Sphere
-from engine.solids.surface import Surface
-from engine.solids.triangle import Triangle
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 from tests.reference.segments import clip_segments as reference_pieces
 
 Floats = Any

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Sphere
 from tests.unit.segment_clipping.scenes import check, nudged, settled_alone
 
 

@@ -21,12 +21,8 @@ from engine.errors import (
 from engine.running.budget import Cancel
 from engine.segment_clipping import clip_segments as segments_module
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
-from engine.solids.half_space import HalfSpace
-from engine.solids.sphere import Sphere
-from engine.solids.triangle import Triangle
+from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 from tests.unit.segment_clipping.scenes import (
     assert_same_uncompiled,
     check,

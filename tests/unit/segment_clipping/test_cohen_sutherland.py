@@ -10,8 +10,7 @@ import numpy as np
 from engine.predicates.cut_point import T_BOUND
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.cohen_sutherland import gap_between, meeting
-from engine.solids.aabb import Aabb
-from engine.solids.convex import Convex
+from engine.solids.primitives import Aabb, Convex
 from tests.unit.segment_clipping.scenes import through
 
 

@@ -18,9 +18,8 @@ from engine.segment_clipping.exact_pieces import (
 )
 from engine.segment_clipping.pieces import joined, point_of, put_own_end, room_for
 from engine.segment_clipping.profiles import exact_pieces
-from engine.solids.convex import Convex
 from engine.solids.polygon import Polygon
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Convex, Sphere
 from tests.unit.segment_clipping.scenes import settled_alone
 
 

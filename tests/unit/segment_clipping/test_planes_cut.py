@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
-from engine.solids.convex import Convex
+from engine.solids.primitives import Aabb, Convex
 from tests.unit.segment_clipping.scenes import check, nudged, settled_alone, through
 from tests.unit.segment_clipping.test_clip_segments import CORNERS
 

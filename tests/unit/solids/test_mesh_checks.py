@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from engine import DeadlineExceededError, InconsistentOrientationError, NotClosedError, Polyhedron
-from engine.compiling.direct import entry_of
+from engine.compiling.jit import entry_of
 from engine.solids import mesh_checks
 from engine.solids.checks import frozen
 from engine.solids.convexity import convexity

@@ -12,7 +12,7 @@ import pytest
 import engine
 from engine import Polygon, overlay, overlay_batch, polygons
 from engine.errors import InvalidArrayError, NotFiniteError, RingTooShortError, WrongDimensionError
-from engine.polygon_overlay.polygon_arrays import Chosen, arrays_of, joined_arrays
+from engine.polygon_overlay.pair_arrays import Chosen, arrays_of, joined_arrays
 from engine.solids.ragged import closed_rings
 
 SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]

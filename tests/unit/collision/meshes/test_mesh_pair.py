@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from engine import Pose, Surface, collide
-from engine.arrays import read_only
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_descent, new_found
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
@@ -19,7 +18,7 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Work
-from engine.types import UNDECIDED
+from engine.types import UNDECIDED, read_only
 from tests.unit.collision.lattices import COUNTS, Maker, aabb, check_pairs, polyhedron, surface
 from tests.unit.collision.meshes.bodies import TURN, brick, mesh
 

@@ -13,7 +13,7 @@ from engine.containment import policy
 from engine.containment.cells.build import Sides, build_cells, build_sides, label_empty
 from engine.containment.cells.lattice import can_have_cells
 from engine.containment.cells.locate import side_in_cell
-from engine.lanes.addresses import array_at, plain_array_at
+from engine.lanes.lanes import array_at, plain_array_at
 from engine.running.budget import Budget
 from engine.types import UNDECIDED
 from tests.unit.containment.scenes import box_mesh, made, merged

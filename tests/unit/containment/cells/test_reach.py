@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from engine.containment.cells.reach import layer_reached, row_reached, walls_of
+from engine.containment.cells.lattice import layer_reached, row_reached, walls_of
 
 N = 6
 

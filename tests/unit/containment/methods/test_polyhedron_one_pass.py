@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from engine import Cancel, CancelledError, Polygon, locate
-from engine.arrays import read_only
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.rational_locate import rational_location
-from engine.containment.prepared.rings import rings_of
-from engine.containment.prepared.triangle_tree import tree_of
+from engine.containment.prepared import rings_of, tree_of
 from engine.running.budget import Budget
+from engine.types import read_only
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 
 

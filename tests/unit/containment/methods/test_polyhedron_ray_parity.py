@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from engine import Polyhedron, locate
-from engine.arrays import read_only
 from engine.containment import policy
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
 from engine.containment.methods.rational_locate import rational_location
-from engine.containment.prepared.triangle_tree import tree_of
-from engine.types import UNDECIDED
+from engine.containment.prepared import tree_of
+from engine.types import UNDECIDED, read_only
 from tests.reference.containment import locate_many
 from tests.unit.containment.scenes import box_mesh, lattice_points, made, merged
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Convex, HalfSpace, Implicit, Polygon, Polyhedron, Solid, locate
-from engine.arrays import read_only
 from engine.containment import posed_locators as posed
 from engine.containment.methods.rational_locate import rational_location
 from engine.running.budget import Budget
+from engine.types import read_only
 from tests.unit.containment.scenes import box_mesh, made
 
 FILTERS: dict[type[Solid], Callable[..., Any]] = {

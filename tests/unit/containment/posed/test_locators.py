@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from engine import Implicit, Pose
-from engine.arrays import read_only
-from engine.containment.methods.frames import frames_of, move_to_body_frame
+from engine.containment.methods.filters import frames_of, move_to_body_frame
 from engine.containment.methods.rational_locate import adjugate, rational_location, to_body_frame, to_world_frame
 from engine.containment.posed_locators import posed_center, posed_locator
 from engine.running.budget import Budget
-from engine.solids.sphere import Sphere
+from engine.solids.primitives import Sphere
+from engine.types import read_only
 from tests.unit.containment.scenes import lattice_points, lattice_solids, made
 
 POSES = {

@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from engine.polygon_overlay.compiled.clearance import round_crossing
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, order_of_crossings, orient
-from engine.polygon_overlay.compiled.rounded_crossings import round_crossing
 
 Point = tuple[Fraction, Fraction]
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.arrays import read_only
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.run import Operation, overlay_compiled
 from engine.running.budget import Budget
+from engine.types import read_only
 from tests.unit.polygon_overlay.checks import OPERATIONS, assert_valid
 from tests.unit.polygon_overlay.families import FAMILIES, star
 from tests.unit.polygon_overlay.test_overlay import PAIRS

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from engine.arrays import read_only
 from engine.polygon_overlay.compiled.kernel import DONE
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.reducing import count_left_out, expand_rings
 from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
-from engine.polygon_overlay.polygon_arrays import PolygonArrays
+from engine.polygon_overlay.pair_arrays import PolygonArrays
 from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, run_blocks
 from engine.running.budget import Budget
+from engine.types import read_only
 from tests.unit.polygon_overlay.checks import OPERATIONS
 from tests.unit.polygon_overlay.families import FAMILIES
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.polygon_overlay.compiled.boundary.chain_rings import Rings
+from engine.polygon_overlay.compiled.chain_rings import Rings
+from engine.polygon_overlay.compiled.clearance import Rounded
 from engine.polygon_overlay.compiled.ring_order import Ranking, find_shells, rank_rings
-from engine.polygon_overlay.compiled.rounded_crossings import Rounded
 
 Ring = list[tuple[float, float]]
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.solids.aabb import Aabb
 from engine.solids.base import Solid
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
+from engine.solids.primitives import Aabb
 from tests.reference.shapes import box, union_of
 from tests.unit.segment_clipping.scenes import (
     assert_exact,

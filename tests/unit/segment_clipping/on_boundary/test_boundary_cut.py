@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.arrays import read_only
 from engine.containment.locators import locator_of
 from engine.running.budget import Budget
 from engine.segment_clipping.clip_segments import clip_segments
@@ -17,7 +16,7 @@ from engine.segment_clipping.on_boundary.prepared_boundary import build_box_tree
 from engine.segment_clipping.pieces import Pieces, joined
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
-from engine.types import OPEN
+from engine.types import OPEN, read_only
 from tests.reference.shapes import box, union_of
 from tests.unit.segment_clipping.on_boundary.test_boundary import REGIONS, solid_of, vertices_of
 from tests.unit.segment_clipping.scenes import assert_exact, random_segments, through

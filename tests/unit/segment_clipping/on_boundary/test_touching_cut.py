@@ -7,8 +7,8 @@ import pytest
 
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.base import Solid
+from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.polyhedron import Polyhedron
 from tests.unit.segment_clipping.scenes import Floats, assert_exact
 
 OCTAHEDRON = [(0.7, 0, 0), (-0.7, 0, 0), (0, 0.7, 0), (0, -0.7, 0), (0, 0, 0.7), (0, 0, -0.7)]

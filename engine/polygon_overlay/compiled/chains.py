@@ -1,4 +1,4 @@
-r"""Chains: the stretches of rings between nodes, and the star of chains around each node.
+"""Chains: the stretches of rings between nodes, and the star of chains around each node.
 
 A node is a point where something happens: a crossing, a vertex on another edge, and one vertex of every ring. All
 work after this is by chains, however many vertices these have. Half-chain 2 c runs along its ring, 2 c + 1 back;
@@ -21,7 +21,6 @@ from collections import namedtuple
 from typing import Final
 
 from engine.arrangement.union_find import root_of
-from engine.arrays import FlagArray, Int32Array, IntArray
 from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges, turn_of_edges
 from engine.polygon_overlay.compiled.edge_contacts import Events, Turn, Unions
@@ -29,6 +28,7 @@ from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.types import FlagArray, Int32Array, IntArray
 
 NOT_YET: Final = -1
 """In the place of a chain that is not known yet."""

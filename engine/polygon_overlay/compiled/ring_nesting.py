@@ -25,12 +25,12 @@ from collections import namedtuple
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of
-from engine.arrays import FlagArray, Int32Array, IntArray
 from engine.compiling.jit import called, merged
-from engine.polygon_overlay.compiled.boundary.chain_faces import Faces
-from engine.polygon_overlay.compiled.boundary.chains import Chains, is_live
+from engine.polygon_overlay.compiled.chain_faces import Faces
+from engine.polygon_overlay.compiled.chains import Chains, is_live
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
+from engine.types import FlagArray, Int32Array, IntArray
 
 NO_ROOM: Final = -1
 _NOT_YET: Final = -2

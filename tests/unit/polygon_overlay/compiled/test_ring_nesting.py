@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay import in_integers
-from engine.polygon_overlay.found import Found, joined, one_pair
+from engine.polygon_overlay.pair_arrays import Found, joined, one_pair
 from engine.polygon_overlay.run import arranged_again
 from engine.running.budget import Budget
 
