@@ -53,15 +53,9 @@ def locate(
 
 
 def collide_poses(
-    client: Client,
-    first: Solid,
-    second: Solid,
-    rotations: object,
-    translations: object,
-    *,
-    part: int = 2_000,
+    client: Client, first: Solid, second: Solid, rotations: object, translations: object, *, part: int = 2_000,
     progress: Progress | None = None,
-) -> Int8Array:
+) -> Int8Array:  # fmt: skip
     """Decide how `first` lies to `second` under many poses, see `engine.collide_poses`."""
     turns, moves = poses.as_poses(rotations, translations, first.dimension)
     function = partial(_about_solids, poses.collide_poses)
@@ -69,16 +63,9 @@ def collide_poses(
 
 
 def clearance_poses(
-    client: Client,
-    first: Solid,
-    second: Solid,
-    rotations: object,
-    translations: object,
-    *,
-    at_least: float | None = None,
-    part: int = 2_000,
-    progress: Progress | None = None,
-) -> FloatArray | BoolArray:
+    client: Client, first: Solid, second: Solid, rotations: object, translations: object, *,
+    at_least: float | None = None, part: int = 2_000, progress: Progress | None = None,
+) -> FloatArray | BoolArray:  # fmt: skip
     """Say how far `first` is from `second` under many poses, see `engine.clearance_poses`."""
     turns, moves = poses.as_poses(rotations, translations, first.dimension)
     least = None if at_least is None else checked_distance(at_least)
@@ -98,14 +85,9 @@ def clip_segments(
 
 
 def clip_segments_scene(
-    client: Client,
-    segments: object,
-    scene: Scene,
-    *,
-    keep: Keep = "all",
-    part: int = 20_000,
+    client: Client, segments: object, scene: Scene, *, keep: Keep = "all", part: int = 20_000,
     progress: Progress | None = None,
-) -> ScenePieces | BoolArray:
+) -> ScenePieces | BoolArray:  # fmt: skip
     """Clip segments on the bodies of a scene, see `engine.Scene.clip_segments`; the scene is sent once to every worker
     and stays prepared there."""
     rows = as_point_groups(segments, 2, scene.solids[0].dimension if len(scene) else None, ("segments",))
@@ -117,14 +99,9 @@ def clip_segments_scene(
 
 
 def overlay_batch(
-    client: Client,
-    subjects: Sequence[Solid],
-    clips: Sequence[Solid],
-    operation: Operation = "intersection",
-    *,
-    part: int = 1_000,
-    progress: Progress | None = None,
-) -> OverlayBatch:
+    client: Client, subjects: Sequence[Solid], clips: Sequence[Solid], operation: Operation = "intersection", *,
+    part: int = 1_000, progress: Progress | None = None,
+) -> OverlayBatch:  # fmt: skip
     """Combine pairs of polygons, see `engine.overlay_batch`."""
     none: Any = overlay_pairs(subjects[:0], clips[:0], operation)  # checks the operation here, not on a worker
     if len(subjects) != len(clips):
@@ -137,7 +114,7 @@ def overlay_batch(
 
 
 def _about_rows(ask: Function, held: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
-    return ask(*rows, *held, workers=1, **options)
+    return _about_solids(ask, rows, *held, **options)
 
 
 def _about_solids(ask: Function, held: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
@@ -165,13 +142,9 @@ def _joined(found: list[tuple[int, Any]]) -> Any:
 
 
 def _answers(
-    client: Client,
-    function: Function,
-    solids: tuple[Any, ...],
-    arrays: tuple[Any, ...],
-    part: int,
+    client: Client, function: Function, solids: tuple[Any, ...], arrays: tuple[Any, ...], part: int,
     progress: Progress | None,
-) -> Iterator[tuple[int, Any]]:
+) -> Iterator[tuple[int, Any]]:  # fmt: skip
     """Yield the start of each part and its answer as they arrive; on an error cancel what is under way."""
     check_options(None, progress)
     if isinstance(part, bool) or not isinstance(part, int) or part < 1:

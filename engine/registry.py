@@ -22,11 +22,12 @@ from engine.solids.implicit import Implicit
 from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
-from engine.solids.registry import Field, Row, register
+from engine.solids.registry import BodyKind, Field, Row, register
 
 ROWS: Final = (
     Row(
         solid=HalfSpace,
+        kind=BodyKind.ROWS,
         about="All points p with dot(normal, p) + offset >= 0; the normal points inward.",
         fields={
             "normal": Field("position", "Points inward; of any length but zero."),
@@ -43,6 +44,7 @@ ROWS: Final = (
     ),
     Row(
         solid=Sphere,
+        kind=BodyKind.BALL,
         about="All points at most `radius` away from `center` (a disc in 2D).",
         fields={"center": Field("position", "The centre."), "radius": Field("number", "Zero or more.")},
         stored=("center", "radius"),
@@ -57,6 +59,7 @@ ROWS: Final = (
     ),
     Row(
         solid=Aabb,
+        kind=BodyKind.BOX,
         about="All points with min <= p <= max on each axis.",
         fields={
             "min": Field("position", "The corner with the least coordinates."),
@@ -76,6 +79,7 @@ ROWS: Final = (
     ),
     Row(
         solid=Convex,
+        kind=BodyKind.ROWS,
         about="All points with a x + b y + c z + d >= 0 for every row [a, b, c, d] (2D: [a, b, c]); may be unbounded\n"
         "or empty.",
         fields={"planes": Field("rows", "Its rows.")},
@@ -92,6 +96,7 @@ ROWS: Final = (
     ),
     Row(
         solid=Polyhedron,
+        kind=BodyKind.MESH,
         about="Everything within a closed, consistently oriented mesh (even-odd rule); faces by index, "
         "counter-clockwise seen\nfrom outside, triangles or simple polygons.",
         fields={
@@ -103,7 +108,7 @@ ROWS: Final = (
         locator=locators.polyhedron_locator,
         posed=posed.by_filter(posed.faces),
         box=bounds.vertices_box,
-        bounds=bounds.bounds_of_mesh,
+        bounds=bounds.bounds_of_vertices,
         profile=profiles.on_boundary,
         n_faces=lambda solid: int(solid.n_faces),
         clip=boundary.on_boundary,
@@ -112,6 +117,7 @@ ROWS: Final = (
     ),
     Row(
         solid=Surface,
+        kind=BodyKind.MESH,
         about="A mesh that encloses nothing, open or closed; for collision only.",
         fields={
             "vertices": Field("vertices", "Positions."),
@@ -120,12 +126,13 @@ ROWS: Final = (
         example={"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]},
         stored=("vertices", "face_offsets", "face_indices"),
         box=bounds.vertices_box,
-        bounds=bounds.bounds_of_mesh,
+        bounds=bounds.bounds_of_vertices,
         profile=profiles.on_boundary,
         meets={3: "mesh"},
     ),
     Row(
         solid=Triangle,
+        kind=BodyKind.RINGS,
         about="2D: a triangle. 3D: for `contains` the prism over it, unbounded both ways; flat for bounds.",
         fields={"vertices": Field("three", "Three positions, in any order.")},
         stored=("vertices",),
@@ -140,6 +147,7 @@ ROWS: Final = (
     ),
     Row(
         solid=Polygon,
+        kind=BodyKind.RINGS,
         about="Everything within the rings (even-odd rule over all of them, any orientation); a repeated last vertex "
         "is\ndropped.",
         fields={"rings": Field("rings", "Shells and holes alike.")},

@@ -14,7 +14,7 @@ from benchmarks.contenders.with_ours import ring_areas
 from benchmarks.errors import REFUSED
 from benchmarks.workloads import Mesh, Rings
 from engine.solids.primitives import rows_of as planes_of
-from engine.textbook import clip_polygons, greiner_hormann, methods, polyhedra
+from engine.textbook import clip_polygons, methods, polyhedra
 
 NAMES = {
     "by planes": "textbook: Cohen-Sutherland by planes", "cross and dot": "textbook: cross and dot",
@@ -90,7 +90,7 @@ def _overlay(operation: str, threads: int) -> Prepared:
     def area(pair: Any) -> float:
         if len(pair[0]) > 1 or len(pair[1]) > 1:
             raise NotApplicable("single rings only")
-        found = [ring for ring in greiner_hormann.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
+        found = [ring for ring in clip_polygons.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
         return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in found)
 
     return Prepared(each_or_nan(area))

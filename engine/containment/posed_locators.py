@@ -1,7 +1,7 @@
 """Locates points in posed solids: filters in the body's own frame, exact on input and transform.
 
 A posed solid is the exact image of the solid under p -> R p + t, but for spheres, which keep their radius about the
-exact image of the centre. Points are moved into the solid's frame with a bound on the rounding (frames.py),
+exact image of the centre. Points are moved into the solid's frame with a bound on the rounding (methods/filters.py),
 located there where that bound allows (filters.py), and settled in integers where it does not. Pure translations and
 quarter turns whose differences are exact use the unposed kernels, so that flush instances on a lattice never reach
 rationals.

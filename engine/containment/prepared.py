@@ -4,10 +4,10 @@
 a ring are one run.
 
 **Cells.** Let U(x) = (x / 2 - low / 2) scale be the exact place of x in units of cells, of which there are at most 2^15
-along an axis; the grid (bounding/grid.py) computes it to within 2^-35. The image of an edge is within as much of the
-segment between the computed places of its ends. That segment is taken row by row, 2^-7 of a cell beyond the row on both
-sides, and every column that this part reaches to within 2^-7 is marked MIXED. Where the part is cut off at a side of
-the row, the segment rises by 2^-7 at least, so its slope is at most 2^22 and the column there off by less than 2^-14.
+along an axis; `cell_of` computes it to within 2^-35. The image of an edge is within as much of the segment
+between the computed places of its ends. That segment is taken row by row, 2^-7 of a cell beyond the row on both sides,
+and every column that this part reaches to within 2^-7 is marked MIXED. Where the part is cut off at a side of the row,
+the segment rises by 2^-7 at least, so its slope is at most 2^22 and the column there off by less than 2^-14.
 So no edge comes as near as 2^-8 to a cell that is not marked: all doubles of the cell have one location, the same as
 those of an unmarked cell beside it, and none is on an edge. One point of each stretch of such cells is located by the
 slabs. Below an extent of 2^-960 underflow could spoil this: there is no grid.

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final, cast
 import numpy as np
 
 from engine.errors import InvalidArrayError, NotRepresentableError
-from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of, check_sources
 from engine.polygon_overlay.overlay import accuracy_of, check_operation, overlay_rings, rings_of, ulps_moved
@@ -94,7 +94,7 @@ class OverlayBatch(Ragged):
         if not -len(self) <= pair < len(self):
             raise IndexError(f"pair {pair} of {len(self)}")
         pair %= len(self)
-        if self.status[pair] != DONE:
+        if self.status[pair] != PairStatus.DONE:
             return None
         if pair in self._apart:
             return self._apart[pair]
@@ -116,8 +116,8 @@ class OverlayBatch(Ragged):
         sides = [(RingArrays(*each[:2]), each[2]) for each in (_gathered(self._subjects), _gathered(self._clips))]
         areas, _ = areas_of(*sides[0], *sides[1], read_only(exact.sources), read_only(exact.ring_offsets), groups)
         unsure = np.isnan(areas) | (exact.status == OPEN)
-        areas[self.status != DONE] = np.nan
-        for pair in np.flatnonzero(unsure & (self.status == DONE)).tolist():
+        areas[self.status != PairStatus.DONE] = np.nan
+        for pair in np.flatnonzero(unsure & (self.status == PairStatus.DONE)).tolist():
             try:
                 areas[pair] = cast("Overlay", self[pair]).area
             except NotRepresentableError:
@@ -227,7 +227,7 @@ def _settled(
     status, is_rounded_again, apart = rest
     settled: dict[int, SettledPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}
-    doubtful = np.flatnonzero(found.status == MAY_CROSS)
+    doubtful = np.flatnonzero(found.status == PairStatus.MAY_CROSS)
 
     def settle(start: int, stop: int) -> None:
         some = doubtful[start * _DOUBTFUL : stop * _DOUBTFUL]
@@ -248,7 +248,7 @@ def _settled(
     together = [settled[start] for start in sorted(settled)]
     for each in together:
         is_rounded_again[each.pairs] = True
-    left = np.flatnonzero((found.status != DONE) & ~is_rounded_again)
+    left = np.flatnonzero((found.status != PairStatus.DONE) & ~is_rounded_again)
     run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
     apart.update((pair, result) for pair, (result, _, _) in alone.items())
     more = [each.found for each in together]

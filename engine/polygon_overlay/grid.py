@@ -19,7 +19,7 @@ import numpy as np
 
 from engine.compiling.jit import entry_of
 from engine.errors import InvalidInputError, NotRepresentableError
-from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.snapping import FOLDS, scale, snap
 from engine.polygon_overlay.compiled.workspace import keep, scratch_for
 from engine.polygon_overlay.implicit_rings import ImplicitRings, rings_alone
@@ -156,10 +156,10 @@ def snapped_to_units(rings: Found, budget: Budget, known: _OnGrid | None = None)
     edges = np.arange(len(vertices)) if found.edges is None else found.edges.astype(np.int64)
     if found.n_moved == 0 and found.edges is None:
         return rings._replace(sources=_along(edges))
-    snapped, ends, status = found.vertices, found.offsets, DONE
+    snapped, ends, status = found.vertices, found.offsets, PairStatus.DONE
     if not found.stays:
         snapped, edges, ends = _bent(vertices, snapped, offsets, found.passages.astype(np.int64))
-        status = MAY_CROSS
+        status = PairStatus.MAY_CROSS
     return one_pair(snapped, ends, rings.piece_offsets, HALF_DIAGONAL, 0, _along(edges), status)
 
 
@@ -238,7 +238,7 @@ def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budg
     """
     vertices, largest = grid.places_of(read_only(result.vertices))
     if grid.base == 10 and not _are_told_apart(result.vertices, result.ring_offsets):
-        rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=MAY_CROSS)
+        rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=PairStatus.MAY_CROSS)
         if not np.array_equal(again(rings, budget).vertices, vertices):
             raise NotRepresentableError(
                 f"multiples of {grid.spacing!r} are not told apart well enough by float64 here; take a power of two"

@@ -17,16 +17,9 @@ from engine.arrangement.arrange import Arrangement, arrange_rings
 from engine.arrangement.rings import ExactRings, Piece, trace_pieces
 from engine.arrangement.subdivision import Subdivision, label_faces, subdivide
 from engine.errors import TooComplexError
-from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import (
-    FIRST_ALONE,
-    NEGATIVE,
-    NON_ZERO,
-    PAIR,
-    POSITIVE,
-    Nesting,
-)
+from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.grid import snapped_to_units
 from engine.polygon_overlay.pair_arrays import Found, one_pair, ring_sizes
 from engine.polygon_overlay.result import Overlay
@@ -77,19 +70,22 @@ def _labelled(
     arrangement = arrange_rings(vertices, offsets, None, budget)
     subdivision = subdivide(arrangement)
     sources = nesting.shells
-    if nesting.rule == PAIR:
+    if nesting.rule == Rule.PAIR:
         sources = np.repeat([0, 1], [len(subject.offsets) - 1, len(clip.offsets) - 1])
-    if nesting.rule in (NON_ZERO, POSITIVE, NEGATIVE):
+    if nesting.rule in (Rule.NON_ZERO, Rule.POSITIVE, Rule.NEGATIVE):
         labels = label_faces(subdivision, _windings(arrangement, vertices, offsets), winds=True)
-        inside = [{NON_ZERO: label != 0, POSITIVE: label > 0, NEGATIVE: label < 0}[nesting.rule] for label in labels]
+        inside = [
+            {Rule.NON_ZERO: label != 0, Rule.POSITIVE: label > 0, Rule.NEGATIVE: label < 0}[Rule(nesting.rule)]
+            for label in labels
+        ]
     else:
         source_of = np.repeat(sources, np.diff(offsets)).tolist()
         masks = [_odd(source_of[k] for k in edges) for edges in polled(arrangement.cover)]
         labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
-        if nesting.rule == PAIR:
+        if nesting.rule == Rule.PAIR:
             inside = [kept[sum(1 << source for source in label)] for label in labels]
         else:
-            inside = [label == {0} if nesting.rule == FIRST_ALONE else bool(label) for label in labels]
+            inside = [label == {0} if nesting.rule == Rule.FIRST_ALONE else bool(label) for label in labels]
     budget.check()
     return subdivision, inside
 
@@ -130,7 +126,7 @@ def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
     return one_pair(
         np.array([(nodes.xs[node], nodes.ys[node]) for node in used]).reshape(-1, 2), np.cumsum([0, *map(len, rings)]),
         np.cumsum([0, *(1 + len(piece.holes) for piece in pieces)]), displacement, 0,
-        np.array([edges, edges], np.int32).T, MAY_CROSS if displacement else DONE,
+        np.array([edges, edges], np.int32).T, PairStatus.MAY_CROSS if displacement else PairStatus.DONE,
     )  # fmt: skip
 
 

@@ -27,14 +27,7 @@ import numpy as np
 
 from engine.errors import InvalidArrayError, InvalidOperationError, UnsupportedSolidError
 from engine.polygon_overlay.compiled.loading import RingArrays
-from engine.polygon_overlay.compiled.ring_nesting import (
-    ANY,
-    FIRST_ALONE,
-    NEGATIVE,
-    NON_ZERO,
-    POSITIVE,
-    Nesting,
-)
+from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.in_integers import overlay_exactly
@@ -194,7 +187,7 @@ def accuracy_of(ulps: float, n_edges: int, n_exact: int, n_rational: int) -> Acc
 
 
 FillRule = Literal["non_zero", "positive", "negative"]
-_RULES: Final = {"non_zero": NON_ZERO, "positive": POSITIVE, "negative": NEGATIVE}
+_RULES: Final = {"non_zero": Rule.NON_ZERO, "positive": Rule.POSITIVE, "negative": Rule.NEGATIVE}
 
 
 @overload
@@ -234,7 +227,7 @@ def union_all(
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(f"polygons must be a list of polygons, got {type(polygons).__name__}", ("polygons",))
     with Budget(deadline, cancel) as budget:
-        result, accuracy = _arranged(polygons, ANY, budget, grid)
+        result, accuracy = _arranged(polygons, Rule.ANY, budget, grid)
     if progress is not None:
         progress(1)
     return (result, accuracy) if report else result
@@ -242,7 +235,7 @@ def union_all(
 
 def less_all(subject: Polygon, clips: Sequence[Polygon], budget: Budget) -> tuple[Overlay, Accuracy]:
     """Return what is left of a polygon, which has rings, without any of some others, which may overlap each other."""
-    return _arranged([subject, *clips], FIRST_ALONE, budget)
+    return _arranged([subject, *clips], Rule.FIRST_ALONE, budget)
 
 
 def filled(rings: object, rule: FillRule, *, deadline: float | None = None, cancel: Cancel | None = None) -> Polygon:
@@ -263,18 +256,18 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
     if not isinstance(rule, str) or rule not in _RULES:
         raise InvalidOperationError(f"rule must be one of {', '.join(_RULES)}; got {shown(rule)}", ("rule",))
     given = rings_of(Polygon(rings))
-    nesting = Nesting(np.zeros(len(given.offsets) - 1, np.int64), np.zeros(0), _RULES[rule])
+    nesting = Nesting(np.zeros(len(given.offsets) - 1, np.int64), np.zeros(0), int(_RULES[rule]))
     with Budget(deadline, cancel) as budget:
         result, _, _ = overlay_rings(given, NOTHING, "union", budget, nesting)
     return Polygon(result.rings)
 
 
 def _arranged(
-    polygons: Sequence[Solid], rule: int, budget: Budget, grid: float | None = None
+    polygons: Sequence[Solid], rule: Rule, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
     """Arrange the rings of all polygons, each a source of its own."""
     rings, sources, starts = _together(polygons)
-    nesting = Nesting(sources, np.zeros(0), rule)
+    nesting = Nesting(sources, np.zeros(0), int(rule))
     result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", budget, nesting, grid)
     object.__setattr__(result, "_starts", starts)
     return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)

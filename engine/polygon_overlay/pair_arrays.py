@@ -12,7 +12,7 @@ import numpy as np
 
 from engine.compiling.jit import entry_of
 from engine.errors import RingTooShortError
-from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import find_most
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.solids.polygon import Polygon
@@ -49,7 +49,7 @@ NO_PAIRS: Final = Found(
 
 def one_pair(
     vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, displacement: float, n_exact: int,
-    sources: Int32Array | None = None, status: int = DONE,
+    sources: Int32Array | None = None, status: int = PairStatus.DONE,
 ) -> Found:  # fmt: skip
     """Return what was found for one pair; sources left out: vertices that may be any."""
     counts = np.array([[len(piece_offsets) - 1, len(ring_offsets) - 1, len(vertices), n_exact]])

@@ -6,7 +6,7 @@ lies in a shell and in no hole of that shell, and new crossings are rounded in t
 nothing is left to round and the rings, being traced from an exact arrangement, are valid.
 
 That almost always ends after one to three rounds; where it has not after `MAX_ROUNDS`, the exact rings are snapped to
-the lattice whose spacing is the unit in the last place of the largest coordinate (snap_rounding.py), after which it
+the lattice whose spacing is the unit in the last place of the largest coordinate (`snap_rings`), after which it
 ends by construction. Each round moves an edge by no more than its ends, so the displacements add up to a bound.
 
 Which exact parts a part comes from is carried along, so that lost, joined and parted ones are counted. The work of a
@@ -23,7 +23,7 @@ import numpy as np
 
 from engine.arrangement.arrange import snap_rings
 from engine.arrangement.union_find import UnionFind
-from engine.polygon_overlay.compiled.kernel import DONE, MAY_CROSS
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.implicit_rings import edges_along
 from engine.polygon_overlay.pair_arrays import NO_PAIRS, Found, joined, one_pair, places_of, taken
 from engine.polygon_overlay.result import Exact, Lost, Overlay, made_overlay
@@ -51,7 +51,7 @@ def settle_rings(
     own = np.repeat(np.arange(first.counts[0, 1]), 2).reshape(-1, 2)
     origins = own  # rows of a ring and one of ``first`` that it comes from, sorted
     has_crossings = snapped = False
-    while rings.status[0] != DONE:  # bound: MAX_ROUNDS + 1
+    while rings.status[0] != PairStatus.DONE:  # bound: MAX_ROUNDS + 1
         rings = again(rings, budget)
         if rings.status[0] == OPEN:
             return None
@@ -72,9 +72,9 @@ def settle_rings(
         edges, moved = edges[edges_along(rings.sources)], float(rings.displacement[0])
         if moved:
             rounds, displacement, snapped, has_crossings = rounds + 1, nextafter(displacement + moved, inf), True, True
-        if rings.status[0] != DONE:
+        if rings.status[0] != PairStatus.DONE:
             rings = again(rings, budget)
-            if rings.status[0] != DONE:
+            if rings.status[0] != PairStatus.DONE:
                 return None
             origins, edges = _composed(rings.evidence, origins), edges[edges_along(rings.sources)]
     return overlay_of(
@@ -128,7 +128,7 @@ def _snapped(first: Found, exact: Exact, budget: Budget) -> tuple[Found, float]:
     vertices = np.array([vertex for ring in snapped for vertex in ring])
     ring_offsets = np.cumsum([0, *map(len, snapped)])
     sources = np.column_stack([along, along]).astype(np.int32)
-    rings = one_pair(vertices, ring_offsets, first.piece_offsets, 0.0, 0, sources, MAY_CROSS)
+    rings = one_pair(vertices, ring_offsets, first.piece_offsets, 0.0, 0, sources, PairStatus.MAY_CROSS)
     return rings, nextafter(hypot(spacing, spacing) / 2, inf)
 
 
@@ -178,7 +178,7 @@ def settle_pairs(first: Found, again: Again, budget: Budget) -> SettledPairs:
     for a single pair, when asked for. Left out are those that the kernel leaves open, or that are not valid after the
     last round. Raises as `Budget.check` when the call must end.
     """
-    pairs = np.flatnonzero(first.status == MAY_CROSS)
+    pairs = np.flatnonzero(first.status == PairStatus.MAY_CROSS)
     rings = taken(first, pairs)
     displacement = rings.displacement
     has_crossings = np.zeros(len(pairs), np.bool_)
@@ -191,12 +191,12 @@ def settle_pairs(first: Found, again: Again, budget: Budget) -> SettledPairs:
         crossings = np.repeat(np.arange(len(pairs)), rings.counts[:, 2])[rings.sources[:, 1] >= 0]
         has_crossings[crossings] = True
         goes_on = (rings.status != OPEN) & ((moved == 0.0) | (rounds < MAX_ROUNDS))
-        done = np.flatnonzero(goes_on & (rings.status == DONE))
+        done = np.flatnonzero(goes_on & (rings.status == PairStatus.DONE))
         valid = taken(rings, done)._replace(displacement=displacement[done])
         valid.counts[:, 3] = first.counts[pairs[done], 3]
         ulps = _ulps_moved(first, pairs[done], valid, np.flatnonzero(has_crossings[done]))
         settled.append(SettledPairs(pairs[done], valid, ulps))
-        left = np.flatnonzero(goes_on & (rings.status == MAY_CROSS))
+        left = np.flatnonzero(goes_on & (rings.status == PairStatus.MAY_CROSS))
         pairs, rings, displacement, has_crossings = (
             pairs[left],
             taken(rings, left),

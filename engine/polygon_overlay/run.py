@@ -14,10 +14,10 @@ from typing import Any, Final, Literal, cast
 import numpy as np
 
 from engine.compiling.jit import entry_of
-from engine.polygon_overlay.compiled.kernel import DONE, FINISHED, NEEDS_CONTACTS, NEEDS_OUTPUT, overlay_pairs
+from engine.polygon_overlay.compiled.kernel import FINISHED, NEEDS_CONTACTS, NEEDS_OUTPUT, PairStatus, overlay_pairs
 from engine.polygon_overlay.compiled.loading import Loaded, RingArrays
 from engine.polygon_overlay.compiled.reducing import expand_rings, reduce_pair
-from engine.polygon_overlay.compiled.ring_nesting import AGAIN, PAIR, Nesting
+from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.compiled.workspace import (
     FEW_VERTICES,
     Outcomes,
@@ -52,7 +52,7 @@ EACH_PART: Final = np.arange(4, dtype=np.uint8)
 """Keeps what lies in the subject alone, in the clip alone and in both, as parts 1, 2 and 3 of one result."""
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
 """What stands in the place of the result of reduce_pair."""
-UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), PAIR)
+UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), int(Rule.PAIR))
 """That of two polygons."""
 _MANY: Final = 500
 """Vertices of a pair from which on blocks of edges are looked at first."""
@@ -78,7 +78,7 @@ def run_kernel(
     nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
     """
     n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
-    is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == PAIR and kept[3] < 2
+    is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and kept[3] < 2
     if is_plain and n_vertices >= max(_MANY, _MANY_IN_RING * n_rings):
         size = _BLOCK if n_vertices < _BLOCKS_GROW else 2 * _BLOCK
         found = run_blocks(subjects, clips, (n_vertices, n_rings), kept, budget, UNNAMED, size)
@@ -130,7 +130,7 @@ def run_blocks(
             budget.take(_BY_CONTACT * n_contacts)
         elif needs == NEEDS_OUTPUT:
             n_out_rings, n_out = (max(m, int(outcomes.counts[reached, k])) for k, m in ((1, n_out_rings), (2, n_out)))
-        elif size and outcomes.status[0] != DONE:
+        elif size and outcomes.status[0] != PairStatus.DONE:
             return None
         elif n_left_out:
             outcomes.counts[0, 2] += n_left_out
@@ -181,9 +181,9 @@ def overlay_compiled(
         array.setflags(False)  # write: by its name it takes twice as long
     exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
     known = None
-    if found.status[0] == DONE and grid is None:
+    if found.status[0] == PairStatus.DONE and grid is None:
         result = as_overlay(found.vertices, found.piece_offsets, found.displacement.item(), exact)
-    elif found.status[0] == DONE and grid is not None:
+    elif found.status[0] == PairStatus.DONE and grid is not None:
         known = snap_vertices(found.vertices, found.ring_offsets, found.piece_offsets, budget)
         result = as_it_stays(found, known, grid, len(subject.vertices))
     if result is None:
@@ -210,7 +210,7 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))
     subjects = PolygonArrays(read_only(rings.vertices), read_only(rings.ring_offsets), items)
     none = PolygonArrays(*NOTHING, read_only(np.zeros_like(items)))
-    nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], AGAIN)
+    nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], int(Rule.AGAIN))
     return run_kernel(subjects, none, KEPT_ARRAYS["union"], budget, nesting)
 
 
@@ -231,7 +231,11 @@ def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray) -> Overlay | N
         first, items[0], second, items[1], 0, NOT_REDUCED, kept, UNNAMED, UNLIMITED.flag, scratch.words, scratch.outcome
     )
     status, _, displacement = scratch.outcome
-    is_done, moved_by, left = needs == FINISHED and status.item(0) == DONE, displacement.item(0), scratch.output
+    is_done, moved_by, left = (
+        needs == FINISHED and status.item(0) == PairStatus.DONE,
+        displacement.item(0),
+        scratch.output,
+    )
     vertices, sources, rings = left.vertices[:n].tobytes(), left.sources[:n].tobytes(), None
     if n_rings != 1:
         rings = left.rings[: n_rings + 1].tobytes(), left.pieces[: n_pieces + 1].tobytes()

@@ -22,7 +22,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import parts_exactly
 from engine.polygon_overlay.pair_arrays import Chosen, Found, chained, places_of, ring_numbers, taken
@@ -72,7 +72,7 @@ def touching(firsts: Chosen, seconds: Chosen, budget: Budget, workers: int | Non
         start, stop = first_block * _BLOCK, min(last_block * _BLOCK, len(firsts))
         some, others = firsts[start:stop], seconds[start:stop]
         arranged = run_kernel(some.together(), others.together(), EACH_PART, budget)
-        may_touch, is_done = _may_touch(arranged), arranged.status == DONE
+        may_touch, is_done = _may_touch(arranged), arranged.status == PairStatus.DONE
         done = np.flatnonzero(may_touch & is_done)
         parts = arranged.evidence[places_of(summed(arranged.counts[:, 1]), done), 1]
         pairs = np.repeat(start + done, arranged.counts[done, 1])

@@ -16,7 +16,7 @@ the three differences z and h for their product with it; the threshold is 8u P +
 intermediates make the threshold infinite or NaN, and both comparisons false: UNDECIDED.
 
 **In pairs.** Differences of doubles are exact pairs. In 2D see `EXACT_DIFFERENCES`. In 3D, by the bounds of
-double_double.py, a minor carries 5 u^2 of each product and 3 u^2 of its value, below 8.1 u^2 of the products' sizes;
+error_free.py, a minor carries 5 u^2 of each product and 3 u^2 of its value, below 8.1 u^2 of the products' sizes;
 the product with z adds 5 u^2, two sums 3 u^2 each: below 19.3 u^2 P in all, for which the threshold has 32 u^2 P, with
 room for the low part of the sum. A rounded product that underflows is off by 2h; three in each of the six products
 under a z, and three with each z, make less than 32 h (1 + sum |z|).

@@ -19,11 +19,12 @@ from engine.containment.methods.filters import in_space
 from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
-from engine.scenes.located import MESH, LocateTables, locate_in_body
+from engine.scenes.located import LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.standing import Standing
 from engine.solids.mesh import Polyhedron
 from engine.solids.ragged import Ragged
+from engine.solids.registry import BodyKind
 from engine.types import UNDECIDED, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 _BYTES: Final = 72
@@ -75,7 +76,7 @@ def locate_near(
             body = scratch.near[place]
             location, is_beyond = locate_in_body(tables, body, is_flat, p, scratch.stack, flag)
             n_beyond += is_beyond
-            if tables.kinds[body] == MESH:
+            if tables.kinds[body] == BodyKind.MESH:
                 asked[tables.slots[body]] += 1
             if location == -1:
                 continue

@@ -22,14 +22,12 @@ from engine.errors import EngineError
 from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.mesh import Polyhedron
-from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
-from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle, rows_in_space, rows_of
+from engine.solids.primitives import rows_in_space, rows_of
 from engine.solids.ragged import summed
+from engine.solids.registry import BodyKind, row_of
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point3, read_only
 
-BY_ITSELF, BOX, BALL, ROWS, RINGS, MESH = range(6)
-"""How a candidate is decided: by the locator of the body, or by the tables."""
 _MOST_EDGES: Final = 128
 """Of a polygon whose edges are all looked at: above it the lists of single solids are better."""
 _CHECK_EVERY: Final = 256
@@ -39,11 +37,12 @@ class LocateTables(NamedTuple):
     """What kernels read of bodies, those that moved last (n + m,), and of their solids."""
 
     kinds: Int8Array
+    """See `BodyKind`; of OTHER the locator of the body decides."""
     slots: Int32Array
     frames: Int32Array
     """Row of a body's pose in the next three, -1 for none."""
     inverses: FloatArray
-    """``(n_poses, 3, 3)``: R^-1 rounded (posed/frames.py); the plane's in the upper left."""
+    """``(n_poses, 3, 3)``: R^-1 rounded (methods/filters.py); the plane's in the upper left."""
     translations: FloatArray
     is_turn: BoolArray
     centers: FloatArray
@@ -79,22 +78,22 @@ def locate_in_body(
     """Return the location of a point in a body, and whether it took more than a filter; stack: (STACK,), scratch."""
     kind, slot = tables.kinds[body], tables.slots[body]
     q, blur = to_frame(tables, tables.frames[body], p)
-    if kind == RINGS:
+    if kind == BodyKind.RINGS:
         first, last = tables.polygon_offsets[slot], tables.polygon_offsets[slot + 1]
         return locate_in_runs(tables.xs, tables.ys, tables.rings, first, last, q[0], q[1], blur)
     location = UNDECIDED
-    if kind == MESH:
+    if kind == BodyKind.MESH:
         if tables.cell_places[slot, 0] != 0:
             location = side_in_cell(tables.cell_frames, tables.cell_places, slot, q, blur)
         if location == UNDECIDED and tables.addresses[slot, 0] != 0:
             location, _ = locate_in_tree(tree_at(tables, slot), Point3(q[0], q[1], q[2]), blur, stack, flag)
-    elif kind == BOX:
+    elif kind == BodyKind.BOX:
         location = side_of_box(in_space(tables.box_lows, slot), in_space(tables.box_highs, slot), is_flat, q, blur)
-    elif kind == BALL:
+    elif kind == BodyKind.BALL:
         c, radius, blur = in_space(tables.centers, slot), tables.balls[slot, 0], tables.balls[slot, 1]
         square, reach = radius * radius, radius + 2.0 * blur
         location = int(located(p[0] - c[0], p[1] - c[1], p[2] - c[2], square, reach, blur))
-    elif kind == ROWS:
+    elif kind == BodyKind.ROWS:
         location = side_of_rows(tables.rows, tables.row_offsets[slot], tables.row_offsets[slot + 1], q, blur)
     return location, False
 
@@ -104,21 +103,21 @@ class Kinds:
 
     def __init__(self, solids: Sequence[Solid], owners: IntArray, poses: Sequence[Pose | None], budget: Budget) -> None:
         n, self.dimension = len(solids), solids[0].dimension
-        self.kinds, self.slots = np.full(n, BY_ITSELF, np.int8), np.zeros(n, np.int32)
+        self.kinds, self.slots = np.full(n, BodyKind.OTHER, np.int8), np.zeros(n, np.int32)
         self._solids = solids
-        by_type: dict[type[Solid], list[int]] = {}
+        of_kind: dict[BodyKind, list[int]] = {kind: [] for kind in BodyKind}
         for index, solid in enumerate(solids):
-            by_type.setdefault(type(solid), []).append(index)
-        flat = by_type.pop(Triangle, []) if self.dimension == 2 else []
-        rings = self._rings(by_type.pop(Polygon, []) + flat)
+            row = row_of(solid)
+            is_in = row.locator is not None and (row.kind != BodyKind.RINGS or self.dimension == 2)
+            of_kind[row.kind if is_in else BodyKind.OTHER].append(index)
+        rings = self._rings(of_kind[BodyKind.RINGS])
         budget.check()
-        boxes = self._chosen(by_type.pop(Aabb, []), BOX)
-        balls = self._chosen(by_type.pop(Sphere, []), BALL)
+        boxes, balls = (self._chosen(of_kind[kind], kind) for kind in (BodyKind.BOX, BodyKind.BALL))
         self._radii, self._centers = np.array([ball.radius for ball in balls]), self._vectors([b.center for b in balls])
-        rows = self._rows(by_type.pop(HalfSpace, []) + by_type.pop(Convex, []))
-        self.meshes: list[Polyhedron] = self._chosen(by_type.pop(Polyhedron, []), MESH)
+        rows = self._rows(of_kind[BodyKind.ROWS])
+        self.meshes: list[Polyhedron] = self._chosen(of_kind[BodyKind.MESH], BodyKind.MESH)
         others = np.zeros(n, np.bool_)
-        others[[index for rest in by_type.values() for index in rest]] = True
+        others[of_kind[BodyKind.OTHER]] = True
         for turn, body in enumerate(np.flatnonzero(others[owners]).tolist()):
             if turn % _CHECK_EVERY == 0:
                 budget.check()
@@ -143,7 +142,7 @@ class Kinds:
         return vectors
 
     def _rings(self, indices: list[int]) -> tuple[Any, ...]:
-        solids = self._chosen(indices, RINGS)
+        solids = self._chosen(indices, BodyKind.RINGS)
         offsets = [solid.ring_offsets for solid in solids]
         polygon_offsets = summed([len(each) - 1 for each in offsets])
         ends = np.concatenate([np.zeros(0, np.int64), *offsets])  # each begins with 0
@@ -151,18 +150,18 @@ class Kinds:
         vertices = read_only(np.concatenate([np.empty((0, 2)), *(solid.vertices for solid in solids)]))
         xs, ys, rings, _ = closed_rings(vertices, summed(sizes))
         n_edges = rings[polygon_offsets[1:] - 1, 1] - rings[polygon_offsets[:-1], 0]
-        self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = BY_ITSELF
+        self.kinds[np.array(indices, np.int64)[n_edges > _MOST_EDGES]] = BodyKind.OTHER
         return polygon_offsets, rings, xs, ys
 
     def _rows(self, indices: list[int]) -> tuple[Any, ...]:
-        planes = [rows_of(solid) for solid in self._chosen(indices, ROWS)]
+        planes = [rows_of(solid) for solid in self._chosen(indices, BodyKind.ROWS)]
         rows = np.concatenate([np.zeros((0, self.dimension + 1)), *planes])
         return summed([len(each) for each in planes]), rows_in_space(rows)
 
     def placed(self, owners: IntArray, poses: Sequence[Pose | None]) -> LocateTables:
         """Return the tables of bodies, of each its solid and its pose."""
         frames, kinds, slots = frames_of(poses, self.dimension), self.kinds[owners], self.slots[owners]
-        bodies = np.flatnonzero(kinds == BALL)
+        bodies = np.flatnonzero(kinds == BodyKind.BALL)
         low, high = moved_boxes(*(self._centers[slots[bodies]],) * 2, frames, frames.rows[bodies])
         with np.errstate(over="ignore", invalid="ignore"):
             centers = low * 0.5 + high * 0.5
@@ -192,7 +191,7 @@ def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
 def both(first: LocateTables, then: LocateTables) -> LocateTables:
     """Return the tables of bodies and of others behind them, all of the same solids."""
     rows, slots = np.where(then.frames < 0, -1, then.frames + len(first.inverses)), then.slots.copy()
-    slots[then.kinds == BALL] += len(first.balls)
+    slots[then.kinds == BodyKind.BALL] += len(first.balls)
     then = then._replace(frames=rows.astype(np.int32), slots=slots)
     return first._replace(**{
         name: np.concatenate([getattr(first, name), getattr(then, name)])

@@ -13,13 +13,12 @@ from engine.containment.prepared import tree_line, tree_of
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.rational import nearest_pair
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
-from engine.scenes.through import BodyKind
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.solids.base import Solid
-from engine.solids.mesh import Polyhedron, Surface
+from engine.solids.mesh import Polyhedron
 from engine.solids.pose import Pose
-from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, rows_in_space, rows_of
-from engine.solids.registry import own_box
+from engine.solids.primitives import rows_in_space, rows_of
+from engine.solids.registry import BodyKind, own_box, row_of
 from engine.types import FloatArray, IntArray
 
 
@@ -54,9 +53,10 @@ class Table:
         elif self.rows[body, 0] == BodyKind.UNREADY:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 
-    def _fill(self, row: IntArray, solid: Solid, pose: Pose | None) -> int:
+    def _fill(self, row: IntArray, solid: Any, pose: Pose | None) -> int:
         """Fill the row of a body, but for its kind; return that, OTHER where no kernel takes its type, or numbers."""
-        if isinstance(solid, Sphere):
+        kind = row_of(solid).kind
+        if kind == BodyKind.BALL:
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
                 return BodyKind.OTHER
             center = solid.center.tolist() if pose is None else to_world_frame(solid.center.tolist(), pose)
@@ -72,11 +72,11 @@ class Table:
                 return BodyKind.OTHER
             self._own.append(frame)
             row[3] = frame.ctypes.data
-        if isinstance(solid, (HalfSpace, Aabb, Convex)):
+        if kind in (BodyKind.ROWS, BodyKind.BOX):
             planes = self._kept.setdefault(id(solid), rows_in_space(rows_of(solid)))
             row[1], row[2] = len(planes), planes.ctypes.data
             return BodyKind.ROWS if _are_safe(planes.ravel().tolist()) else BodyKind.OTHER
-        if isinstance(solid, (Polyhedron, Surface)):
+        if kind == BodyKind.MESH:
             words = self._kept.get(id(solid))
             words = self._kept.setdefault(id(solid), _words_of(solid)) if words is None else words
             row[1], row[2] = isinstance(solid, Polyhedron), words.ctypes.data
@@ -91,7 +91,7 @@ def unready(n: int) -> IntArray:
     return rows
 
 
-def _words_of(solid: Polyhedron | Surface) -> IntArray:
+def _words_of(solid: Any) -> IntArray:
     """Return what kernels read of a mesh, without the tree that points are located by."""
     mesh: Any = boundary_of(solid)
     low, high, _ = own_box(solid)

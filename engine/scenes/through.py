@@ -9,7 +9,6 @@ segment whose first piece would be found by two that round alike, or on a body t
 from __future__ import annotations
 
 from collections import namedtuple
-from enum import IntEnum
 from typing import Any, Final
 
 import numpy as np
@@ -38,20 +37,8 @@ from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, Crossings,
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import Way
 from engine.segment_clipping.pieces import Pieces, put_piece
+from engine.solids.registry import BodyKind
 from engine.types import OPEN, FlagArray, FloatArray, IntArray
-
-
-class BodyKind(IntEnum):
-    """What cuts segments on a body."""
-
-    UNREADY = -1
-    """Not prepared yet."""
-    OTHER = 0
-    """Exact arithmetic."""
-    BALL = 1
-    ROWS = 2
-    MESH = 3
-
 
 MET: Final = 1
 """State of a segment, beside SETTLED, which meets nothing, and OPEN."""

@@ -100,14 +100,9 @@ def bounds_of_box(solid: Aabb, budget: Budget) -> Reported:
     return _around(corners_of_box(solid.min, solid.max), budget, solid)
 
 
-def bounds_of_mesh(solid: Mesh, budget: Budget) -> Reported:
-    """Return the bounds of faces."""
+def bounds_of_vertices(solid: Mesh | Polygon | Triangle, budget: Budget) -> Reported:
+    """Return the bounds of vertices."""
     return _around(vertices_in_use(solid), budget)
-
-
-def bounds_of_vertices(solid: Polygon | Triangle, budget: Budget) -> Reported:
-    """Return the bounds of a polygon or triangle."""
-    return _around(solid.vertices, budget)
 
 
 def _around(points: FloatArray, budget: Budget, box: Aabb | None = None) -> Reported:
@@ -116,8 +111,10 @@ def _around(points: FloatArray, budget: Budget, box: Aabb | None = None) -> Repo
     return result, _accuracy("farthest_point_walk", len(points), ball)
 
 
-def vertices_in_use(mesh: Mesh) -> FloatArray:
-    """Return the vertices that faces name, of equal ones the first."""
+def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
+    """Return the vertices, of a mesh those that faces name, of equal ones the first."""
+    if not isinstance(mesh, Mesh):
+        return mesh.vertices
     is_used = np.zeros(len(mesh.vertices), np.bool_)
     is_used[mesh.triangles] = True
     return mesh.vertices if is_used.all() else mesh.vertices[is_used]
@@ -166,7 +163,7 @@ def triangle_box(solid: Triangle, check: Check) -> Box:
 
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:
     """The square loses distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings."""
-    points = vertices_in_use(body) if isinstance(body, Mesh) else body.vertices
+    points = vertices_in_use(body)
     low, high = box_of_points(points)
     with np.errstate(all="ignore"):
         aside = points - (0.5 * low + 0.5 * high)

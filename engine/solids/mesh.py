@@ -230,7 +230,7 @@ def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
     """Return the error that says which vertex a face names twice."""
     values, counts = np.unique(face, return_counts=True)
     return RepeatedIndexError(
-        f"faces[{i_face}] = {_shortened(face.tolist())} names vertex {int(values[counts > 1][0])} more than once; "
+        f"faces[{i_face}] = {shown(face.tolist(), 200)} names vertex {int(values[counts > 1][0])} more than once; "
         "leave the face out or split it there",
         ("faces", i_face),
     )
@@ -255,10 +255,6 @@ def _unbalanced_edges(
     ]
     more = "; ..." if n > len(lines) else ""
     return kind(f"{n} edges {claim}: {'; '.join(lines)}{more}; {advice}", ("faces", int(named[0, 0])))
-
-
-def _shortened(items: list[int]) -> str:
-    return repr(items) if len(items) <= 12 else repr(items[:12])[:-1] + ", ...]"
 
 
 class Polyhedron(Mesh):

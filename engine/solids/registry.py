@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from enum import IntEnum
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -21,6 +22,22 @@ from engine.types import FloatArray
 Where = tuple[str | int, ...]
 Box = tuple[FloatArray, FloatArray, float]
 """Low and high (d,), of a ball those of its centre, and how far a point is at most from the middle as computed."""
+
+
+class BodyKind(IntEnum):
+    """In which table of a scene kernels find a body."""
+
+    UNREADY = -1
+    """Not prepared yet."""
+    OTHER = 0
+    """In none: what is exact, or its own locator, decides."""
+    BALL = 1
+    ROWS = 2
+    MESH = 3
+    BOX = 4
+    """Its planes are rows too, where segments are cut."""
+    RINGS = 5
+    """In the plane."""
 
 
 class Field(NamedTuple):
@@ -64,6 +81,8 @@ class Row:
     """(solid) -> the Plan by which segments are cut on it; without it `clip_segments` refuses the type."""
     planes: Callable[[Any, Any], Any] | None = None
     """(solid, check) -> the integer rows that polygons are clipped by."""
+    kind: BodyKind = BodyKind.OTHER
+    """The table of scenes that it is in."""
     meets: Mapping[int, str] = field(default_factory=dict)
     """By dimension, as what it meets others: mesh (a `Mesh`), outline (with vertices and ring_offsets, as a polygon),
     box, sphere or half_space."""
@@ -72,6 +91,11 @@ class Row:
     def name(self) -> str:
         """What JSON and messages call the type."""
         return self.solid.type
+
+    @property
+    def is_convex(self) -> bool:
+        """Whether it leaves at most one piece of a segment for certain."""
+        return self.kind in (BodyKind.BALL, BodyKind.ROWS, BodyKind.BOX)
 
 
 _ROWS: Final[dict[str, Row]] = {}
@@ -127,11 +151,4 @@ def unbounded(solid: Solid) -> Box:
     return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf), np.inf
 
 
-class _Nothing(Solid):
-    """What has no row."""
-
-    __slots__ = ()
-    type = "nothing"
-
-
-_NO_ROW: Final = Row(solid=_Nothing, about="")
+_NO_ROW: Final = Row(solid=Solid, about="")

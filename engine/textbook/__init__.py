@@ -12,15 +12,15 @@ capped.
 | polygon by the parity of a half-line | polygons.by_half_line |
 | convex polygon by the sum of angles, signed and unsigned | polygons.by_signed_angles, by_unsigned_angles |
 | convex polygon by the same side of all edges | polygons.by_same_side |
-| triangle in space by cross and scalar products | triangles.by_products |
-| triangle on the projection of largest area | triangles.by_projection |
+| triangle in space by cross and scalar products | solids.by_products |
+| triangle on the projection of largest area | solids.by_projection |
 | polyhedra: vertices in the other, edges against faces | collision.by_vertices, by_edges |
 | bounding volumes first; exercise 4: bounding sphere and box | collision.by_volumes, bounding_sphere |
 | exercise 5: two triangles in the plane | collision.of_triangles |
 | segment on a half-space; exercise 7: on a sphere | clip_segments.on_half_space, on_sphere |
 | Cohen-Sutherland on a box; exercise 6: on a convex polyhedron | clip_segments.on_box, on_convex |
 | Sutherland-Hodgman; multiply connected; cascade | clip_polygons.clip_contour, clip_polygon, on_convex |
-| exercise 3: polygon on a concave polygon | greiner_hormann.intersection |
+| exercise 3: polygon on a concave polygon | clip_polygons.intersection |
 
 Exercise 1, collision in less than quadratic time, is what engine.collision does.
 """

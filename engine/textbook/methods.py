@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.solids.primitives import rows_of
-from engine.textbook import clip_polygons, clip_segments, collision, polygons, polyhedra, solids, triangles
+from engine.textbook import clip_polygons, clip_segments, collision, polygons, polyhedra, solids
 from engine.types import BoolArray, FloatArray
 
 Methods = dict[str, tuple[Callable[..., Any], int]]
@@ -37,7 +37,7 @@ def of_points(solid: Any) -> Methods:
             rest = solid.vertices, solid.triangles, AHEAD
             return {"half-line": (lambda points: polyhedra.by_half_line(points, *rest), len(rest[1]))}
         case "triangle" if solid.dimension == 3:
-            both = {"cross and dot products": triangles.by_products, "projection": triangles.by_projection}
+            both = {"cross and dot products": solids.by_products, "projection": solids.by_projection}
             return {name: (lambda points, of=of: of(points, solid.vertices), 1) for name, of in both.items()}
         case "triangle" | "polygon":
             return _of_rings(solid.vertices, getattr(solid, "ring_offsets", np.array([0, len(solid.vertices)])))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 from starlette import responses
@@ -12,8 +12,6 @@ import engine
 from service import mesh_reader
 from service.convert.answers import from_accuracy
 from service.work import Call
-
-_CONVEX: Final = ("half_space", "aabb", "convex", "sphere")
 
 
 class Response(responses.Response):
@@ -41,9 +39,11 @@ def answer(call: Call, array: Any, accuracy: engine.Accuracy) -> Any:
 
 def check_is_convex(region: engine.Solid) -> engine.Solid:
     """Return `region` if it leaves at most one piece of a segment for certain."""
-    if region.type not in _CONVEX:
+    rows = sorted(engine.solid_types.values(), key=lambda row: row.planes is None)  # those of planes first
+    taken = [row.name for row in rows if row.is_convex]
+    if region.type not in taken:
         raise engine.UnsupportedSolidError(
-            f"a {region.type} may leave several pieces of a segment; here are taken: {', '.join(_CONVEX)}; "
+            f"a {region.type} may leave several pieces of a segment; here are taken: {', '.join(taken)}; "
             "POST /v1/clip/segments takes the others"
         )
     return region

@@ -10,7 +10,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FLOORS = {
     "engine.version": 0,
-    "engine.types": 0,
     "engine.errors": 0,
     "engine.types": 0,
     "engine.compiling": 1,

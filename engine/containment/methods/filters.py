@@ -20,9 +20,9 @@ Spheres: the exact sign of r^2 - |p - c|^2.
 
 Three stages. (1) An axis on which |p - c| rounds to more than r: rounding is monotone and r is a double, so the exact
 difference is above r as well, and the point is outside. (2) The plain value with an error bound: each difference
-carries u = 2^-53 relative error, each square 3 u, a sum of up to four terms 3 u more; `_SLACK` = 16 u covers this and
-the rounding of the bound. (3) Differences as exact pairs high + low; where all low parts are zero (the usual case on
-flush data), r^2 and the squares are exact pairs, and the sign is that of an expansion of at most eight terms. Else
+carries u = 2^-53 relative error, each square 3 u, a sum of up to four terms 3 u more; `_BALL_SLACK` = 16 u covers this
+and the rounding of the bound. (3) Differences as exact pairs high + low; where all low parts are zero (the usual case
+on flush data), r^2 and the squares are exact pairs, and the sign is that of an expansion of at most eight terms. Else
 UNDECIDED. Squares are exact pairs only above 2^-480 in size, smaller ones (but zero) are UNDECIDED too.
 
 The first two stages are taken for a block of points at once, without branches: so the compiler uses vectors, and no
@@ -93,7 +93,6 @@ def _inverses(rotations: FloatArray) -> FloatArray:
 
 _BLUR: Final = 16.0 * 2.0**-53
 """Of eight times the differences: these overflow before a coordinate does."""
-_FRAME_TINY: Final = 1e-320
 
 
 @inline
@@ -114,7 +113,7 @@ def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
     z = inverses[frame, 2, 0] * dx + inverses[frame, 2, 1] * dy + inverses[frame, 2, 2] * dz
     if frames.is_turn[frame] and x_tail == 0.0 and y_tail == 0.0 and z_tail == 0.0:
         return (x, y, z), 0.0
-    return (x, y, z), _BLUR * (8.0 * abs(dx) + 8.0 * abs(dy) + 8.0 * abs(dz)) + _FRAME_TINY
+    return (x, y, z), _BLUR * (8.0 * abs(dx) + 8.0 * abs(dy) + 8.0 * abs(dz)) + _TINY
 
 
 @kernel
@@ -262,7 +261,6 @@ def locate_by_polynomial(
 
 
 _BALL_SLACK: Final = 16.0 * 2.0**-53
-_BALL_TINY: Final = 1e-320
 _SMALLEST: Final = 2.0**-480
 _LARGEST: Final = 2.0**500
 _BALL_BLOCK: Final = 64
@@ -274,7 +272,7 @@ def located(dx: float, dy: float, dz: float, square: float, reach: float, blur: 
     """Return the location of a point at that difference from the centre, UNDECIDED where the filter is unsure."""
     ax, ay, az = abs(dx), abs(dy), abs(dz)
     total = dx * dx + dy * dy + dz * dz
-    excess, bound = square - total, _BALL_SLACK * (square + total) + _BALL_TINY
+    excess, bound = square - total, _BALL_SLACK * (square + total) + _TINY
     bound += 4.0 * blur * (ax + ay + az + 2.0 * blur)  # |(d + e)^2 - d^2| <= 2 |d| e + e^2 an axis
     is_out = (max(ax, max(ay, az)) > reach) | (-excess > bound)
     return -1.0 if is_out else (1.0 if excess > bound else 2.0)

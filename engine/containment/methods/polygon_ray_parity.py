@@ -6,7 +6,7 @@ that sign is zero and q is between the ends, q is on the edge: BOUNDARY, whateve
 never passed and are only looked at for BOUNDARY.
 
 Edges are listed as runs, from one vertex of a ring to another: the rings themselves, or what a horizontal slab holds of
-them (rings.py). The filter looks at all edges of a run without a branch, so that the compiler works on several at a
+them (prepared.py). The filter looks at all edges of a run without a branch, so that the compiler works on several at a
 time; where the sign at a passed edge is not sure, or a vertex is level with q (which may then lie on a horizontal
 edge), the edges are taken one by one. A grid of cells, if there is one, knows the location of all points of most cells.
 

@@ -1,7 +1,7 @@
 """Boundary rings of the regions that a choice of labels keeps, walked over chains.
 
-The same rules as in rings.py: a walk keeps to its own region, is cut into simple rings where it passes a node twice,
-and lists the points where the boundary turns or rings meet.
+The same rules as in arrangement/rings.py: a walk keeps to its own region, is cut into simple rings where it passes a
+node twice, and lists the points where the boundary turns or rings meet.
 
 Boundary rings of two simple rings that only cross each other: walked from crossing to crossing, without chains.
 

@@ -14,7 +14,7 @@ vouch for the rounded rings, or put a vertex on the line of its neighbours: its 
 back as another pair then, each ring a source of its own (ring_nesting.py).
 
 The intersection of two convex rings is convex.py's where floating point is sure of all that it asks; two rings that
-only cross each other are walked by crossing_walk.py, from the events on.
+only cross each other are walked by `walk_crossings`, from the events on.
 
 Scratch arrays come from the caller, who gives more and calls again where they do not suffice: nothing here allocates,
 so nothing counts references to arrays.
@@ -22,6 +22,7 @@ so nothing counts references to arrays.
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import Final, NamedTuple
 
 from engine.compiling.jit import kernel, merged
@@ -60,14 +61,7 @@ from engine.polygon_overlay.compiled.loading import (
     mark_runs,
 )
 from engine.polygon_overlay.compiled.reducing import count_left_out
-from engine.polygon_overlay.compiled.ring_nesting import (
-    AGAIN,
-    NO_ROOM,
-    PAIR,
-    Nesting,
-    gather_evidence,
-    spread_sources,
-)
+from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, Nesting, Rule, gather_evidence, spread_sources
 from engine.polygon_overlay.compiled.ring_order import (
     Filled,
     has_room,
@@ -81,13 +75,18 @@ from engine.polygon_overlay.compiled.workspace import Outcomes, Workspace, outpu
 from engine.predicates.expansion import LARGEST
 from engine.types import OPEN, FlagArray, IntArray
 
-DONE: Final = 0
-MAY_CROSS: Final = 1
 FINISHED: Final = 0
 NEEDS_CONTACTS: Final = 1
 """The pair reached has more contacts than there is scratch for."""
 NEEDS_OUTPUT: Final = 2
 """The pair reached has more vertices or rings than the output has room for."""
+
+
+class PairStatus(IntEnum):
+    """What became of a pair, if it is not OPEN."""
+
+    DONE = 0
+    MAY_CROSS = 1
 
 
 class _Span(NamedTuple):
@@ -170,7 +169,7 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
     are_clear = sort_events(edges, w.events, w.along, w.unions, n, contacts.n_events, stop)
     if stop[0]:
         return _NONE
-    if nesting.rule == PAIR and do_nothing_but_cross(w.given, w.events, contacts, n_rings, kept):
+    if nesting.rule == Rule.PAIR and do_nothing_but_cross(w.given, w.events, contacts, n_rings, kept):
         n_found, n_points = walk_crossings(
             w.given, w.events, w.along, w.chains.at, w.tree.marks, kept, contacts.n_crossings, w.found, stop
         )
@@ -206,12 +205,12 @@ def _arrange_chains(
     join_faces(w, w.found.point, (n, n_cycles, loaded.n_runs), stop)
     if stop[0]:
         return 0, 0
-    tells = nesting.rule == AGAIN
+    tells = nesting.rule == Rule.AGAIN
     n_entries = spread_sources(w.given, w.chains, w.faces, nesting, w.holders, kept, (n_chains, n_cycles), stop)
     if n_entries == NO_ROOM:
         return NO_ROOM, 0
     mark_boundary(w.chains, w.faces, n_chains, stop)
-    join_regions(w.chains, w.stars, w.faces, nesting.rule != PAIR, (n_chains, n_crossings, n_nodes), stop)
+    join_regions(w.chains, w.stars, w.faces, nesting.rule != Rule.PAIR, (n_chains, n_crossings, n_nodes), stop)
     if tells:
         gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
@@ -291,7 +290,7 @@ def overlay_pairs(
             clip_box = box_of(clips.vertices, clips.offsets[span.second], clips.offsets[span.second_end])
             common = common_box(subject_box, clip_box)
             if is_intersection and is_empty(common):
-                status[pair] = DONE
+                status[pair] = PairStatus.DONE
                 continue
             if is_intersection and span.first_end - span.first == 1 and span.second_end - span.second == 1:
                 m, low, moved_by = _intersect_convex(w, subjects, clips, span, stop)
@@ -303,9 +302,9 @@ def overlay_pairs(
                         write_convex(w, m, low, output, filled)
                         filled = Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1, 0)
                         counts[pair, 0], counts[pair, 1], counts[pair, 2] = 1, 1, m
-                    status[pair], displacement[pair] = DONE, moved_by
+                    status[pair], displacement[pair] = PairStatus.DONE, moved_by
                     continue
-            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, nesting.rule != PAIR, stop)
+            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, nesting.rule != Rule.PAIR, stop)
             loaded = Loaded(n, n_rings, 0, max(magnitude(subject_box), magnitude(clip_box)))
             if not (safe and loaded.largest <= LARGEST):
                 continue
@@ -329,7 +328,7 @@ def overlay_pairs(
             counts[pair, 1], counts[pair, 2] = n_found, m
             return _ended(pair, NEEDS_OUTPUT, filled, 0)
         n_evidence = 0
-        if nesting.rule == AGAIN:
+        if nesting.rule == Rule.AGAIN:
             n_evidence = tell_evidence(w, n_found, span.first, output, filled)
         elif kept[3] > 1:
             n_evidence = tell_parts(w, n_found, output, filled)
@@ -344,5 +343,5 @@ def overlay_pairs(
                 n_left_out += count_left_out(output.sources, output.rings[ring], output.rings[ring + 1])
         filled = Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces, n_evidence)
         counts[pair, 0], counts[pair, 1], counts[pair, 2], counts[pair, 3] = n_pieces, n_found, m, arranged.n_exact
-        status[pair], displacement[pair] = (DONE if is_valid else MAY_CROSS), moved_by
+        status[pair], displacement[pair] = (PairStatus.DONE if is_valid else PairStatus.MAY_CROSS), moved_by
     return _ended(status.shape[0], FINISHED, filled, n_left_out)

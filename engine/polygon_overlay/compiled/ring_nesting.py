@@ -22,6 +22,7 @@ Only the few rings that a face lies in are looked at.
 from __future__ import annotations
 
 from collections import namedtuple
+from enum import IntEnum
 from typing import Any, Final, NamedTuple
 
 from engine.arrangement.union_find import root_of
@@ -34,15 +35,23 @@ from engine.types import FlagArray, Int32Array, IntArray
 
 NO_ROOM: Final = -1
 _NOT_YET: Final = -2
-AGAIN: Final = 0
-ANY: Final = 1
-NON_ZERO: Final = 2
-POSITIVE: Final = 3
-NEGATIVE: Final = 4
-PAIR: Final = 5
-FIRST_ALONE: Final = 6
-"""Rules: shells and holes of a round, within any source, winding numbers, a table by label of two polygons (bit 0: in
-the subject, bit 1: in the clip), within source 0 and no other."""
+
+
+class Rule(IntEnum):
+    """Which faces are inside."""
+
+    AGAIN = 0
+    """By the shells and holes of a round of rounding."""
+    ANY = 1
+    """Within any source."""
+    NON_ZERO = 2
+    """By the winding number, as for the next two."""
+    POSITIVE = 3
+    NEGATIVE = 4
+    PAIR = 5
+    """By a table over the labels of two polygons (bit 0: in the subject, bit 1: in the clip)."""
+    FIRST_ALONE = 6
+    """Within source 0 and no other."""
 
 
 class Nesting(NamedTuple):
@@ -55,6 +64,7 @@ class Nesting(NamedTuple):
     shells: Any
     sizes: Any
     rule: int
+    """Of `Rule`, as an int: kernels are compiled for that."""
 
 
 Holders = namedtuple("Holders", "held place stamp link first entered ring after region beyond offset")
@@ -73,14 +83,14 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
     Of winding numbers and labels: return the one beyond, ``n_held`` being the one here.
     """
     chain = half >> 1
-    if nesting.rule == PAIR:
+    if nesting.rule == Rule.PAIR:
         return n_held ^ chains.mask[chain]
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
-        if NON_ZERO <= nesting.rule <= NEGATIVE:
+        if Rule.NON_ZERO <= nesting.rule <= Rule.NEGATIVE:
             n_held += 1 if (chains.stands[chain] ^ half) & 1 else -1
         else:
-            source = ring if nesting.rule == AGAIN else nesting.shells[ring]
+            source = ring if nesting.rule == Rule.AGAIN else nesting.shells[ring]
             if h.place[source] < 0:
                 h.place[source], h.held[n_held] = n_held, source
                 n_held += 1
@@ -96,11 +106,11 @@ def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int
 @merged
 def _part_of(rule: int, h: Holders, kept: FlagArray, n_held: int) -> int:
     """Return the part of the result that a face is in, 0 for none, by a rule other than AGAIN."""
-    if rule == PAIR:
+    if rule == Rule.PAIR:
         return int(kept[n_held])
-    if rule == FIRST_ALONE:
+    if rule == Rule.FIRST_ALONE:
         return int(n_held == 1 and h.place[0] == 0)
-    return int(n_held < 0 if rule == NEGATIVE else n_held > 0 if rule != NON_ZERO else n_held != 0)
+    return int(n_held < 0 if rule == Rule.NEGATIVE else n_held > 0 if rule != Rule.NON_ZERO else n_held != 0)
 
 
 @merged
@@ -161,7 +171,7 @@ def spread_sources(
             other = root_of(joined, cycle[half ^ 1])
             if h.entered[other] == _NOT_YET:
                 n_held = _cross(given, chains, nesting, h, half, n_held)
-                if nesting.rule != AGAIN:
+                if nesting.rule != Rule.AGAIN:
                     inside[other] = _part_of(nesting.rule, h, kept, n_held)
                 else:
                     inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)

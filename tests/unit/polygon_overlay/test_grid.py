@@ -32,7 +32,7 @@ def assert_on_grid(vertices: np.ndarray, size: float) -> None:
 
 
 def snapped_in_fractions(result: engine.Overlay, size: float) -> Any:
-    """Snap the valid rings of an overlay by arrangement/snap_rounding.py, and return the area of their union."""
+    """Snap the valid rings of an overlay by `snap_rings`, and return the area of their union."""
     rings = [[(Fraction(x), Fraction(y)) for x, y in ring.tolist()] for ring in result.rings]
     snapped, _ = snap_rings(rings, round(np.log2(size)))
     shells = result.piece_offsets.tolist()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.in_integers import arranged_again, overlay_exactly
 from engine.polygon_overlay.pair_arrays import one_pair
 from engine.running.budget import Budget
@@ -37,4 +37,4 @@ def test_valid_rings_arranged_again_are_themselves() -> None:
     found = arranged_again(given, Budget())
     assert found.vertices.tolist() == vertices.tolist()
     assert (found.ring_offsets.tolist(), found.piece_offsets.tolist()) == ([0, 4, 7, 10, 13], [0, 3, 4])
-    assert (found.status[0], found.evidence.tolist()) == (DONE, [[ring, ring] for ring in range(4)])
+    assert (found.status[0], found.evidence.tolist()) == (PairStatus.DONE, [[ring, ring] for ring in range(4)])

@@ -10,7 +10,7 @@ import pytest
 
 from engine.polygon_overlay import rounds as overlay_rounds
 from engine.polygon_overlay.batch import overlay_batch
-from engine.polygon_overlay.compiled.kernel import MAY_CROSS
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.pair_arrays import Found, gathered, joined, taken
@@ -169,7 +169,7 @@ def doubtful() -> Found:
 
 def test_pairs_together_are_pairs_alone() -> None:
     found = doubtful()
-    n_doubtful = int((found.status == MAY_CROSS).sum())
+    n_doubtful = int((found.status == PairStatus.MAY_CROSS).sum())
     assert n_doubtful > 3
     together = settle_pairs(found, arranged_again, Budget())
     assert len(together.pairs) <= n_doubtful

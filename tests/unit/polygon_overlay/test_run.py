@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay.batch import overlay_batch
-from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.pair_arrays import gathered
 from engine.polygon_overlay.result import Overlay
@@ -128,6 +128,6 @@ def test_room_is_made() -> None:
     comb = np.concatenate([teeth, [[n, 0.0], [0, 0.0]]])
     sides = [gathered([Polygon([each])] * 3) for each in (comb, comb[:, ::-1])]
     found = run_kernel(*sides, KEPT_ARRAYS["intersection"], Budget())
-    assert found.status.tolist() == [DONE] * 3
+    assert found.status.tolist() == [PairStatus.DONE] * 3
     assert len(set(found.counts[:, 0].tolist())) == 1
     assert found.counts[0, 0] > n * (n - 2)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from engine.errors import DeadlineExceededError
-from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import parts_exactly
 from engine.polygon_overlay.pair_arrays import Chosen, gathered
@@ -99,7 +99,7 @@ def test_rings_that_cross_themselves(pytestconfig: pytest.Config) -> None:
         pair = [Polygon([rng.integers(0, size, (rng.integers(3, 8), 2)) for _ in range(2)]) for _ in range(2)]
         one, other = (gathered([each]) for each in pair)
         with Budget(None, None) as budget:
-            n_settled += int(run_kernel(one, other, EACH_PART, budget).status[0] == DONE)
+            n_settled += int(run_kernel(one, other, EACH_PART, budget).status[0] == PairStatus.DONE)
             found = touching(Chosen(one, np.arange(1)), Chosen(other, np.arange(1)), budget)
             exact, places = parts_exactly(RingArrays(*one[:2]), RingArrays(*other[:2]), budget)
         parts = exact.evidence[:, 1]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.polygon_overlay.compiled.ring_nesting import ANY, NEGATIVE, NON_ZERO, POSITIVE, Nesting
+from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import less_all
@@ -25,9 +25,9 @@ from tests.unit.polygon_overlay.compiled.test_kernel import arrays
 from tests.unit.polygon_overlay.families import FAMILIES, Random, Rings, drawn
 
 RULES: dict[str, tuple[int, Callable[[int], bool]]] = {
-    "non_zero": (NON_ZERO, lambda winding: winding != 0),
-    "positive": (POSITIVE, lambda winding: winding > 0),
-    "negative": (NEGATIVE, lambda winding: winding < 0),
+    "non_zero": (Rule.NON_ZERO, lambda winding: winding != 0),
+    "positive": (Rule.POSITIVE, lambda winding: winding > 0),
+    "negative": (Rule.NEGATIVE, lambda winding: winding < 0),
 }
 
 
@@ -178,7 +178,7 @@ def test_integers_agree(draw: Callable[[Random], list[Rings]], seed: int) -> Non
     layer = draw(np.random.default_rng(seed))
     sources = np.repeat(np.arange(len(layer)), [len(rings) for rings in layer])
     rings = arrays([ring for rings in layer for ring in rings])
-    exact, _ = overlay_exactly(rings, NOTHING, "union", Budget(), Nesting(sources, np.zeros(0), ANY))
+    exact, _ = overlay_exactly(rings, NOTHING, "union", Budget(), Nesting(sources, np.zeros(0), Rule.ANY))
     result = engine.union_all([engine.Polygon(rings) for rings in layer])
     for name in ("vertices", "ring_offsets", "piece_offsets", "area_exact", "n_pieces_exact", "n_holes_exact"):
         assert np.array_equal(getattr(exact, name), getattr(result, name)), name

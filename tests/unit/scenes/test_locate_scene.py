@@ -15,8 +15,8 @@ from engine.running.budget import Budget
 from engine.scenes import locate as locate_module
 from engine.scenes.bodies import Bodies
 from engine.scenes.locate import locate_all
-from engine.scenes.located import BALL, BOX, BY_ITSELF, MESH, RINGS, ROWS
 from engine.scenes.standing import Standing
+from engine.solids.registry import BodyKind
 from engine.types import read_only
 from tests.reference.containment import locate as reference
 from tests.unit.containment.scenes import box_mesh, lattice_points, lattice_solids, made, merged, spelled
@@ -262,7 +262,8 @@ def test_kinds_and_slots_of_the_plane() -> None:
     solids = [ball, ring, box, half, triangle, wedge, many, other, ring, ball]
     with Budget() as budget:
         tables = Bodies(tuple(solids), (*[None] * 9, Pose.identity(2))).tables(budget)
-    assert tables.kinds.tolist() == [BALL, RINGS, BOX, ROWS, RINGS, ROWS, BY_ITSELF, BY_ITSELF, RINGS, BALL]
+    names = "BALL RINGS BOX ROWS RINGS ROWS OTHER OTHER RINGS BALL"
+    assert tables.kinds.tolist() == [BodyKind[name] for name in names.split()]
     first = tables.rings[tables.polygon_offsets[tables.slots[8]] + 1, 0]
     assert (tables.xs[first : first + 4].tolist(), tables.ys[first : first + 4].tolist()) == (
         [1, 2, 1, 1],
@@ -277,6 +278,6 @@ def test_polyhedra_have_the_trees_that_are_there() -> None:
     with Budget() as budget:
         for has_tree in (False, True):
             tables = Bodies((solid,), (None,)).tables(budget)
-            assert tables.kinds.tolist() == [MESH]
+            assert tables.kinds.tolist() == [BodyKind.MESH]
             assert bool(tables.addresses.any()) == has_tree
             tree_of(solid)

@@ -13,10 +13,11 @@ from engine.scenes.bodies import Bodies
 from engine.scenes.near_boxes import MOST_MET, scratch_for
 from engine.scenes.posed_mesh import WANTS_BODY
 from engine.scenes.standing import Standing
-from engine.scenes.through import BodyKind, cut_near
+from engine.scenes.through import cut_near
 from engine.segment_clipping.exact_pieces import compare
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
 from engine.segment_clipping.profiles import exact_pieces
+from engine.solids.registry import BodyKind
 from tests.unit.scenes.scenes import FACES, OCTAHEDRON
 
 BODIES: list[Solid] = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.textbook import clip_polygons, clip_segments, greiner_hormann
+from engine.textbook import clip_polygons, clip_segments
 from engine.textbook.clip_segments import ACCEPTED, REJECTED, UNFINISHED
 from tests.reference.overlay import overlay, signed_area
 from tests.reference.segments import clip_segment
@@ -124,19 +124,19 @@ def test_polygon_on_concave_polygon() -> None:
         [[0, 0], [5, 0], [5, 4], [4, 4], [4, 1], [3, 1], [3, 4], [2, 4], [2, 1], [1, 1], [1, 4], [0, 4]], float
     )
     bar = np.array([[-0.5, 2.0], [5.5, 2.25], [5.5, 3.0], [-0.5, 3.25]])
-    rings = greiner_hormann.intersection(comb, bar)
+    rings = clip_polygons.intersection(comb, bar)
     exact = overlay(polygon(comb.tolist()), polygon(bar.tolist()), "intersection")
     assert len(rings) == len(exact.pieces) == 3
     assert sum(abs(signed_area(ring.tolist())) for ring in rings) == pytest.approx(float(exact.area), rel=1e-14)
     small = np.array([[0.25, 0.25], [0.5, 0.25], [0.5, 0.5]])
-    assert greiner_hormann.intersection(comb, small)[0].tolist() == small.tolist()
-    assert greiner_hormann.intersection(small, comb)[0].tolist() == small.tolist()
-    assert greiner_hormann.intersection(small + 10.0, comb) == []
+    assert clip_polygons.intersection(comb, small)[0].tolist() == small.tolist()
+    assert clip_polygons.intersection(small, comb)[0].tolist() == small.tolist()
+    assert clip_polygons.intersection(small + 10.0, comb) == []
 
 
 def test_polygon_on_concave_polygon_is_wrong_when_edges_overlap() -> None:
     first, second = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float), np.array([[0, 0], [2, 0], [2, 6], [0, 6]], float)
     exact = overlay(polygon(first.tolist()), polygon(second.tolist()), "intersection")
-    found = greiner_hormann.intersection(first, second)
+    found = clip_polygons.intersection(first, second)
     assert exact.area == 8
     assert sum(abs(signed_area(ring.tolist())) for ring in found) != 8

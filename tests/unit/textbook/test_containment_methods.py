@@ -7,7 +7,7 @@ from math import pi, tan
 import numpy as np
 import pytest
 
-from engine.textbook import polygons, polyhedra, solids, triangles
+from engine.textbook import polygons, polyhedra, solids
 from tests.reference.containment import locate, locate_many
 from tests.reference.shapes import box, polygon, reversed_faces, union_of
 from tests.reference.shapes import half_space as half_space_solid
@@ -147,22 +147,22 @@ def test_triangle_methods_agree() -> None:
     for order in ([0, 1, 2], [1, 0, 2]):
         for axes in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
             turned = np.ascontiguousarray(triangle[order][:, axes])
-            assert (triangles.by_products(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
-            assert (triangles.by_projection(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
+            assert (solids.by_products(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
+            assert (solids.by_projection(np.ascontiguousarray(points[:, axes]), turned) == expected).all()
 
 
 def test_triangle_methods_are_wrong_beside_an_edge() -> None:
     triangle = [[8.8, 1.7000000000000002, 0.1], [1.9000000000000001, 9.8, 0.7], [1.9000000000000001, 4.9, 0.3]]
     point = [4.524423672699365, 6.719154819005095, 0.47178924585222914]
     assert locate(point, {"type": "triangle", "vertices": triangle}) == -1
-    assert triangles.by_products(np.array([point]), np.array(triangle))[0]
-    assert triangles.by_projection(np.array([point]), np.array(triangle))[0]
+    assert solids.by_products(np.array([point]), np.array(triangle))[0]
+    assert solids.by_projection(np.array([point]), np.array(triangle))[0]
 
 
 def test_prism_of_a_tiny_triangle_holds_everything() -> None:
     """The normal underflows to zero, and every product is >= 0."""
     tiny = np.array([[0.0, 0.0, 0.0], [1e-170, 0.0, 0.0], [0.0, 1e-170, 0.0]])
-    assert triangles.by_products(np.array([[5.0, 5.0, 5.0]]), tiny)[0]
+    assert solids.by_products(np.array([[5.0, 5.0, 5.0]]), tiny)[0]
 
 
 def test_csg_tree() -> None:

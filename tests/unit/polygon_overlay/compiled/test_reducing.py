@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from engine.polygon_overlay.compiled.kernel import DONE
+from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.reducing import count_left_out, expand_rings
 from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
@@ -112,7 +112,7 @@ def compare(subject: Rings, clip: Rings, operation: Operation, size: int, has_ar
     found = run_blocks(*sides, largest, KEPT_ARRAYS[operation], Budget(), size=size, most=2.0)
     if found is None:
         return False
-    if expected.status[0] == DONE:
+    if expected.status[0] == PairStatus.DONE:
         for name in ("vertices", "ring_offsets", "piece_offsets"):
             assert getattr(found, name).tobytes() == getattr(expected, name).tobytes()
         if has_area:
