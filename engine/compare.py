@@ -34,20 +34,34 @@ MOST_STEPS: Final = 1 << 24
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What both said, how long it took them, and where they differ."""
+    """Both answers, the time of each, and where they differ.
+
+    Attributes
+    ----------
+    method : str
+        The textbook's method.
+    methods : tuple of str
+        All methods that the textbook has for this question.
+    exact : ndarray
+        For each item whether it is contained, collides or is left; of segments rows of both ends, NaN where removed.
+    plain : ndarray
+        The same in plain float64.
+    differing : ndarray of int64
+        Items that plain float64 decides wrongly, ascending.
+    inexact : ndarray of int64
+        Items decided rightly, with a coordinate that is not the double nearest to the exact one, ascending.
+    seconds_exact, seconds_plain : float
+        For all items.
+    accuracy : Accuracy
+        Of the exact answer.
+    """
 
     method: str
-    """The textbook's method."""
     methods: tuple[str, ...]
-    """All that the textbook has for this question."""
     exact: BoolArray | FloatArray
-    """For each item whether it is contained, collides or is kept; of segments rows of both ends, NaN where removed."""
     plain: BoolArray | FloatArray
-    """The same in plain float64."""
     differing: IntArray
-    """Items that plain float64 decides wrongly, ascending."""
     inexact: IntArray
-    """Items decided rightly, with a coordinate that is not the double nearest to the exact one, ascending."""
     seconds_exact: float
     seconds_plain: float
     accuracy: Accuracy
@@ -62,25 +76,51 @@ def compare(
 ) -> Comparison:
     """Answer a question exactly and by the textbook's plain float64 method.
 
-    Both are asked about one item before, so that kernels are there, and then timed on all.
-
     Parameters
-        operation: "contains" (points, solid), "collide" (first, second), "clip_segments" (segments, region) or
-            "clip_polygons" (an ``(n, size, dim)`` array of polygons of one ring, region).
-        arguments: those of the engine's function of that name.
-        method: one of the textbook's methods for this question; None for the first. A wrong name lists them.
-        deadline: seconds; cancel: a switch. One pair of bodies is not interrupted, but refused if it is too large.
-    Boundary: what is on the boundary is contained, bodies that touch collide, a segment that touches is kept.
-    Degenerate input: as the engine's function takes it; the textbook's methods give whatever they give.
-    Accuracy: the exact answer is exact, coordinates correctly rounded; the other has no bound at all.
-    Cost: that of both methods; those of the textbook pass over all faces for every point.
-    Raises: InvalidOperationError, UnsupportedSolidError, WrongDimensionError, TooComplexError and what the engine's
-        function raises.
-    Source: the textbook's section 22.4, file by file in `engine.textbook`.
+    ----------
+    operation : {"contains", "collide", "clip_segments", "clip_polygons"}
+        "contains" (points, solid), "collide" (first, second), "clip_segments" (segments, region) or "clip_polygons" (an
+        ``(n, size, dim)`` array of polygons of one ring, region).
+    *arguments
+        Those of the engine's function of that name.
+    method : str, optional
+        One of the textbook's methods for this question; the first by default. A wrong name lists them.
+    deadline, cancel
+        As for `locate`. One pair of bodies is not interrupted, but refused if it is too large.
 
+    Returns
+    -------
+    Comparison
+        Both answers, the time of each, and the items on which they differ.
+
+    Raises
+    ------
+    InvalidOperationError, UnsupportedSolidError, WrongDimensionError, TooComplexError
+        The question, solid or size is not taken.
+    EngineError
+        As the engine's function.
+
+    Notes
+    -----
+    Both are asked about one item before, so that kernels are loaded, and then timed on all.
+
+    Boundary: what is on the boundary is contained, bodies that touch collide, a segment that touches is kept.
+
+    Degenerate input: as the engine's function takes it; the textbook's methods give whatever they give.
+
+    Accuracy: the exact answer is exact, coordinates correctly rounded; the other has no bound at all.
+
+    Cost: that of both methods; those of the textbook pass over all faces for every point.
+
+    References
+    ----------
+    The textbook, section 22.4, file by file in `engine.textbook`.
+
+    Examples
+    --------
     >>> from engine import HalfSpace, compare
-    >>> found = compare("contains", [[0.1, 0.3], [0.1, 0.2]], HalfSpace([3.0, -1.0], 0.0))
-    >>> found.method, found.exact.tolist(), found.plain.tolist(), found.differing.tolist()
+    >>> both = compare("contains", [[0.1, 0.3], [0.1, 0.2]], HalfSpace([3.0, -1.0], 0.0))
+    >>> both.method, both.exact.tolist(), both.plain.tolist(), both.differing.tolist()
     ('half-space', [True, True], [True, True], [])
     """
     if not isinstance(operation, str) or operation not in OPERATIONS:

@@ -114,14 +114,22 @@ class Rcc8(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """What one call can say of its own accuracy and cost.
+    """What one call reports of its own accuracy and cost.
 
-    decisions: "exact", or "float64" where a caller's own callable decides.
-    coordinates_ulp: bound on each constructed coordinate in units in the last place; None where none is constructed.
-    n_items: items asked for (points, segments, poses, pairs, contours).
-    n_beyond_filter: items that the floating-point filter left open (an upper bound where a kernel counts by stages).
-    n_rational: items of those that needed rational arithmetic.
-    method: the method chosen, a stable short name.
+    Attributes
+    ----------
+    decisions : str
+        "exact", or "float64" where a caller's own callable decides.
+    coordinates_ulp : float or None
+        Bound on each constructed coordinate in units in the last place; None where none is constructed.
+    n_items : int
+        Items asked for (points, segments, poses, pairs, contours).
+    n_beyond_filter : int
+        Items that the floating-point filter left open (an upper bound where a kernel counts by stages).
+    n_rational : int
+        Of those, the items that needed rational arithmetic.
+    method : str
+        The method chosen, a stable short name.
     """
 
     decisions: Literal["exact", "float64"]

@@ -47,12 +47,29 @@ _lock = threading.Lock()
 
 
 def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1) -> None:
-    """Compile or load every kernel; the second call returns at once.
+    """Compile or load every kernel; a second call returns at once.
 
+    Parameters
+    ----------
+    progress : callable, optional
+        Called with hundredths of all the work as they are done, 100 in the end: ``tqdm(total=100).update`` fits.
+    processes : int, default 1
+        Where nothing is cached, up to so many more processes are started that compile (up to 1 GB each), and end.
+
+    Raises
+    ------
+    InvalidInputError
+        For options of a wrong type.
+
+    Notes
+    -----
     Takes some minutes where nothing is cached, else a second or two; what is compiled is logged. Safe to call from
     several threads (the others wait) and processes (each compiles what it does not find).
-    progress: called with hundredths of all the work as they are done, 100 in the end: ``tqdm(total=100).update`` fits.
-    processes: where nothing is cached, up to so many more are started that compile (up to 1 GB each), and end.
+
+    Examples
+    --------
+    >>> import engine
+    >>> engine.warm(processes=2)  # doctest: +SKIP
     """
     check_options(None, progress)
     if isinstance(processes, bool) or not isinstance(processes, int) or processes < 1:

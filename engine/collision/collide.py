@@ -153,32 +153,77 @@ def collide(
     progress: Progress | None = None,
     report: bool = False,
 ) -> result.Collision | tuple[result.Collision, Accuracy]:
-    """Decide how two solids lie to each other, exactly, and name one reason.
+    """Decide how two solids relate, exactly, and name a witness.
 
-    Solids are closed sets. The first true line decides: no common point, disjoint; the first within the open interior
-    of the second, first_inside_second; the other way, second_inside_first; the open interiors meet, overlapping; else
-    touching. Bodies without interior (surfaces, flat boxes, faces that all cancel) never overlap. For many poses of one
-    pair use `collide_poses`, for many bodies `collide_scene`.
+    Parameters
+    ----------
+    first, second : Solid
+        In 3D polyhedron, surface, aabb, sphere, half_space; in 2D polygon, triangle, aabb, sphere, half_space.
+    first_pose, second_pose : Pose, optional
+        Poses of the bodies; omit for the identity.
+    boolean : bool, default False
+        Only decide disjoint or not; any other relation may be answered as touching, sooner, without a witness.
+    witness : bool, default True
+        False where no witness is needed.
+    detail : bool, default False
+        Also decide which of the eight relations of RCC-8 (`Rcc8`) holds, in `Collision.detail`.
+    workers, progress : optional
+        Accepted by every operation; one pair is one item.
+    deadline, cancel, report
+        As for `locate`.
 
-    Parameters: first, second: 3D polyhedron, surface, aabb, sphere, half_space; 2D polygon, triangle, aabb, sphere,
-    half_space. first_pose, second_pose: exact affine images as given, None for none. boolean: disjoint or not is all
-    that is wanted; any other relation may then be answered as touching, sooner, without a witness. witness: False where
-    no reason is wanted. detail: say which of the eight relations of RCC-8 (`Rcc8`) too, in `Collision.detail`: disjoint
-    is DC, touching EC, inside NTPP, NTPPi;
-    overlapping becomes PO, EQ, or TPP and TPPi where one body lies in the other and the boundaries meet. Containment
-    and equality are of the closures of the open interiors, so walls that cancel do not count; they count as boundary.
-    None where a body has no interior (flat, radius 0, all faces cancel); a surface is refused. workers, progress: taken
-    for uniformity, one pair is one item. deadline: seconds. report: return an `Accuracy` too.
-    Returns: a `Collision`: the relation, and a witness unless disjoint. Among several contacts the witness names one;
-    which one depends on the order of the faces, never on threads.
-    Boundary: one common point is enough to touch. Degenerate input: faces without area count as the segment or point
-    they are; walls that cancel under even-odd are part of the body but bound no interior.
+    Returns
+    -------
+    Collision
+        The relation, and a witness unless disjoint; with ``report=True`` a pair of it and an `Accuracy`. Among several
+        contacts the witness names one; which one depends on the order of the faces, never on threads.
+
+    Raises
+    ------
+    UnsupportedSolidError, UnsupportedPairError, WrongDimensionError, InvalidArrayError
+        For solids or poses that are not accepted.
+    InvalidInputError
+        For `boolean` together with `detail`.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    Solids are closed sets. The first true line decides:
+
+    | condition | relation |
+    | --- | --- |
+    | no common point | disjoint |
+    | the first lies in the open interior of the second | first_inside_second |
+    | the second lies in the open interior of the first | second_inside_first |
+    | the open interiors meet | overlapping |
+    | else | touching |
+
+    RCC-8: disjoint is DC, touching EC, inside NTPP or NTPPi; overlapping becomes PO, EQ, or TPP and TPPi where one body
+    lies in the other and the boundaries meet. It compares the closures of the open interiors, so walls that cancel
+    count as boundary only. It is None where a body has no interior (flat, radius 0, all faces cancel); a surface is
+    refused.
+
+    Boundary: one common point is enough to touch.
+
+    Degenerate input: faces without area count as the segment or point they are; walls that cancel under even-odd are
+    part of the body but bound no interior. Bodies without interior never overlap.
+
     Accuracy: exact for all finite input, under poses too.
-    Cost: two trees, built once per solid; then about the number of pairs of faces near each other. detail: nothing more
-    where faces cross, some 20 us for each face in contact where bodies lie flush, 1 ms for one that the other cuts.
-    Raises: UnsupportedSolidError, UnsupportedPairError, WrongDimensionError, InvalidArrayError, InvalidInputError
-    (boolean with detail), DeadlineExceededError, CancelledError.
 
+    Cost: two trees, built once per solid; then about the number of pairs of faces near each other. `detail`: nothing
+    more where faces cross, some 20 us for each face in contact where bodies lie flush, 1 ms for one that the other
+    cuts.
+
+    For many poses of one pair use `collide_poses`, for many bodies `collide_scene`.
+
+    References
+    ----------
+    Guigue, Devillers, Fast and robust triangle-triangle overlap test using orientation predicates, 2003; Randell, Cui,
+    Cohn, A spatial logic based on regions and connection, 1992 (RCC-8).
+
+    Examples
+    --------
     >>> from engine import Aabb
     >>> collide(Aabb([0, 0, 0], [1, 1, 1]), Aabb([1, 0, 0], [2, 1, 1])).relation.label
     'touching'

@@ -53,20 +53,53 @@ def collide_poses(
     progress: Progress | None = None,
     report: bool = False,
 ) -> PoseCollisions | tuple[PoseCollisions, Accuracy]:
-    """Decide how `first` lies to `second` moved by each of many poses, exactly.
+    """Decide how `first` relates to `second` moved by each of many poses, exactly.
 
-    The structures of both solids are built once; most poses are decided in compiled code, in parallel chunks. Time is
-    discrete: two poses may be free while a motion between them collides.
+    Parameters
+    ----------
+    first, second : Solid
+        As for `collide`.
+    rotations : array_like, shape (n_poses, d, d)
+        Row-major; vertices map exactly to R p + t.
+    translations : array_like, shape (n_poses, d)
+        Of the second body.
+    witnesses : bool, default False
+        Also return the witness of every pose.
+    boolean : bool, default False
+        Only decide disjoint or not; any other relation may be answered as touching.
+    detail : bool, default False
+        Also decide the relation of RCC-8, as `collide`.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts poses.
 
-    Parameters: first, second: as for `collide`. rotations ``(n_poses, d, d)`` and translations ``(n_poses, d)``:
-    vertices map exactly to R p + t. witnesses: return the witness of every pose too. boolean: disjoint or not is all
-    that is wanted; any other relation may then be answered as touching. workers, deadline, cancel, progress (items
-    are poses), report: as everywhere.
-    Returns: ``(n_poses,) int8`` relations (`Relation`); with `witnesses` a pair of that and a list, None where
-    disjoint. Boundary, degenerate input, accuracy: as `collide`. Empty arrays give an empty answer.
-    Cost: per pose the pairs of faces near each other; a chunk of poses takes about 2 ms.
-    Raises: as `collide`; NotRigidError, NotFiniteError, InvalidArrayError name the pose.
+    Returns
+    -------
+    ndarray of int8, shape (n_poses,)
+        Codes of `Relation`. With `witnesses` a pair of it and a list of `Witness`, None where disjoint; with
+        ``report=True`` a pair of the answer and an `Accuracy`.
 
+    Raises
+    ------
+    NotRigidError, NotFiniteError, InvalidArrayError
+        The message names the pose.
+    EngineError
+        As `collide`.
+
+    Notes
+    -----
+    Only the given poses are tested: a collision between two poses is not detected.
+
+    Boundary, degenerate input, accuracy: as `collide`. Empty arrays give an empty answer.
+
+    Cost: the structures of both solids are built once; most poses are decided in compiled code, in parallel chunks of
+    about 2 ms. A pose costs the pairs of faces near each other.
+
+    References
+    ----------
+    Gottschalk, Lin, Manocha, OBBTree, 1996 (dual traversal); Snethen, XenoCollide, 2008 (convex pairs).
+
+    Examples
+    --------
     >>> from engine import Aabb
     >>> box = Aabb([0, 0, 0], [1, 1, 1])
     >>> turns = np.broadcast_to(np.eye(3), (3, 3, 3))

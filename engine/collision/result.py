@@ -36,13 +36,19 @@ SWAPPED_RELATION = {_IN: _AROUND, _AROUND: _IN}
 class Witness:
     """One reason why two bodies have a common point.
 
-    kind: how the two faces meet, or `containment`.
-    first_face, second_face: the caller's face of each body (aabb: 0..5 = xmin, xmax, ymin, ymax, zmin, zmax), -1 where
-        the body has no faces or the witness is a containment and this body is the one that contains; -1 for both in a
-        containment of boxes, or of outlines of the plane.
-    containing: for `containment` the body that contains, else "".
-    piercing: touching only: some point of one body lies in the open interior of the other, although the open interiors
-        do not meet (a surface, a flat body, or a wall that cancels).
+    Attributes
+    ----------
+    kind : str
+        How the two faces meet, or `containment`.
+    first_face, second_face : int
+        The caller's face of each body (aabb: 0..5 = xmin, xmax, ymin, ymax, zmin, zmax), -1 where the body has no faces
+        or the witness is a containment and this body is the one that contains; -1 for both in a containment of boxes,
+        or of outlines of the plane.
+    containing : str
+        For `containment` the body that contains, else "".
+    piercing : bool
+        Touching only: some point of one body lies in the open interior of the other, although the open interiors do not
+        meet (a surface, a flat body, or a wall that cancels).
     """
 
     kind: Kind
@@ -54,9 +60,16 @@ class Witness:
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """How two bodies lie to each other; `witness` is None when they are disjoint, or where none was asked for.
+    """How two bodies relate.
 
-    detail: which of the eight relations of RCC-8, where asked for; None where a body has no interior.
+    Attributes
+    ----------
+    relation : Relation
+        Disjoint, touching, overlapping, or one inside the other.
+    witness : Witness or None
+        What proves it; None when they are disjoint, or where none was asked for.
+    detail : Rcc8 or None
+        The relation of RCC-8, where asked for; None where a body has no interior.
     """
 
     relation: Relation
@@ -64,7 +77,13 @@ class Collision:
     detail: Rcc8 | None = None
 
     def swapped(self) -> Collision:
-        """Return the answer for the two bodies in the other order."""
+        """Return the answer for the two bodies in the other order.
+
+        Returns
+        -------
+        Collision
+            Relation, witness and detail are those of the second to the first.
+        """
         w, detail = self.witness, None if self.detail is None else self.detail.swapped
         if w is not None:
             w = Witness(w.kind, w.second_face, w.first_face, _SWAPPED[w.containing], w.piercing)
@@ -139,10 +158,18 @@ PartsFunction = Callable[[Any, Any, Poses, Work], Parts]
 class Feature(NamedTuple):
     """What of a body the nearest point lies on.
 
-    kind: vertex, edge or face; ball; plane (of a half_space). indices: of a vertex one index, of an edge two, the
-    smaller first, of a face its own; none of a ball or a plane. Vertices are numbered as given (polygon: over all
-    rings; aabb: bit k of a corner's number says low or high on axis k), of several at one position the first; aabb
-    faces are 0..5 = xmin, xmax, ymin, ymax, zmin, zmax. What lies inside a face is on it, whatever it was cut into.
+    Attributes
+    ----------
+    kind : str
+        vertex, edge or face; ball; plane (of a half_space).
+    indices : tuple of int
+        Of a vertex one index, of an edge two, the smaller first, of a face its own; none of a ball or a plane.
+
+    Notes
+    -----
+    Vertices are numbered as given (polygon: over all rings; aabb: bit k of a corner's number is 0 for low, 1 for high
+    on axis k), of several at one position the first; aabb faces are 0..5 = xmin, xmax, ymin, ymax, zmin, zmax. What
+    lies inside a face is on it, whatever it was cut into.
     """
 
     kind: Literal["vertex", "edge", "face", "ball", "plane"]
@@ -153,8 +180,14 @@ class Feature(NamedTuple):
 class Clearance:
     """How far apart two bodies are.
 
-    distance: the double nearest to the exact distance; 0.0 exactly where they have a common point. points: (2, d) a
-    point of each at that distance, and features what these lie on (`Feature`); None where they have a common point.
+    Attributes
+    ----------
+    distance : float
+        The double nearest to the exact distance; 0.0 exactly where they have a common point.
+    points : ndarray of float64, shape (2, d), or None
+        A point of each at that distance; None where they have a common point.
+    features : tuple of Feature, or None
+        What these points lie on.
     """
 
     distance: float

@@ -143,20 +143,46 @@ def collide_triangles(
     progress: Progress | None = None,
     report: bool = False,
 ) -> Int8Array | tuple[Int8Array, Accuracy]:
-    """Decide how each of many triangles lies to its partner, exactly.
+    """Decide how each of many triangles relates to its partner, exactly.
 
+    Parameters
+    ----------
+    first, second : array_like, shape (n_pairs, 3, d)
+        d is 2 or 3; either orientation.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts pairs.
+
+    Returns
+    -------
+    ndarray of int8, shape (n_pairs,)
+        Codes of `Relation`; with ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError
+        For arrays that break a rule; the message names the triangle.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
     In the plane triangles are solids, with all five relations; in space they are surfaces: disjoint or touching.
 
-    Parameters: first, second: ``(n_pairs, 3, d)`` float64, d 2 or 3, either orientation. workers, deadline, cancel,
-    progress (items are pairs), report: as everywhere.
-    Returns: ``(n_pairs,) int8`` of `Relation`; with report=True a pair of it and an `Accuracy`.
-    Boundary: one common point is enough to touch. Degenerate: a triangle without area is the segment or point it
-    covers, which has no interior: it may lie inside another, and never overlaps.
-    Accuracy: exact for all finite input. Cost: constant per pair; what orientation tests leave undecided by their
-    exponents, some 100 us.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, DeadlineExceededError, CancelledError.
-    Source: see this module, and triangle_triangle.
+    Boundary: one common point is enough to touch.
 
+    Degenerate input: a triangle without area is the segment or point it covers, which has no interior: it may lie
+    inside another, and never overlaps.
+
+    Accuracy: exact for all finite input.
+
+    Cost: constant per pair; some 100 us where exponents leave the orientation tests undecided.
+
+    References
+    ----------
+    Guigue, Devillers, 2003; separating axes after Gottschalk et al., OBBTree, 1996; the textbook, exercise 22.4-5.
+
+    Examples
+    --------
     >>> collide_triangles([[[0, 0], [4, 0], [0, 4]]], [[[1, 1], [2, 1], [1, 2]]]).tolist()
     [2]
     """

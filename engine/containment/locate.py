@@ -132,29 +132,60 @@ def locate(
 ) -> Int8Array | tuple[Int8Array, Accuracy]:
     """Locate points in a solid: `Location` INSIDE 1, BOUNDARY 0 or OUTSIDE -1 for each.
 
-    Polygons and polyhedra by ray and parity, convex solids by their planes, spheres by squared distance, implicit
-    solids by the sign of their polynomial, Boolean trees by max, min and min(A, -B) of their leaves. For many solids
-    at once use `locate_scene`.
-
     Parameters
-        points: ``(n_points, dimension)`` floats or integers, or nested lists; borrowed. None at all are welcome.
-        solid: any but a surface, of the same dimension.
-        workers: threads; None for one per core. deadline: seconds; cancel: a switch; progress: called with counts.
-        report: True to get an `Accuracy` as well.
-    Returns
-        ``(n_points,)`` int8; with report=True a pair of it and an `Accuracy`.
-    Boundary: BOUNDARY on any face or edge, even on one that another cancels under even-odd; on the on-on case of a
-        Boolean combination.
-    Degenerate input: zero-area faces and zero-length edges count for BOUNDARY only. A box with min = max and a sphere
-        of radius 0 have only boundary, and so has a plane triangle without area; the prism over a triangle of space
-        without area is all of space, all of it BOUNDARY, as the formula gives it.
-    Accuracy: exact for every finite input; an implicit solid made from a callable is decided by that callable.
-    Cost: few points pass once over the faces, with nothing prepared; many have lists built, linear in the solid's
-        size, after which a point costs some of the faces near it or over it.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, UnsupportedSolidError, DeadlineExceededError,
-        CancelledError.
-    Source: the textbook's section on containment; see the modules of the methods.
+    ----------
+    points : array_like, shape (n_points, dimension)
+        Floats or integers, or nested lists; borrowed, and may be empty.
+    solid : Solid
+        Any type but a surface, of the same dimension.
+    workers : int, optional
+        Threads; one a core by default.
+    deadline : float, optional
+        Seconds; after them the call ends with `DeadlineExceededError`.
+    cancel : Cancel, optional
+        A switch with which another thread ends the call.
+    progress : callable, optional
+        Called with the number of points done since the last call.
+    report : bool, default False
+        Also return an `Accuracy`.
 
+    Returns
+    -------
+    ndarray of int8, shape (n_points,)
+        With ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, UnsupportedSolidError
+        For arguments that break a rule; the message names the element.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    Methods: polygons and polyhedra by ray parity, convex solids by the signs of their planes, spheres by squared
+    distance, implicit solids by the sign of their polynomial, CSG trees by max, min and min(A, -B) of their leaves.
+
+    Boundary: BOUNDARY on any face or edge, even on one that another cancels under even-odd, and where both operands of
+    a CSG node have their boundary.
+
+    Degenerate input: zero-area faces and zero-length edges count for BOUNDARY only. A box with min = max, a sphere of
+    radius 0 and a plane triangle without area are all boundary; the prism over a triangle of space without area is all
+    of space, all of it BOUNDARY, as the formula gives it.
+
+    Accuracy: exact for every finite input; an implicit solid made from a callable is decided by that callable.
+
+    Cost: a small batch passes once over the faces, with nothing prepared. Larger ones have lists of faces built once,
+    linear in the solid's size; a point then costs some of the faces near it.
+
+    For many solids at once use `locate_scene`.
+
+    References
+    ----------
+    The textbook, section 22.4.1; docs/algorithms.md has the paper of each method.
+
+    Examples
+    --------
     >>> from engine import Aabb, locate
     >>> locate([[0.5, 0.5], [1.0, 0.2], [2.0, 2.0]], Aabb([0, 0], [1, 1])).tolist()
     [1, 0, -1]
@@ -207,13 +238,33 @@ def contains(
     progress: Progress | None = None,
     report: bool = False,
 ) -> BoolArray | tuple[BoolArray, Accuracy]:
-    """Tell for each point whether a solid, a closed set, holds it: `locate` is INSIDE or BOUNDARY.
+    """Return for each point whether a solid, a closed set, contains it: `locate` is INSIDE or BOUNDARY.
 
-    Parameters, cost, accuracy and errors are those of `locate`.
+    Parameters
+    ----------
+    points, solid, workers, deadline, cancel, progress, report
+        As for `locate`.
 
     Returns
-        ``(n_points,)`` bool; with report=True a pair of it and an `Accuracy`.
+    -------
+    ndarray of bool, shape (n_points,)
+        With ``report=True`` a pair of it and an `Accuracy`.
 
+    Raises
+    ------
+    EngineError
+        As `locate`.
+
+    Notes
+    -----
+    Boundary, degenerate input, accuracy and cost are those of `locate`.
+
+    References
+    ----------
+    The textbook, section 22.4.1.
+
+    Examples
+    --------
     >>> from engine import Sphere, contains
     >>> contains([[3.0, 4.0], [3.1, 4.0]], Sphere([0, 0], 5)).tolist()
     [True, False]

@@ -53,29 +53,65 @@ def clearance(
     progress: Progress | None = None,
     report: bool = False,
 ) -> Clearance | bool | tuple[Clearance | bool, Accuracy]:
-    """Say how far apart two solids are, or whether they are at least so far apart, exactly.
+    """Return how far apart two solids are, or whether they are at least a distance apart, exactly.
 
-    Solids are closed sets: one within another, or in contact, is 0 apart; one in a cavity of another is as far from it
-    as the walls are. For many poses of one pair use `clearance_poses`.
+    Parameters
+    ----------
+    first, second : Solid
+        All pairs that `collide` accepts.
+    first_pose, second_pose : Pose, optional
+        As for `collide`.
+    at_least : float, optional
+        A distance; the answer is then a bool.
+    workers, progress : optional
+        Accepted by every operation; one pair is one item.
+    deadline, cancel, report
+        As for `locate`.
 
-    Parameters: first, second, first_pose, second_pose: as for `collide`, all pairs that it takes. at_least: a distance;
-    the answer is then a bool. workers, progress: taken for uniformity, one pair is one item. deadline: seconds.
-    report: return an `Accuracy` too.
-    Returns: a `Clearance`; with at_least whether the exact distance is that or more, that itself counts (so 0 is always
-    true; `collide` tells whether they meet).
+    Returns
+    -------
+    Clearance
+        With `at_least` a bool: whether the exact distance is that or more (so 0 is always true). With ``report=True`` a
+        pair of the answer and an `Accuracy`.
+
+    Raises
+    ------
+    InvalidInputError
+        `at_least` is negative or not finite.
+    NotRepresentableError
+        The distance is beyond the largest double.
+    EngineError
+        As `collide`.
+
+    Notes
+    -----
+    Solids are closed sets: bodies in contact, or one within another, are 0 apart; a body in a cavity of another is as
+    far from it as the walls are.
+
     Boundary: 0.0 exactly where they have a common point; a positive distance that would round to 0 is the smallest
-    denormal. Degenerate input: as `collide`; radius 0, flat boxes and faces without area are bodies too.
-    Of several nearest pairs the one on the faces with the smallest numbers is given, the first body's first; where two
-    faces are as near along an edge or all over, one point of that: of boxes along the axes, with gaps from 1e-135 to
-    1e150, the one nearest to where the first one's face, or edge in the plane, begins.
+    denormal.
+
+    Degenerate input: as `collide`; radius 0, flat boxes and faces without area are bodies too. Of several nearest pairs
+    the one on the faces with the smallest numbers is given, the first body's first; where two faces are as near along
+    an edge or all over, one point of that: of boxes along the axes, with gaps from 1e-135 to 1e150, the one nearest to
+    where the first one's face, or edge in the plane, begins.
+
     Accuracy: the distance and each coordinate are the doubles nearest to the exact values, each on its own, so the
-    points given may be a little nearer or further. Poses are exact images, equal ones are left out, as by `collide`.
+    points given may be a little nearer or further. Poses are exact images, as for `collide`.
+
     Cost: boxes along the axes, balls and half-spaces some 4 us, small bodies of the plane 8. Others both trees, built
     once per solid; a search of 30 to 220 us for 1,000 to 20,000 faces, then integers for ties. Where sums of
     coordinates may exceed 1e300 every pair of faces is measured: right, and slow.
-    Raises: as `collide`; InvalidInputError (at_least negative or not finite); NotRepresentableError (the distance is
-    beyond the largest double).
 
+    For many poses of one pair use `clearance_poses`.
+
+    References
+    ----------
+    Hjaltason, Samet, Incremental distance join algorithms for spatial databases, 1998; Larsen, Gottschalk, Lin,
+    Manocha, Fast distance queries with rectangular swept sphere volumes, 2000.
+
+    Examples
+    --------
     >>> from engine import Aabb, Sphere
     >>> box = Aabb([0, 0, 0], [1, 1, 1])
     >>> clearance(box, Sphere([4, 5, 1], 2)).distance
@@ -161,15 +197,44 @@ def clearance_poses(
     progress: Progress | None = None,
     report: bool = False,
 ) -> FloatArray | BoolArray | tuple[FloatArray | BoolArray, Accuracy]:
-    """Say how far `first` is from `second` moved by each of many poses, or whether at least so far, exactly.
+    """Return how far `first` is from `second` moved by each of many poses, or whether at least a distance, exactly.
 
-    Parameters: first, second, rotations ``(n_poses, d, d)``, translations ``(n_poses, d)``: as for `collide_poses`.
-    at_least: a distance that every pose is held against. workers, deadline, cancel, progress (items are poses), report:
-    as everywhere.
-    Returns: ``(n_poses,) float64`` distances, each as `clearance` gives it; with at_least ``(n_poses,) bool``.
-    Boundary, degenerate input, accuracy: as `clearance`. Empty arrays give an empty answer.
-    Raises: as `clearance`; NotRigidError, NotFiniteError, InvalidArrayError name the pose.
+    Parameters
+    ----------
+    first, second : Solid
+        As for `collide`.
+    rotations : array_like, shape (n_poses, d, d)
+        As for `collide_poses`.
+    translations : array_like, shape (n_poses, d)
+        As for `collide_poses`.
+    at_least : float, optional
+        A distance that every pose is compared with.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts poses.
 
+    Returns
+    -------
+    ndarray of float64, shape (n_poses,)
+        Distances, each as `clearance` gives it; with `at_least` of bool. With ``report=True`` a pair of it and an
+        `Accuracy`.
+
+    Raises
+    ------
+    NotRigidError, NotFiniteError, InvalidArrayError
+        The message names the pose.
+    EngineError
+        As `clearance`.
+
+    Notes
+    -----
+    Boundary, degenerate input, accuracy and cost: as `clearance`, a pose each. Empty arrays give an empty answer.
+
+    References
+    ----------
+    As `clearance`.
+
+    Examples
+    --------
     >>> from engine import Aabb
     >>> box = Aabb([0, 0, 0], [1, 1, 1])
     >>> turns = np.broadcast_to(np.eye(3), (3, 3, 3))

@@ -36,12 +36,22 @@ _POSITION: Final = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FeatureRows:
-    """Features of an answer, made when asked for: ``len``, ``make(start, stop)``; and the collection's `crs`, if any.
+    """Features of an answer, made on request.
 
-    offsets: (n + 1,) how many vertices stand before each feature. collapsed: rows that rounding left nothing of.
-    As JSON: members(row) are those beside type and geometry, crs_text the `crs`, geometry(row) one that is passed
-    through; n_bytes: (n + 1,) bytes before each feature, at least.
-    areas: positions, and offsets of rings, of polygons and of rows, where the geometries are made; else None.
+    Attributes
+    ----------
+    offsets : ndarray of int64, shape (n + 1,)
+        How many vertices stand before each feature.
+    collapsed : int
+        Rows that rounding left nothing of.
+    crs_text : str
+        The collection's `crs` as JSON.
+    n_bytes : ndarray of int64, shape (n + 1,)
+        Bytes of JSON before each feature, at least.
+    areas : tuple or None
+        Positions, and offsets of rings, of polygons and of rows, where the geometries are made.
+    members, geometry : callable
+        ``members(row)``: the members beside type and geometry, as JSON; ``geometry(row)``: one that is passed through.
     """
 
     members: Callable[[int], bytes]
@@ -65,7 +75,18 @@ class FeatureRows:
         return None if self.crs_text is None else json.loads(self.crs_text)
 
     def make(self, start: int, stop: int) -> list[dict[str, Any]]:
-        """Return the features from one up to another."""
+        """Return features as dicts.
+
+        Parameters
+        ----------
+        start, stop : int
+            The first, and one past the last.
+
+        Returns
+        -------
+        list of dict
+            GeoJSON features.
+        """
         return [
             {"type": "Feature", **json.loads(b"{%b}" % self.members(row)), "geometry": self._geometry(row)}
             for row in range(start, stop)
@@ -97,10 +118,47 @@ def overlay_features(
     cancel: Cancel | None = None,
     report: bool = False,
 ) -> Answer:
-    """Overlay two FeatureCollections of polygons; rows and options as `engine.layers.overlay` on GeoDataFrames.
+    """Overlay two FeatureCollections of polygons.
 
-    Features with null geometry are kept with their properties where what is left of their layer is asked for.
-    Raises: as there, with the path to what is at fault, and its id.
+    Parameters
+    ----------
+    left, right : dict
+        GeoJSON FeatureCollections. Features with null geometry keep their properties where what is left of their layer
+        is part of the answer.
+    how : {"intersection", "union", "identity", "difference", "symmetric_difference"}
+        As `engine.layers.overlay`.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        With ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`, with the path to the element at fault and its id.
+
+    Notes
+    -----
+    Boundary, degenerate input, accuracy and cost: as `engine.layers.overlay`.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers
+    >>> def layer(low, high):
+    ...     ring = [[low, low], [high, low], [high, high], [low, high], [low, low]]
+    ...     geometry = {"type": "Polygon", "coordinates": [ring]}
+    ...     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
+    ...     return {"type": "FeatureCollection", "features": [feature]}
+    >>> rows = layers.overlay_features(layer(0, 2), layer(1, 3))
+    >>> rows.make(0, len(rows))[0]["geometry"]["coordinates"][0].tolist()
+    [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0]]
     """
     check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
@@ -125,7 +183,42 @@ def dissolve_features(
 ) -> Answer:
     """Unite the features of a FeatureCollection that agree in the properties `by`; all of them by default.
 
-    Groups stand in the order of their first features. Properties: those of `by`, and `count`, the features united.
+    Parameters
+    ----------
+    layer : dict
+        A GeoJSON FeatureCollection of polygons.
+    by : list of str, optional
+        Names of properties.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        Groups in the order of their first features. Properties: those of `by`, and `count`, the features united. With
+        ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`.
+
+    Notes
+    -----
+    Boundary, accuracy and cost: as `engine.union_all`, a group each.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers
+    >>> geometry = {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]}
+    >>> features = [{"type": "Feature", "properties": {"owner": "Ada"}, "geometry": geometry}] * 2
+    >>> rows = layers.dissolve_features({"type": "FeatureCollection", "features": features}, ["owner"])
+    >>> rows.make(0, len(rows))[0]["properties"]
+    {'owner': 'Ada', 'count': 2}
     """
     check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
@@ -170,8 +263,46 @@ def locate_features(
     cancel: Cancel | None = None,
     report: bool = False,
 ) -> Answer:
-    """Join each Point to the polygons that hold it, boundary included: a row each, with `boundary`, and properties of
-    both; outside: also a row for a point that nothing holds."""
+    """Join each Point to the polygons that contain it, boundary included.
+
+    Parameters
+    ----------
+    points, polygons : dict
+        GeoJSON FeatureCollections.
+    outside : bool, default False
+        Also a row for a point that no polygon contains.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        A row each, with `boundary`, and the properties of both. With ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`.
+
+    Notes
+    -----
+    Boundary: a point on a border that two polygons share is in both. Exact; cost as `engine.locate_scene`.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers
+    >>> def collection(kind, coordinates):
+    ...     geometry = {"type": kind, "coordinates": coordinates}
+    ...     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
+    ...     return {"type": "FeatureCollection", "features": [feature]}
+    >>> triangle = collection("Polygon", [[[0, 0], [2, 0], [0, 2], [0, 0]]])
+    >>> len(layers.locate_features(collection("Point", [1, 1]), triangle))
+    1
+    """
     check_options(None, None, report=report, outside=outside)
     limits = Limits(deadline, cancel)
     sides = [collection_of(points, ("points",), limits, ("Point",)), collection_of(polygons, ("polygons",), limits)]

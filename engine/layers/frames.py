@@ -52,22 +52,56 @@ def overlay(
 ) -> GeoDataFrame:
     """Overlay two layers of polygons, every feature with every one that it meets, as geopandas.overlay does.
 
-    The rows, their order, columns, suffixes and types are those of geopandas.overlay; the geometry is that of
-    `engine.overlay`: exact topology, coordinates rounded once, valid.
+    Parameters
+    ----------
+    left, right : GeoDataFrame
+        Of Polygon and MultiPolygon; missing and empty geometries are accepted.
+    how : {"intersection", "union", "identity", "difference", "symmetric_difference"}
+        As geopandas.
+    keep_geom_type : bool, optional
+        None is True, with a warning where rows without geometry are left out. False keeps these rows, and of every pair
+        the lines and points in which features meet without common area, alone or with the area in a GeometryCollection,
+        and those to which rounding collapses an area.
+    workers, deadline, cancel
+        As for `engine.locate`.
+    **others
+        No other option of geopandas is accepted: its precision and its repairs are not those of here.
 
-    Parameters: left, right: GeoDataFrames of Polygon and MultiPolygon; missing and empty geometries are welcome. how:
-    "intersection", "union", "identity", "difference" or "symmetric_difference". keep_geom_type: None (as True, with a
-    warning where rows without geometry are left out), True, or False, which keeps these rows, and of every pair the
-    lines and points in which features meet without common area, alone or with the area in a GeometryCollection, and
-    those to which rounding collapses an area. deadline in seconds. No other option of geopandas is taken: its precision
-    and its repairs are not those of here.
-    Boundary, degenerate input: features that only touch make no row, but with keep_geom_type=False. Lines bend where
-    borders do, and end where lines meet. A ring that crosses itself is even-odd; the parts of a MultiPolygon that
+    Returns
+    -------
+    GeoDataFrame
+        Rows, their order, columns, suffixes and types are those of geopandas.overlay; the geometry is that of
+        `engine.overlay`: exact topology, coordinates rounded once, valid.
+
+    Raises
+    ------
+    InvalidInputError
+        geopandas is not installed, or an option is not accepted.
+    InvalidOperationError, UnsupportedSolidError, NotFiniteError, NotRepresentableError
+        The message names the feature.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    Boundary, degenerate input: features that only touch make no row, but with ``keep_geom_type=False``. Lines bend
+    where borders do, and end where lines meet. A ring that crosses itself is even-odd; the parts of a MultiPolygon that
     overlap are united. A z is refused.
+
     Cost: that of `overlay_batch` on the pairs whose boxes meet, and some microseconds a feature; some 15 us more a pair
-    with keep_geom_type=False.
-    Raises: InvalidInputError where geopandas is not installed; InvalidOperationError, UnsupportedSolidError,
-    NotFiniteError (each names the feature), NotRepresentableError, DeadlineExceededError, CancelledError.
+    with ``keep_geom_type=False``.
+
+    References
+    ----------
+    geopandas.overlay, whose rows and columns these are.
+
+    Examples
+    --------
+    >>> import geopandas, shapely, engine
+    >>> parcels = geopandas.GeoDataFrame({"owner": ["Ada"]}, geometry=[shapely.box(0, 0, 2, 2)])
+    >>> floods = geopandas.GeoDataFrame({"year": [1962]}, geometry=[shapely.box(1, 1, 3, 3)])
+    >>> engine.layers.overlay(parcels, floods).geometry.area.tolist()
+    [1.0]
     """
     _check_frames("overlay", others, left=left, right=right)
     check_how(how)
@@ -98,12 +132,47 @@ def dissolve(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> GeoDataFrame:
-    """Unite the polygons of each group exactly, and gather their attributes, as GeoDataFrame.dissolve does.
+    """Unite the polygons of each group exactly, and aggregate their attributes, as GeoDataFrame.dissolve does.
 
-    Parameters: by, aggfunc as there, and of its options those about attributes: as_index, level, sort, observed,
-    dropna, and for aggfunc numeric_only, min_count, engine, engine_kwargs. Others are refused. deadline, cancel as
-    `overlay`. A group without polygons has an empty geometry.
-    Raises: as `overlay`, and InvalidInputError for what geopandas cannot group by or gather.
+    Parameters
+    ----------
+    layer : GeoDataFrame
+        Of polygons.
+    by, aggfunc
+        As GeoDataFrame.dissolve.
+    deadline, cancel
+        As for `engine.locate`.
+    **options
+        Those about attributes: as_index, level, sort, observed, dropna, and for aggfunc numeric_only, min_count,
+        engine, engine_kwargs. Others are refused.
+
+    Returns
+    -------
+    GeoDataFrame
+        A row a group. A group without polygons has an empty geometry.
+
+    Raises
+    ------
+    InvalidInputError
+        What geopandas cannot group by or aggregate.
+    EngineError
+        As `overlay`.
+
+    Notes
+    -----
+    Boundary, accuracy and cost: as `engine.union_all`, a group each.
+
+    References
+    ----------
+    GeoDataFrame.dissolve.
+
+    Examples
+    --------
+    >>> import geopandas, shapely, engine
+    >>> squares = [shapely.box(x, 0, x + 1, 1) for x in range(3)]
+    >>> parcels = geopandas.GeoDataFrame({"owner": ["Ada", "Ada", "Bo"]}, geometry=squares)
+    >>> engine.layers.dissolve(parcels, by="owner").geometry.area.tolist()
+    [2.0, 1.0]
     """
     _check_frames("dissolve", options, _ABOUT_ATTRIBUTES, layer=layer)
     geopandas, shapely = _geopandas()
@@ -137,10 +206,47 @@ def sjoin(
     cancel: Cancel | None = None,
     **others: Any,
 ) -> GeoDataFrame:
-    """Join points to the polygons that hold them, boundary included, decided exactly: geopandas.sjoin, "intersects".
+    """Join points to the polygons that contain them, boundary included, decided exactly: geopandas.sjoin, "intersects".
 
-    Parameters: left: of points; missing ones are in nothing. right: of polygons. how: "inner" or "left".
-    Raises: as `overlay`.
+    Parameters
+    ----------
+    left : GeoDataFrame
+        Of points; missing ones are in nothing.
+    right : GeoDataFrame
+        Of polygons.
+    how : {"inner", "left"}
+        As geopandas.
+    deadline, cancel
+        As for `engine.locate`.
+    **others
+        No other option of geopandas is accepted.
+
+    Returns
+    -------
+    GeoDataFrame
+        Rows and columns as geopandas.sjoin has them.
+
+    Raises
+    ------
+    EngineError
+        As `overlay`.
+
+    Notes
+    -----
+    Boundary: a point on a border that two polygons share is in both. Exact; cost as `engine.locate_scene`.
+
+    References
+    ----------
+    geopandas.sjoin.
+
+    Examples
+    --------
+    >>> import geopandas, shapely, engine
+    >>> wells = geopandas.GeoDataFrame({"depth": [9]}, geometry=[shapely.Point(1, 0.5)])
+    >>> squares = [shapely.box(x, 0, x + 1, 1) for x in (0, 1)]
+    >>> parcels = geopandas.GeoDataFrame({"owner": ["Ada", "Bo"]}, geometry=squares)
+    >>> engine.layers.sjoin(wells, parcels)["owner"].tolist()
+    ['Ada', 'Bo']
     """
     _check_frames("sjoin", others, left=left, right=right)
     _, shapely = _geopandas()

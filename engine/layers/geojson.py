@@ -296,7 +296,37 @@ def checked_each(there: list[int], side: Collection, check: Callable[[dict[str, 
 
 
 def polygon_of(geometry: Any) -> Polygon:
-    """Return a GeoJSON Polygon or MultiPolygon as one polygon, parts that overlap united."""
+    """Return a GeoJSON Polygon or MultiPolygon as one polygon, parts that overlap united.
+
+    Parameters
+    ----------
+    geometry : dict or object with `__geo_interface__`
+        A Polygon or MultiPolygon.
+
+    Returns
+    -------
+    Polygon
+        Even-odd over all rings.
+
+    Raises
+    ------
+    UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError, RingTooShortError
+        For another geometry or coordinates that break a rule.
+
+    Notes
+    -----
+    Boundary, accuracy: parts are united exactly, as by `engine.union_all`, where their boxes overlap.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers
+    >>> layers.polygon_of({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]})
+    Polygon(1 rings, 3 vertices)
+    """
     feature, limits = {"type": "Feature", "geometry": geometry}, Limits(None, None)
     side = collection_of({"type": "FeatureCollection", "features": [feature]}, ("geometry",), limits)
     return polygons_of(side, limits).arrays.polygon(0)

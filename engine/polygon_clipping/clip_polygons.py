@@ -41,12 +41,20 @@ class PolygonStatus(IntEnum):
 class ClippedPolygons(Ragged):
     """What is left of a batch of polygons, polygon by polygon, ring by ring.
 
-    vertices: (m, dim) float64, each coordinate the double nearest to the exact one.
-    ring_offsets: (r + 1,) int64, ring i holds the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``.
-    polygon_offsets: (n + 1,) int64, polygon i holds the rings ``polygon_offsets[i]`` up to ``polygon_offsets[i + 1]``.
-    contours: (r,) int64, the contour of its polygon that each ring is left of; contours that vanish are missing.
-    status: (n,) int8, a `PolygonStatus` for each polygon.
-    may_have_bridges: (n,) bool, whether edges along a plane may run there and back, or along another contour.
+    Attributes
+    ----------
+    vertices : ndarray of float64, shape (m, dim)
+        Each coordinate the double nearest to the exact one.
+    ring_offsets : ndarray of int64, shape (r + 1,)
+        Ring i has the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``.
+    polygon_offsets : ndarray of int64, shape (n + 1,)
+        Polygon i has the rings ``polygon_offsets[i]`` up to ``polygon_offsets[i + 1]``.
+    contours : ndarray of int64, shape (r,)
+        The contour of its polygon that each ring is left of; contours that vanish are missing.
+    status : ndarray of int8, shape (n,)
+        A `PolygonStatus` for each polygon.
+    may_have_bridges : ndarray of bool, shape (n,)
+        Whether edges along a plane may run there and back, or along another contour.
     """
 
     _levels: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets", "polygon_offsets")
@@ -61,7 +69,18 @@ class ClippedPolygons(Ragged):
         return len(self.status)
 
     def rings(self, polygon: int) -> list[FloatArray]:
-        """Return the rings left of one polygon, (k, dim) float64 each; borrowed."""
+        """Return the rings left of one polygon.
+
+        Parameters
+        ----------
+        polygon : int
+            Its place in the batch.
+
+        Returns
+        -------
+        list of ndarray, shape (k, dim)
+            Views of `vertices`.
+        """
         first, last = self.polygon_offsets[polygon : polygon + 2]
         pairs = zip(self.ring_offsets[first:last], self.ring_offsets[first + 1 : last + 1])
         return [self.vertices[i:j] for i, j in pairs]
@@ -94,41 +113,64 @@ def clip_polygons(
     progress: Progress | None = None,
     report: bool = False,
 ) -> ClippedPolygons | tuple[ClippedPolygons, Accuracy]:
-    """Return what Sutherland-Hodgman leaves of polygons on a convex region.
-
-    Each contour is cut by one plane after another: half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex in
-    row order; polyhedron in face order. The result is defined as the exact algorithm on the original input, however
-    long the cascade: a cut vertex stays exact until the end. It is connected: parts of a concave contour that fall
-    apart stay joined by bridge edges along a plane, harmless under the even-odd rule. For separate pieces of polygons
-    in the plane use `overlay`.
+    """Return what Sutherland-Hodgman leaves of polygons in a convex region.
 
     Parameters
-        polygons: `Polygon` solids, or lists of rings ((k, dim) numbers each, in 2D or 3D, planar or not), or an array
-            (n, k, dim) of n polygons of one ring. A ring of one or two vertices is a point or a segment.
-        region: half_space, aabb, convex, or a polyhedron that exact orientation certifies as convex.
-        workers, deadline (seconds), cancel, progress: see `engine.running.parallel`.
-        report: return ``(clipped, Accuracy)``.
-    Returns
-        `ClippedPolygons`; rings keep the direction of their contour, and start at its first vertex that is left.
-    Boundary
-        Counts as in: a contour in a plane is kept, one that touches in an edge or a point leaves two vertices or one.
-    Degenerate input
-        Vertices that coincide exactly one after another, around the ring, are merged into the first of them; vertices
-        that merely round to the same doubles are not. Spikes, repeated and self-crossing contours are clipped as they
-        are.
-    Bridges
-        `may_have_bridges` is False only where no bridge is possible: nothing is left, or at each plane that dropped a
-        vertex all contours of the polygon together met the plane in at most two points (vertices on it, edges through).
-    Accuracy
-        Decisions exact for every finite input; coordinates are the doubles nearest to the exact values, zero as +0.0.
-        Nothing overflows. An item too complex to finish is marked in `status` and spoils no other.
-    Cost
-        O(vertices x planes) for each polygon.
-    Raises
-        UnsupportedSolidError (a sphere would change the type of the result), InvalidArrayError, WrongDimensionError,
-        NotFiniteError, EmptyGeometryError, DeadlineExceededError, CancelledError.
+    ----------
+    polygons : sequence of Polygon, sequence of lists of rings, or array_like of shape (n, k, dim)
+        Rings are (k, dim) numbers in 2D or 3D, planar or not; the array has n polygons of one ring. A ring of one or
+        two vertices is a point or a segment.
+    region : Solid
+        half_space, aabb, convex, or a polyhedron that exact orientation certifies as convex.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts polygons.
 
-    >>> from engine.solids.primitives import HalfSpace
+    Returns
+    -------
+    ClippedPolygons
+        Rings keep the direction of their contour, and start at its first vertex that is left. With ``report=True`` a
+        pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    UnsupportedSolidError
+        A sphere, for example, would change the type of the result.
+    InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError
+        For arguments that break a rule; the message names the polygon.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    Each contour is cut by one plane after another: half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex in row
+    order; polyhedron in face order. The result is defined as the exact algorithm on the original input, however long
+    the cascade: a cut vertex stays exact until the end. It is connected: parts of a concave contour that fall apart
+    stay joined by bridge edges along a plane, harmless under the even-odd rule. For separate pieces of polygons in the
+    plane use `overlay`.
+
+    Boundary: counts as inside. A contour in a plane is kept, one that touches in an edge or a point leaves two vertices
+    or one.
+
+    Degenerate input: vertices that coincide exactly one after another, around the ring, are merged into the first of
+    them; vertices that merely round to the same doubles are not. Spikes, repeated and self-crossing contours are
+    clipped as they are.
+
+    Bridges: `may_have_bridges` is False only where no bridge is possible: nothing is left, or at each plane that
+    dropped a vertex all contours of the polygon together met the plane in at most two points (vertices on it, edges
+    through).
+
+    Accuracy: decisions exact for every finite input; coordinates are the doubles nearest to the exact values, zero as
+    +0.0. Nothing overflows. An item too complex to finish is marked in `status` and spoils no other.
+
+    Cost: O(vertices x planes) for each polygon.
+
+    References
+    ----------
+    Sutherland, Hodgman, Reentrant polygon clipping, 1974; the textbook, section 22.4.2.
+
+    Examples
+    --------
+    >>> from engine.solids.half_space import HalfSpace
     >>> clipped = clip_polygons([[[[0, 0], [4, 0], [0, 4]]]], HalfSpace(normal=[-1.0, 0.0], offset=1.0))
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]

@@ -77,31 +77,63 @@ def overlay(
 ) -> Overlay | tuple[Overlay, Accuracy]:
     """Combine two polygons; the result is separate pieces with holes.
 
-    An exact arrangement of both boundaries: nothing is assumed of the rings, which may cross, touch, overlap, repeat or
-    have no area. For a convex region, a connected result and 3D there is `clip_polygons`.
+    Parameters
+    ----------
+    subject, clip : Polygon
+        Even-odd over all rings, which may cross, touch, overlap, repeat or have no area.
+    operation : {"intersection", "union", "difference", "symmetric_difference"}
+        "difference" is the subject without the clip.
+    grid : float, optional
+        Snap the result to multiples of a power of two or ten (the doubles nearest to these), so that borders that
+        nearly coincide do. No edge moves by more than 0.71 of it and a unit in the last place; with it `area` is the
+        output's, counts and `collapsed` go from the overlay before it to the output.
+    workers : int, optional
+        Accepted and not used: one overlay runs in one thread.
+    deadline, cancel, report
+        As for `locate`.
+    progress : callable, optional
+        Called with 1 at the end.
 
-    Parameters: subject, clip: `Polygon`, even-odd over all rings. operation: "intersection", "union", "difference"
-    (subject without clip) or "symmetric_difference". grid: snap the result to multiples of a power of two or ten (the
-    doubles nearest to these), so that borders that nearly coincide do; no edge moves by more than 0.71 of it and a unit
-    in the last place; with it `area` is the output's, counts and `collapsed` go from the overlay before it to the
-    output. deadline in seconds; cancel: a switch for other threads; workers is accepted and not used, one overlay runs
-    in one thread; progress is called with 1 at the end.
-    Returns: `Overlay`: simple rings that cross nowhere, holes inside their shells; with report=True also an `Accuracy`,
-    whose items are the edges of the input, and whose coordinates_ulp is 0.5 unless vertices were moved to keep rings
-    valid: then it is the largest displacement in units in the last place of the largest coordinate.
+    Returns
+    -------
+    Overlay
+        Simple rings that cross nowhere, holes inside their shells. With ``report=True`` a pair of it and an `Accuracy`,
+        whose items are the edges of the input, and whose coordinates_ulp is 0.5 unless vertices were moved to keep
+        rings valid: then it is the largest displacement in units in the last place of the largest coordinate.
+
+    Raises
+    ------
+    UnsupportedSolidError, InvalidOperationError
+        For a solid that is no polygon, an unknown operation or grid.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    An exact arrangement of both boundaries. For a convex region, a connected result and 3D there is `clip_polygons`.
+
     Boundary: pieces are the connected parts of the open interior. Parts that meet in one point are separate, a hole
-    that touches its shell in a point stays a hole, walls between parts, spikes and shared edges vanish.
+    that touches its shell in a point stays a hole; walls between parts, spikes and shared edges vanish.
+
     Degenerate input: rings without area add nothing; an empty result has no pieces. Vertices on a straight stretch of
     the result's boundary are left out unless rings meet there, so equal point sets give equal rings.
-    Accuracy: topology, counts and area are those of exact arithmetic for every finite input. Rounding may move, join,
-    part or lose pieces: the result tells which (`collapsed`, `pieces_joined`, ...) and how far edges moved.
-    Cost: n log n for n edges, plus pairs of edges whose boxes overlap, plus about a microsecond per crossing;
-    twice that and more where rounding comes near other edges; some 10 us per edge and crossing where exponents lie
-    further than 2^240 apart; some 0.2 ms per vertex where twelve rounds of rounding do not end. An edge costs 27 to
-    40 ns, one of a stretch of a large ring that is near nothing 3 to 5; a call costs 4 us besides, which
-    `overlay_batch` spares, and up to as much again where fields of a small result are read first.
-    Raises: UnsupportedSolidError, InvalidOperationError, DeadlineExceededError, CancelledError.
 
+    Accuracy: topology, counts and area are those of exact arithmetic for every finite input. Rounding may move, join,
+    part or lose pieces: the result reports which (`collapsed`, `pieces_joined`, ...) and how far edges moved.
+
+    Cost: n log n for n edges, plus pairs of edges whose boxes overlap, plus about a microsecond per crossing; twice
+    that and more where rounding comes near other edges; some 10 us per edge and crossing where exponents lie further
+    than 2^240 apart; some 0.2 ms per vertex where twelve rounds of rounding do not end. An edge costs 27 to 40 ns, one
+    of a stretch of a large ring that is near nothing 3 to 5; a call costs 4 us besides, which `overlay_batch` spares,
+    and up to as much again where fields of a small result are read first.
+
+    References
+    ----------
+    Halperin, Sharir, Arrangements, Handbook of Discrete and Computational Geometry, 2018; Hobby, Practical segment
+    intersection with finite precision output, 1999.
+
+    Examples
+    --------
     >>> from engine import Polygon, overlay
     >>> result = overlay(Polygon([[(0, 0), (4, 0), (4, 4), (0, 4)]]), Polygon([[(2, 2), (6, 2), (6, 6), (2, 6)]]))
     >>> result.area, result.pieces[0].shell.tolist()
@@ -208,16 +240,43 @@ def union_all(
     progress: Progress | None = None,
     report: bool = False,
 ) -> Overlay | tuple[Overlay, Accuracy]:
-    """Unite any number of polygons, each even-odd within itself; the options are those of `overlay`.
+    """Unite any number of polygons, each even-odd within itself.
 
-    Parameters: polygons: a list of `Polygon`; none, or such without rings, unite to nothing.
-    Returns: `Overlay`, whose `sources` are places in the list; with report=True also an `Accuracy`, as of `overlay`.
+    Parameters
+    ----------
+    polygons : sequence of Polygon
+        None at all, or some without rings, unite to nothing.
+    grid : float, optional
+        As for `overlay`.
+    workers, deadline, cancel, progress, report
+        As for `overlay`.
+
+    Returns
+    -------
+    Overlay
+        Its `sources` are places in the list. With ``report=True`` a pair of it and an `Accuracy`, as of `overlay`.
+
+    Raises
+    ------
+    UnsupportedSolidError, InvalidArrayError, InvalidOperationError
+        For a solid that is no polygon, or a wrong grid.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
     Boundary, degenerate input, accuracy: as of `overlay`, whose union this is for two polygons. Borders that polygons
     share vanish where they are one line exactly; `grid` makes them so.
+
     Cost: n log n for n edges in all, plus about a microsecond per crossing: 1,000 circles of 64 vertices 11 ms, 14,400
     parcels that share all their edges 50 ms.
-    Raises: UnsupportedSolidError, InvalidArrayError, InvalidOperationError, DeadlineExceededError, CancelledError.
 
+    References
+    ----------
+    As `overlay`.
+
+    Examples
+    --------
     >>> from engine import Polygon, union_all
     >>> squares = [Polygon([[(x, 0), (x + 1, 0), (x + 1, 1), (x, 1)]]) for x in range(3)]
     >>> union_all(squares).pieces[0].shell.tolist()
@@ -241,17 +300,46 @@ def less_all(subject: Polygon, clips: Sequence[Polygon], budget: Budget) -> tupl
 def filled(rings: object, rule: FillRule, *, deadline: float | None = None, cancel: Cancel | None = None) -> Polygon:
     """Return what rings enclose under a fill rule of drawings, as a `Polygon`, which is even-odd.
 
-    A winding number counts how often rings run around a point counter-clockwise, less how often clockwise.
-    Parameters: rings: as those of `Polygon`; rule: "non_zero", "positive" or "negative", which winding numbers are
-    within.
-    Returns: a valid polygon: simple rings that cross nowhere, shells counter-clockwise, holes clockwise. No rings where
-    nothing is enclosed. Points without area (spikes, rings there and back) are not kept.
-    Accuracy: decisions exact; crossings are rounded as those of `overlay`.
-    Cost: that of `union_all`. Raises: as `Polygon`, InvalidOperationError, DeadlineExceededError, CancelledError.
+    Parameters
+    ----------
+    rings : sequence of rings
+        As those of `Polygon`.
+    rule : {"non_zero", "positive", "negative"}
+        Which winding numbers are inside.
+    deadline, cancel
+        As for `locate`.
 
+    Returns
+    -------
+    Polygon
+        Simple rings that cross nowhere, shells counter-clockwise, holes clockwise; no rings where nothing is enclosed.
+
+    Raises
+    ------
+    InvalidOperationError
+        The rule is unknown.
+    EngineError
+        As `Polygon`.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    A winding number counts how often rings run around a point counter-clockwise, less how often clockwise. Points
+    without area (spikes, rings there and back) are left out.
+
+    Accuracy: decisions exact; crossings are rounded as those of `overlay`. Cost: that of `union_all`.
+
+    References
+    ----------
+    Hormann, Agathos, The point in polygon problem for arbitrary polygons, 2001.
+
+    Examples
+    --------
+    >>> from engine import Polygon, filled
     >>> twice = [[(0, 0), (2, 0), (2, 2), (0, 2)], [(1, 1), (3, 1), (3, 3), (1, 3)]]
-    >>> [Polygon(twice).n_rings, filled(twice, "non_zero").n_rings, filled(twice, "negative").n_rings]
-    [2, 1, 0]
+    >>> Polygon(twice).n_rings, filled(twice, "non_zero").n_rings, filled(twice, "negative").n_rings
+    (2, 1, 0)
     """
     if not isinstance(rule, str) or rule not in _RULES:
         raise InvalidOperationError(f"rule must be one of {', '.join(_RULES)}; got {shown(rule)}", ("rule",))

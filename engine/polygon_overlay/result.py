@@ -35,7 +35,15 @@ def _all_of(n_rings: int) -> IntArray:
 
 
 class OverlayPiece(NamedTuple):
-    """One connected part: its shell, counter-clockwise, and its holes, clockwise; each ``(n, 2)`` float64."""
+    """One connected part of a result.
+
+    Attributes
+    ----------
+    shell : ndarray of float64, shape (n, 2)
+        Counter-clockwise.
+    holes : tuple of ndarray
+        Clockwise, each (n, 2).
+    """
 
     shell: FloatArray
     holes: tuple[FloatArray, ...]
@@ -45,7 +53,14 @@ class OverlayPiece(NamedTuple):
 class Collapse:
     """A part of the exact result that the rounded output no longer has as a part of its own.
 
-    kind: "piece" (with its holes) or "hole". area: exact. near: its first vertex, rounded.
+    Attributes
+    ----------
+    kind : {"piece", "hole"}
+        A piece goes with its holes.
+    area : float
+        Of the exact part.
+    near : ndarray of float64, shape (2,)
+        Its first vertex, rounded.
     """
 
     kind: Literal["piece", "hole"]
@@ -118,27 +133,47 @@ def nearest(value: Fraction) -> float:
 
 @dataclass(frozen=True)
 class Overlay:
-    """The result of a Boolean operation on two polygons.
+    """The result of a Boolean operation on polygons.
 
-    vertices: (n_vertices, 2) float64, all rings one after another, none repeating its first vertex at its end.
-    ring_offsets: (n_rings + 1,) int64 into vertices.
-    piece_offsets: (n_pieces + 1,) int64 into the rings; the first ring of a piece is its shell, counter-clockwise, the
-        others its holes, clockwise. Each ring begins at its leftmost, then lowest vertex; pieces and holes are in
-        lexicographic order.
-    n_pieces_exact, n_holes_exact: how many the exact result has, before rounding.
-    pieces_joined, holes_joined: by how many the count fell because parts closer than rounding grew together.
-    pieces_parted, holes_parted: by how many it rose because parts fell apart, or rounding enclosed a new hole.
-        Always: n_pieces = n_pieces_exact - collapsed pieces - pieces_joined + pieces_parted; likewise for holes.
-    rounds: how often the rings were rounded; 0 where every vertex of the exact result is a double.
-    vertices_moved: output vertices that are not the correctly rounded image of a vertex of the exact result.
-    largest_displacement: proven bound on the distance between an edge of the exact result and its image.
-    snapped: the coarser lattice of snap rounding was needed.
-    exact: the rings of the exact result, from which `area_exact` and `area` are computed when asked for.
-    _later: makes fields that are not there yet (run.py); missing: all are.
-    _lost: of what `collapsed` is made when asked for; None where rounding lost nothing.
-    _edges: by vertex the input edge along which its ring goes on, by its first vertex; or sources, as
-        ``exact`` has them, that tell; None: those.
-    _starts: the first vertex of each input but the first, all inputs one after another; None: that of the clip.
+    Attributes
+    ----------
+    vertices : ndarray of float64, shape (n_vertices, 2)
+        All rings one after another, none repeating its first vertex at its end.
+    ring_offsets : ndarray of int64, shape (n_rings + 1,)
+        Into `vertices`. Each ring begins at its leftmost, then lowest vertex.
+    piece_offsets : ndarray of int64, shape (n_pieces + 1,)
+        Into the rings; the first ring of a piece is its shell, counter-clockwise, the others its holes, clockwise.
+        Pieces and holes are in lexicographic order.
+    n_pieces_exact, n_holes_exact : int
+        How many the exact result has, before rounding.
+    pieces_joined, holes_joined : int
+        By how many the count fell because parts closer than rounding grew together.
+    pieces_parted, holes_parted : int
+        By how many it rose because parts fell apart, or rounding enclosed a new hole. Always n_pieces = n_pieces_exact
+        - collapsed pieces - pieces_joined + pieces_parted; likewise for holes.
+    rounds : int
+        How often the rings were rounded; 0 where every vertex of the exact result is a double.
+    vertices_moved : int
+        Output vertices that are not the correctly rounded image of a vertex of the exact result.
+    largest_displacement : float
+        Proven bound on the distance between an edge of the exact result and its image.
+    snapped : bool
+        The coarser lattice of snap rounding was needed.
+    collapsed : tuple of Collapse
+        Parts that rounding left nothing of.
+    exact : ExactRings
+        The rings of the exact result, from which `area_exact` and `area` are computed on request.
+
+    Notes
+    -----
+    Private fields:
+
+    | field | contents |
+    | --- | --- |
+    | `_later` | makes fields that are not computed yet (run.py); missing: all are computed |
+    | `_lost` | what `collapsed` is made of on request; None where rounding lost nothing |
+    | `_edges` | by vertex the input edge of the output edge that begins there, by its first vertex; or sources |
+    | `_starts` | the first vertex of each input but the first, all inputs one after another; None: that of the clip |
     """
 
     vertices: FloatArray
@@ -210,10 +245,11 @@ class Overlay:
 
     @property
     def sources(self) -> IntArray:
-        """Which input each edge comes from, (n_vertices,): entry k of the edge from vertex k to the next of its ring.
+        """Which input each edge comes from, shape (n_vertices,): entry k of the edge from vertex k to the next of its
+        ring.
 
-        0: the subject, 1: the clip; of `union_all` the place in its list. Where several inputs share an edge, the first
-        of them; where one output edge is several of the input in line, the one that it begins with.
+        0 is the subject, 1 the clip; of `union_all` the place in its list. Where several inputs share an edge, the
+        first of them; where one output edge is several of the input in line, the one that it begins with.
         """
         exact = self.exact
         edges, starts = self._edges, self._starts

@@ -17,7 +17,7 @@ from engine.types import FlagArray
 
 
 class Cancel:
-    """A switch that another thread may throw: every call given it ends soon with `CancelledError`."""
+    """A switch that another thread may set: every call given it ends soon with `CancelledError`."""
 
     __slots__ = ("_flags", "_lock", "is_set")
 
@@ -27,26 +27,44 @@ class Cancel:
         self._lock = threading.Lock()
 
     def set(self) -> None:
-        """Throw the switch; it stays thrown."""
+        """Set the switch; it stays set."""
         with self._lock:
             self.is_set = True
             for flag in self._flags:
                 flag[0] = 1
 
     def attach(self, flag: FlagArray) -> None:
-        """Have `flag` raised when the switch is thrown."""
+        """Have `flag` raised when the switch is set.
+
+        Parameters
+        ----------
+        flag : ndarray of uint8, shape (1,)
+            Read by kernels.
+        """
         with self._lock:
             self._flags.append(flag)
             if self.is_set:
                 flag[0] = 1
 
     def detach(self, flag: FlagArray) -> None:
-        """Forget `flag`."""
+        """Forget `flag`.
+
+        Parameters
+        ----------
+        flag : ndarray of uint8, shape (1,)
+            One that `attach` was given.
+        """
         with self._lock:
             self._flags = [kept for kept in self._flags if kept is not flag]
 
     def take(self, n_bytes: int) -> None:
-        """Hear that an answer is about to take so many more bytes; who must bound them overrides this, and raises."""
+        """Note that an answer is about to allocate memory; a subclass that bounds it overrides this, and raises.
+
+        Parameters
+        ----------
+        n_bytes : int
+            How many more bytes.
+        """
 
 
 @dataclass(order=True, slots=True)

@@ -44,14 +44,20 @@ _BYTES_OF_WITNESS: Final = 150
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenePairs:
-    """The colliding pairs of a scene, with a gap those nearer than that too, sorted by first, then second.
+    """The colliding pairs of a scene, sorted by first, then second; with a gap also the pairs nearer than that.
 
-    first, second: ``(n_pairs,)`` int64, indices of bodies, first < second.
-    relation: ``(n_pairs,)`` int8, `Relation` of the first to the second, DISJOINT only where a gap was given.
-    witnesses: one a pair, where asked for; else None.
-    detail: ``(n_pairs,)`` int8, codes of `Rcc8`, -1 where a body has no interior, where asked for; else None.
-    distance: ``(n_pairs,)`` float64, how far apart, as `clearance` gives it, 0.0 where they meet, where a gap was given
-        and boolean was not; else None.
+    Attributes
+    ----------
+    first, second : ndarray of int64, shape (n_pairs,)
+        Indices of bodies, first < second.
+    relation : ndarray of int8, shape (n_pairs,)
+        `Relation` of the first to the second, DISJOINT only where a gap was given.
+    witnesses : tuple of Witness or None
+        One a pair, where asked for.
+    detail : ndarray of int8, shape (n_pairs,), or None
+        Codes of `Rcc8`, -1 where a body has no interior, where asked for.
+    distance : ndarray of float64, shape (n_pairs,), or None
+        As `clearance` gives it, 0.0 where they meet; where a gap was given and boolean was not.
     """
 
     first: IntArray
@@ -78,28 +84,64 @@ def collide_scene(
     progress: Progress | None = None,
     report: bool = False,
 ) -> ScenePairs | tuple[ScenePairs, Accuracy]:
-    """Find every pair of bodies with a common point, and how each lies to the other, exactly.
+    """Find every pair of bodies with a common point, and how they relate, exactly.
 
-    Boxes around the posed bodies tell which pairs may meet (a grid, or a sweep where sizes are mixed). Pairs of boxes,
-    balls and convex polyhedra are decided in batches where float64 with a proven margin can; all others, contacts
-    above all, as by `collide`. One solid object may stand in the scene many times under different poses; its structures
-    are built once.
+    Parameters
+    ----------
+    solids : sequence of Solid
+        Bodies of one dimension, of the types that `collide` accepts; one object may stand for many bodies.
+    poses : sequence of Pose or None, optional
+        One for each solid.
+    skip : array_like, shape (n, 2), optional
+        Pairs of indices to leave out, in either order.
+    only : array_like, shape (n, 2), optional
+        The only pairs to test.
+    gap : float, optional
+        A distance; pairs that do not meet but are nearer than that, exactly, are reported too, as disjoint.
+    witnesses : bool, default False
+        Also return the witness of each pair.
+    boolean : bool, default False
+        Only decide disjoint or not: every pair that meets is answered as touching, and no distance is measured.
+    detail : bool, default False
+        Also decide the relation of RCC-8, as `collide`; no body may be a surface.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts candidate pairs.
 
-    Parameters: solids: bodies of one dimension, of the types that `collide` takes. poses: one or None for each. skip:
-    ``(n, 2)`` pairs of indices to leave out, in either order. only: ``(n, 2)`` the only pairs to look at. gap: a
-    distance; pairs that do not meet but are nearer than that, exactly, are found too, as disjoint. witnesses: give the
-    witness of each pair too. boolean: disjoint or not is all that is wanted, every pair that meets is answered as
-    touching, sooner, and no distance is measured. detail: which of the eight relations of RCC-8 holds too, as by
-    `collide`; no body may be a surface. workers, deadline, cancel, progress (items are candidate pairs), report: as
-    everywhere.
-    Returns: `ScenePairs`; with report=True a pair of it and an `Accuracy` whose items are the candidate pairs.
+    Returns
+    -------
+    ScenePairs
+        With ``report=True`` a pair of it and an `Accuracy` whose items are the candidate pairs.
+
+    Raises
+    ------
+    IndexOutOfRangeError, InvalidArrayError
+        For `skip` and `only`.
+    InvalidInputError
+        `gap` is negative or not finite.
+    EngineError
+        As `collide`, with the index of the body.
+
+    Notes
+    -----
+    Broad phase: boxes around the posed bodies, by a grid, or by a sweep where sizes are mixed. Narrow phase: pairs of
+    boxes, balls and convex polyhedra are decided in batches where float64 with a proven margin can; all others,
+    contacts above all, as by `collide`.
+
     Boundary and degenerate input: as `collide`; a pair exactly as far apart as the gap is clear. An empty scene has no
     pairs; two surfaces touch or are disjoint.
-    Accuracy: exact. Cost: n log n for the boxes, 1 us or less for each pair that a batch decides, then as `collide`;
-    with a gap as `clearance` for those whose boxes are nearer than that, but for boxes and balls.
-    Raises: as `collide`, with the index of the body; IndexOutOfRangeError and InvalidArrayError for skip and only;
-    InvalidInputError (gap negative or not finite).
 
+    Accuracy: exact.
+
+    Cost: n log n for the boxes, 1 us or less for each pair that a batch decides, then as `collide`; with a gap as
+    `clearance` for the pairs whose boxes are nearer than that, but for boxes and balls.
+
+    References
+    ----------
+    Ericson, Real-Time Collision Detection, 2005, chapter 7; Baraff, Dynamic simulation of non-penetrating rigid bodies,
+    1992 (sweep and prune).
+
+    Examples
+    --------
     >>> from engine import Aabb, Pose
     >>> cube = Aabb([0, 0, 0], [1, 1, 1])
     >>> step = Pose([[1, 0, 0], [0, 1, 0], [0, 0, 1]], [1, 0, 0])

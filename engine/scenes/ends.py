@@ -24,12 +24,19 @@ from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray
 class ScenePieces:
     """The pieces of segments within bodies, by source, then by where they start, then by body.
 
-    source, body: (m,) int64, the segment each piece is a part of, and the body it lies in.
-    start, end: (m, dim) float64, each coordinate the double nearest to the exact one.
-    t: (m, 2) float64, the parameters of both ends, each the nearest double; equal for a single point.
-    faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the segment's own.
-    ranks: (m, 2) int64, of all ends of the pieces of a segment, in exact order, which each is: equal ranks are one
-        point, so that two pieces overlap, touch or leave a gap exactly as their ranks do.
+    Attributes
+    ----------
+    source, body : ndarray of int64, shape (m,)
+        The segment each piece is a part of, and the body it lies in.
+    start, end : ndarray of float64, shape (m, dim)
+        Each coordinate the double nearest to the exact one.
+    t : ndarray of float64, shape (m, 2)
+        The parameters of both ends, each the nearest double; equal for a single point.
+    faces : ndarray of int64, shape (m, 2)
+        The plane or face crossed at either end, -1 where the end is the segment's own.
+    ranks : ndarray of int64, shape (m, 2)
+        The exact order of all ends of the pieces of a segment: equal ranks are one point, so that two pieces overlap,
+        touch or leave a gap exactly as their ranks do.
     """
 
     source: IntArray

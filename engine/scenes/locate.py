@@ -41,7 +41,17 @@ _FEWEST_FOR_TREES: Final = 64
 
 @dataclass(frozen=True, slots=True)
 class SceneLocations(Ragged):
-    """The bodies that hold each point: those of point i are ``indices[offsets[i]:offsets[i + 1]]``, ascending."""
+    """The bodies that contain each point: those of point i are ``indices[offsets[i]:offsets[i + 1]]``, ascending.
+
+    Attributes
+    ----------
+    offsets : ndarray of int64, shape (n_points + 1,)
+        Into the other two.
+    indices : ndarray of int64, shape (n,)
+        Positions in the list of solids.
+    on_boundary : ndarray of bool, shape (n,)
+        True where the point is on the body's boundary, False where it is inside.
+    """
 
     _levels: ClassVar[tuple[str, ...]] = ("indices", "offsets")
     offsets: IntArray

@@ -43,26 +43,50 @@ def locate_scene(
     progress: Progress | None = None,
     report: bool = False,
 ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
-    """Find for each point the solids that hold it, inside or on the boundary.
-
-    It is `Scene.locate` of a scene made for this question alone. For one solid use `locate`.
+    """Find for each point the bodies that contain it, inside or on the boundary.
 
     Parameters
-        points: ``(n_points, dimension)`` numbers; borrowed.
-        solids: any but surfaces, all of the points' dimension; the same object may stand for many bodies.
-        poses: one `Pose` or None for each solid. A posed solid is the exact image of the solid under R p + t; a sphere
-            keeps its radius about the exact image of its centre.
-        workers, deadline, cancel, progress, report: as in `locate`; progress counts points.
-    Returns
-        `SceneLocations`; with report=True a pair of it and an `Accuracy`.
-    Boundary: a point on a wall that two bodies share is on both.
-    Degenerate input: no points and no solids are welcome; solids as in `locate`.
-    Accuracy: exact, also for posed solids: the image of the matrix as given is meant, not that of a nearby rotation.
-    Cost: bodies whose boxes hold the points; bodies without bounds (half_space, convex, implicit, the prism over a
-        triangle of space) are asked about every point.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, UnsupportedSolidError, DeadlineExceededError,
-        CancelledError.
+    ----------
+    points : array_like, shape (n_points, dimension)
+        Borrowed, and may be empty.
+    solids : sequence of Solid
+        Any type but surfaces, all of the points' dimension; one object may stand for many bodies.
+    poses : sequence of Pose or None, optional
+        One for each solid, None for a body that stands where its solid does.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts points.
 
+    Returns
+    -------
+    SceneLocations
+        With ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, UnsupportedSolidError
+        For arguments that break a rule; the message names the body or point.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    Boundary: a point on a wall that two bodies share is on both.
+
+    Degenerate input: no points and no solids are accepted; solids as in `locate`.
+
+    Accuracy: exact, also for posed solids: a body is the exact image R p + t under the matrix as given, not under a
+    nearby rotation; a sphere keeps its radius about the exact image of its centre.
+
+    Cost: bodies whose boxes contain the points; bodies without bounds (half_space, convex, implicit, the prism over a
+    triangle of space) are tested for every point. The same as `Scene.locate` of a scene made for this call; for one
+    solid use `locate`.
+
+    References
+    ----------
+    Ericson, Real-Time Collision Detection, 2005, chapter 6 (trees over boxes).
+
+    Examples
+    --------
     >>> from engine import Aabb, Pose, locate_scene
     >>> box = Aabb([0, 0], [1, 1])
     >>> held = locate_scene([[0.5, 0.5], [1, 0.5], [9, 9]], [box, box], [None, Pose([[1, 0], [0, 1]], [1, 0])])

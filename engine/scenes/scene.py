@@ -37,18 +37,30 @@ Keep = Literal["all", "first", "any"]
 
 
 class Scene(Immutable):
-    """Many bodies, asked again and again: which hold a point, which collide, what of a segment lies in which.
+    """Many bodies, queried repeatedly: which contain a point, which collide, what of a segment lies in which.
 
-    What a question needs of all bodies (boxes, trees over them, tables of solids by kind) is prepared when it is asked
-    first, and kept; structures of single solids stay with these. Immutable, picklable (without what is prepared), safe
-    to share between threads. For one question about bodies that do not stay, `locate_scene` and `collide_scene` give
-    the same answers.
+    Parameters
+    ----------
+    solids : sequence of Solid
+        Of one dimension, the same object wherever it is the same solid; each query accepts the types that it accepts
+        elsewhere. May be empty.
+    poses : sequence of Pose or None, optional
+        One for each body; the exact image is meant.
 
-    Parameters: solids, a list of solids of one dimension, the same object wherever it is the same solid; each question
-    takes the types that it takes elsewhere. poses: one `Pose` or None for each; the exact image is meant.
-    Degenerate input: no solids at all are welcome.
-    Raises: InvalidArrayError, WrongDimensionError, naming the body.
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError
+        The message names the body.
 
+    Notes
+    -----
+    What a query needs of all bodies (boxes, trees over them, tables of solids by kind) is prepared by the first and
+    cached; structures of single solids are cached with these. Immutable, picklable (without the caches), safe to share
+    between threads. For one query about bodies that are used once, `locate_scene` and `collide_scene` give the same
+    answers.
+
+    Examples
+    --------
     >>> from engine import Aabb, Pose
     >>> box, turn = Aabb([0, 0], [1, 1]), [[1, 0], [0, 1]]
     >>> scene = Scene([box, box], [None, Pose(turn, [3, 0])])
@@ -104,10 +116,25 @@ class Scene(Immutable):
     def moved(self, poses: Mapping[int, Pose | None]) -> Scene:
         """Return the scene with some bodies under other poses; what is prepared of the others is shared.
 
-        Parameters: poses, the new pose of each body that moves, None to put it where its solid is.
+        Parameters
+        ----------
+        poses : mapping of int to Pose or None
+            The new pose of each body that moves, None to put it where its solid is.
+
+        Returns
+        -------
+        Scene
+            This one is unchanged.
+
+        Raises
+        ------
+        IndexOutOfRangeError, InvalidArrayError, WrongDimensionError
+            For a body that does not exist, or a wrong pose.
+
+        Notes
+        -----
         Cost: grows with the bodies that moved since all were prepared together; where these are more than a quarter,
-        and more than 64, all are prepared anew.
-        Raises: IndexOutOfRangeError for a body that is not there, InvalidArrayError, WrongDimensionError.
+        and more than 64, all are prepared again.
         """
         if not isinstance(poses, Mapping):
             raise InvalidArrayError(f"poses must be a dict of poses by body, got {type(poses).__name__}", ("poses",))
@@ -131,7 +158,18 @@ class Scene(Immutable):
         progress: Progress | None = None,
         report: bool = False,
     ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
-        """Find for each point the bodies that hold it; all is as in `locate_scene`, which prepares anew each time."""
+        """Find for each point the bodies that contain it; as `locate_scene`, with what is prepared cached.
+
+        Parameters
+        ----------
+        points, workers, deadline, cancel, progress, report
+            As for `locate_scene`.
+
+        Returns
+        -------
+        SceneLocations
+            With ``report=True`` a pair of it and an `Accuracy`.
+        """
         check_options(workers, progress, report=report)
         array = as_points(points, self.solids[0].dimension if len(self) else None)
         with Budget(deadline, cancel) as budget:
@@ -154,11 +192,27 @@ class Scene(Immutable):
         progress: Progress | None = None,
         report: bool = False,
     ) -> ScenePairs | tuple[ScenePairs, Accuracy]:
-        """Find every pair of bodies with a common point; all is as in `collide_scene`, which prepares anew each time.
+        """Find every pair of bodies with a common point; as `collide_scene`, with what is prepared cached.
 
-        Parameters: moved, indices of bodies: only pairs with one of them are looked at. After `scene.moved(poses)` the
-        colliding pairs are those of the scene before without a body of `poses`, and these.
-        Raises: as `collide_scene`; IndexOutOfRangeError for a body that is not there.
+        Parameters
+        ----------
+        moved : sequence of int, optional
+            Only pairs with one of these bodies are tested. After ``scene.moved(poses)`` the colliding pairs are those
+            of the scene before without a body of `poses`, and these.
+        skip, only, gap, witnesses, boolean, detail, workers, deadline, cancel, progress, report
+            As for `collide_scene`.
+
+        Returns
+        -------
+        ScenePairs
+            With ``report=True`` a pair of it and an `Accuracy`.
+
+        Raises
+        ------
+        IndexOutOfRangeError
+            For a body that does not exist.
+        EngineError
+            As `collide_scene`.
         """
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
         asked = Asked(skip, only, gap, witnesses, boolean, detail)
@@ -228,31 +282,45 @@ class Scene(Immutable):
     ) -> ScenePieces | BoolArray | tuple[ScenePieces | BoolArray, Accuracy]:
         """Return the pieces of segments within each body, in order along each segment.
 
-        A tree over the boxes of the bodies gives each segment's candidates; each body cuts those that may meet it, as
-        `clip_segments` does, in its own frame where it is posed. Ends that round to one double are put in order by
-        exact arithmetic, roots of spheres included.
-
         Parameters
-            segments: (n, 2, dim) numbers; none at all are welcome.
-            keep: "all"; "first", of each segment the piece that begins first, of those that begin at one point that of
-                the first body (picking); "any", whether it meets a body at all (line of sight). The last two look at
-                nothing that cannot matter.
-            workers, deadline, cancel, progress (items are segments), report: as everywhere.
-        Returns
-            `ScenePieces`, with "any" a bool array (n,); with report=True a pair of it and an `Accuracy`.
-        Bodies
-            What `clip_segments` takes, and triangle (of the plane; in space the prism over it), surface, and csg of all
-            these. On a surface, which holds nothing, pieces are the points where it is crossed (t0 = t1), or stretches
-            that lie in it. Within a csg pieces are those of its closed set, joined where operands meet; faces are
-            counted through its distinct leaves, operands first, a leaf's own behind those of all before it.
-        Boundary, degenerate input, accuracy
-            As `clip_segments`: t and coordinates are the nearest doubles to those of the exact image of each body.
-        Cost
-            The boxes near a segment, and what a body costs; CSG trees and prisms some 0.1 ms for each segment near
-            them.
-        Raises
-            UnsupportedSolidError (implicit), InvalidOperationError, and as `clip_segments`.
+        ----------
+        segments : array_like, shape (n, 2, dim)
+            May be empty.
+        keep : {"all", "first", "any"}
+            "first": of each segment the piece that begins first, of those that begin at one point that of the first
+            body (picking). "any": whether it meets a body at all (line of sight). These two stop as soon as the answer
+            is certain.
+        workers, deadline, cancel, progress, report
+            As for `engine.locate`; progress counts segments.
 
+        Returns
+        -------
+        ScenePieces
+            With "any" an ndarray of bool, shape (n,); with ``report=True`` a pair of the answer and an `Accuracy`.
+
+        Raises
+        ------
+        UnsupportedSolidError, InvalidOperationError
+            An implicit solid; an unknown `keep`.
+        EngineError
+            As `clip_segments`.
+
+        Notes
+        -----
+        Bodies: what `clip_segments` accepts, and triangle (of the plane; in space the prism over it), surface, and csg
+        of all these. On a surface, which contains nothing, pieces are the points where it is crossed (t0 = t1), or
+        stretches that lie in it. Within a csg pieces are those of its closed set, joined where operands meet; faces are
+        counted through its distinct leaves, operands first, a leaf's own behind those of all before it.
+
+        Boundary, degenerate input, accuracy: as `clip_segments`; t and coordinates are the nearest doubles to those of
+        the exact image of each body. Ends that round to one double are ordered by exact arithmetic, roots of spheres
+        included.
+
+        Cost: a tree over the boxes of the bodies gives each segment's candidates; each body cuts those that may meet
+        it, in its own frame where it is posed. CSG trees and prisms cost some 0.1 ms for each segment near them.
+
+        Examples
+        --------
         >>> from engine import Aabb, Sphere
         >>> scene = Scene([Sphere([5, 0], 1), Aabb([1, -1], [2, 1])])
         >>> pieces = scene.clip_segments([[[0, 0], [8, 0]]])

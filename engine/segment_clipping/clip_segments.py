@@ -27,10 +27,16 @@ from engine.types import Accuracy, FloatArray, IntArray
 class SegmentPieces:
     """The pieces of a batch of segments within a region, by source and then by t.
 
-    source: (m,) int64, the segment each piece is a part of.
-    start, end: (m, dim) float64, each coordinate the double nearest to the exact one.
-    t: (m, 2) float64, the parameters of both ends, each the nearest double.
-    faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the segment's own.
+    Attributes
+    ----------
+    source : ndarray of int64, shape (m,)
+        The segment each piece is a part of.
+    start, end : ndarray of float64, shape (m, dim)
+        Each coordinate the double nearest to the exact one.
+    t : ndarray of float64, shape (m, 2)
+        The parameters of both ends, each the nearest double.
+    faces : ndarray of int64, shape (m, 2)
+        The plane or face crossed at either end, -1 where the end is the segment's own.
     """
 
     source: IntArray
@@ -67,38 +73,57 @@ def clip_segments(
 ) -> SegmentPieces | tuple[SegmentPieces, Accuracy]:
     """Return the pieces of segments that lie in a region, a closed set.
 
-    A piece is a maximal connected part of a segment within the region or on its boundary. Boxes are clipped by
-    Cohen-Sutherland outcodes, convex regions by their generalisation, spheres by the roots of a quadratic, polygons and
-    polyhedra by the elements of their boundary that a box tree finds; all with exact decisions on the original ends.
-
     Parameters
-        segments: (n, 2, dim) numbers, two points each; none at all are welcome.
-        region: half_space, aabb, convex (may be empty or unbounded), sphere, polygon or polyhedron of the same
-            dimension. On the last two a segment may have several pieces.
-        workers, deadline (seconds), cancel, progress: see `engine.running.parallel`.
-        report: return ``(pieces, Accuracy)``.
-    Returns
-        `SegmentPieces`; the parts of [0, 1] that no piece covers are outside of the region.
-    Boundary
-        Counts as in: a segment in a face is kept, one that touches in a single point gives that point (t0 = t1).
-        `faces` at the start is -1 exactly where t0 = 0, at the end where t1 = 1; else the plane crossed there, of
-        several at one point the smallest, those that the segment runs along, or that have no
-        area, last. Indices: half_space 0; aabb xmin,
-        xmax, ymin, ymax, zmin, zmax; convex the row; sphere 0; polyhedron the face as given; polygon the edge, named by
-        the index of its first vertex over all rings.
-    Degenerate input
-        A segment of no length is a point: kept as a whole (t = (0, 1), faces -1) or dropped.
-    Accuracy
-        Decisions exact for every finite input. Coordinates and t are the doubles nearest to the exact values, each on
-        its own, zero as +0.0; so a piece may stick out of a slanted plane by half an ulp, and the ends of a tiny piece
-        may be equal. On an aabb a coordinate cut by a plane is the plane's. No result overflows.
-    Cost
-        O(n planes), or O(n (log faces + contacts)) after one preparation; allocates the outputs.
-    Raises
-        UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError, DeadlineExceededError,
-        CancelledError.
+    ----------
+    segments : array_like, shape (n, 2, dim)
+        Two points each; may be empty.
+    region : Solid
+        half_space, aabb, convex (may be empty or unbounded), sphere, polygon or polyhedron of the same dimension. In
+        the last two a segment may have several pieces.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts segments.
 
-    >>> from engine.solids.primitives import Aabb
+    Returns
+    -------
+    SegmentPieces
+        The parts of [0, 1] that no piece covers are outside of the region. With ``report=True`` a pair of it and an
+        `Accuracy`.
+
+    Raises
+    ------
+    UnsupportedSolidError, InvalidArrayError, WrongDimensionError, NotFiniteError
+        For arguments that break a rule; the message names the segment.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    A piece is a maximal connected part of a segment within the region or on its boundary. Boxes are clipped by
+    Cohen-Sutherland outcodes, convex regions by Cyrus-Beck, spheres by the roots of a quadratic, polygons and polyhedra
+    by the elements of their boundary that a box tree gives; all with exact decisions on the original ends.
+
+    Boundary: counts as inside. A segment in a face is kept, one that touches in a single point gives that point (t0 =
+    t1). `faces` at the start is -1 exactly where t0 = 0, at the end where t1 = 1; else the plane crossed there, of
+    several at one point the smallest, those that the segment runs along, or that have no area, last. Indices:
+    half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex the row; sphere 0; polyhedron the face as given;
+    polygon the edge, named by the index of its first vertex over all rings.
+
+    Degenerate input: a segment of no length is a point, kept as a whole (t = (0, 1), faces -1) or dropped.
+
+    Accuracy: decisions exact for every finite input. Coordinates and t are the doubles nearest to the exact values,
+    each on its own, zero as +0.0; so a piece may stick out of a slanted plane by half a unit in the last place, and the
+    ends of a tiny piece may be equal. On an aabb a coordinate cut by a plane is the plane's. No result overflows.
+
+    Cost: O(n planes), or O(n (log faces + contacts)) after one preparation; allocates the outputs.
+
+    References
+    ----------
+    Cohen and Sutherland in Newman, Sproull, Principles of Interactive Computer Graphics, 1979; Cyrus, Beck, Generalized
+    two- and three-dimensional clipping, 1978; the textbook, section 22.4.2.
+
+    Examples
+    --------
+    >>> from engine.solids.aabb import Aabb
     >>> pieces = clip_segments([[[-1.0, 1.0], [3.0, 1.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])

@@ -34,12 +34,21 @@ _AT_ONCE: Final = 1 << 20
 class LinePieces(Ragged):
     """The pieces of a batch of polylines within a region, by source and then along the line.
 
-    source: (m,) int64, the line each piece is a part of.
-    vertices: (n, dim) float64, of all pieces one after another: the two ends, each coordinate the double nearest to
-        the exact one, and between them the line's own vertices. offsets: (m + 1,) int64 into them.
-    segments: (m, 2) int64, on which segment of the line either end lies: segment k goes from vertex k to k + 1.
-    t: (m, 2) float64, the parameters of both ends on those segments, each the nearest double.
-    faces: (m, 2) int64, the plane or face crossed at either end, -1 where the end is the line's own.
+    Attributes
+    ----------
+    source : ndarray of int64, shape (m,)
+        The line each piece is a part of.
+    vertices : ndarray of float64, shape (n, dim)
+        Of all pieces one after another: the two ends, each coordinate the double nearest to the exact one, and between
+        them the line's own vertices.
+    offsets : ndarray of int64, shape (m + 1,)
+        Into `vertices`.
+    segments : ndarray of int64, shape (m, 2)
+        On which segment of the line either end lies: segment k goes from vertex k to k + 1.
+    t : ndarray of float64, shape (m, 2)
+        The parameters of both ends on those segments, each the nearest double.
+    faces : ndarray of int64, shape (m, 2)
+        The plane or face crossed at either end, -1 where the end is the line's own.
     """
 
     _levels: ClassVar[tuple[str, ...]] = ("vertices", "offsets")
@@ -85,30 +94,48 @@ def clip_lines(
 ) -> LinePieces | tuple[LinePieces, Accuracy]:
     """Return the pieces of polylines (open paths) that lie in a region, a closed set.
 
-    A piece is a maximal stretch of a line within the region or on its boundary. For lines of one segment each, and
-    their pieces in flat columns, there is `clip_segments`.
-
     Parameters
-        lines: a list of lines, each (n, dim) numbers; or an array (n_lines, n, dim); or a pair of arrays
-            ``(vertices, offsets)``, (n, dim) and (n_lines + 1,), which is not copied. A line has 2 positions or more;
-            one of none has no pieces.
-        region, workers, deadline, cancel, report: as `clip_segments`; progress: told of segments.
+    ----------
+    lines : array_like or pair of array_like
+        A list of lines, each (n, dim) numbers; or an array (n_lines, n, dim); or a pair of arrays ``(vertices,
+        offsets)``, (n, dim) and (n_lines + 1,), which is not copied. A line has two positions or more; one of none has
+        no pieces.
+    region : Solid
+        As for `clip_segments`.
+    workers, deadline, cancel, progress, report
+        As for `locate`; progress counts segments.
+
     Returns
-        `LinePieces`; with report=True also the `Accuracy`, whose items are segments.
-    Boundary
-        Counts as in, so a line that runs along it is kept there, and one that touches in a single point gives that
-        point, as a piece of two equal positions.
-    Degenerate input
-        Repeated vertices are kept as they are. A line whose last vertex is its first closes there: where the region
-        holds that vertex and cuts the line elsewhere, the stretch through it is one piece, the line's last, whose first
-        end lies on a later segment than its second. Points that a line passes twice otherwise join nothing.
-    Accuracy
-        As `clip_segments`. A vertex of the line beside a constructed end that rounds to it is left out.
-    Cost
-        That of `clip_segments` on all segments, and some passes over the pieces.
+    -------
+    LinePieces
+        With ``report=True`` a pair of it and an `Accuracy`, whose items are segments.
+
     Raises
+    ------
+    EngineError
         As `clip_segments`.
 
+    Notes
+    -----
+    A piece is a maximal stretch of a line within the region or on its boundary.
+
+    Boundary: counts as inside. A line that runs along it is kept there, one that touches in a single point gives that
+    point, as a piece of two equal positions.
+
+    Degenerate input: repeated vertices are kept as they are. A line whose last vertex is its first closes there: where
+    the region contains that vertex and cuts the line elsewhere, the stretch through it is one piece, the line's last,
+    whose first end lies on a later segment than its second. Points that a line passes twice otherwise join nothing.
+
+    Accuracy: as `clip_segments`. A vertex of the line beside a constructed end that rounds to it is left out.
+
+    Cost: that of `clip_segments` on all segments, and some passes over the pieces.
+
+    References
+    ----------
+    As `clip_segments`.
+
+    Examples
+    --------
     >>> from engine import Aabb, clip_lines
     >>> pieces = clip_lines([[[-1.0, 1.0], [1.0, 1.0], [1.0, 3.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
     >>> pieces[0].tolist(), pieces.segments.tolist(), pieces.t.tolist(), pieces.faces.tolist()

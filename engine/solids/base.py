@@ -78,7 +78,15 @@ class Preparing:
 
 
 class Solid(Preparing, Immutable):
-    """Base of the ten solids. `type` is the name used in JSON, `dimension` is 2 or 3."""
+    """Base of the ten solids.
+
+    Attributes
+    ----------
+    type : str
+        The name used in JSON.
+    dimension : int
+        2 or 3.
+    """
 
     __slots__ = (*_RUNTIME, "dimension")
 

@@ -27,7 +27,15 @@ Check: TypeAlias = Callable[[], object] | None
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The two bounding volumes of a solid."""
+    """The two bounding volumes of a solid.
+
+    Attributes
+    ----------
+    aabb : Aabb
+        The smallest box along the axes.
+    sphere : Sphere
+        The minimal enclosing ball.
+    """
 
     aabb: Aabb  # the smallest box, each coordinate the nearest double
     sphere: Sphere  # the smallest sphere: centre the nearest double, radius the smallest double that holds the solid
@@ -49,22 +57,54 @@ def bounds(
     progress: Progress | None = None,
     report: bool = False,
 ) -> Bounds | tuple[Bounds, Accuracy]:
-    """Return the smallest axis-aligned box and the smallest sphere around a solid.
+    """Return the smallest axis-aligned box and the minimal enclosing ball of a solid.
 
-    The box is exact for solids given by vertices; for a convex the exact corners are found and each bound is rounded to
-    the nearest double, for a sphere likewise (so there the box may miss the solid by half an ulp). The sphere has the
-    exact centre of the minimal one, rounded to the nearest doubles, and the smallest radius about THAT centre whose
-    closed ball holds the solid. Kept with the solid: asking again costs nothing.
+    Parameters
+    ----------
+    solid : Solid
+        A sphere, aabb, triangle (flat, also in 3D), polygon, polyhedron, surface (only vertices that faces name count)
+        or a bounded, non-empty convex.
+    workers : int, optional
+        One is used.
+    deadline, cancel, report
+        As for `locate`.
+    progress : callable, optional
+        Called with 1 when done.
 
-    Parameters: solid, a sphere, aabb, triangle (flat, also in 3D), polygon, polyhedron, surface (only vertices that
-    faces name count) or a bounded, non-empty convex. workers: one is used. deadline: seconds. cancel: a switch.
-    progress: called with 1 when done. report: return an `Accuracy` too.
-    Degenerate: a single point has a box without size and a sphere of radius 0.
-    Cost: O(n) per turn, 5 to 20 turns in practice: some 15 ms for 43,000 vertices.
-    Raises: UnsupportedSolidError (half_space, implicit, csg, an unbounded convex), EmptyGeometryError (a convex without
-    points), NotRepresentableError, TooComplexError, DeadlineExceededError, CancelledError.
-    Source: see `engine.bounding.minimal_sphere` and `engine.bounding.double_description`.
+    Returns
+    -------
+    Bounds
+        With ``report=True`` a pair of it and an `Accuracy`.
 
+    Raises
+    ------
+    UnsupportedSolidError
+        A half_space, implicit, csg, or an unbounded convex.
+    EmptyGeometryError
+        A convex without points.
+    NotRepresentableError, TooComplexError
+        A bound is beyond the largest double; a stated cap on exact work was reached.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
+    Degenerate input: a single point has a box without size and a ball of radius 0.
+
+    Accuracy: the box is exact for solids given by vertices. For a convex the exact corners are computed and each bound
+    is rounded to the nearest double, likewise for a sphere, so there the box may miss the solid by half a unit in the
+    last place. The ball has the exact centre of the minimal one, rounded to the nearest doubles, and the smallest
+    radius about that centre whose closed ball contains the solid.
+
+    Cost: O(n) per iteration, 5 to 20 iterations in practice: some 15 ms for 43,000 vertices. Cached with the solid.
+
+    References
+    ----------
+    Welzl, Smallest enclosing disks (balls and ellipsoids), 1991; Gaertner, Fast and robust smallest enclosing balls,
+    1999; Motzkin et al., The double description method, 1953.
+
+    Examples
+    --------
     >>> from engine.solids.polygon import Polygon
     >>> box = bounds(Polygon([[[0, 0], [4, 0], [4, 3]]]))
     >>> box.aabb, box.sphere

@@ -23,17 +23,32 @@ MAX_LEAVES: Final = 1_000_000
 
 
 class Csg(Solid):
-    """A Boolean combination, three-valued: union is the max of its operands, intersection the min, difference
-    ``min(A, -B)``.
+    """A Boolean combination of solids, three-valued.
 
-    Parameters: operation, "union", "intersection" or "difference"; operands, one or more solids of one dimension, for
-    "difference" exactly two: A and what is taken away from it. Any solid but a surface, Csg too, up to 100 deep.
-    Boundary: a label, not necessarily the topological boundary: where a point lies on the boundary of two operands
-    it is BOUNDARY, even if the combination is solid or void all around it.
-    Raises: InvalidArrayError, InvalidOperationError, EmptyGeometryError, WrongDimensionError, UnsupportedSolidError,
-    TooDeepError, TooComplexError.
+    Parameters
+    ----------
+    operation : {"union", "intersection", "difference"}
+        Union is the max of its operands, intersection the min, difference ``min(A, -B)``.
+    operands : sequence of Solid
+        One or more of one dimension, for "difference" exactly two: A and what is taken away from it. Any solid but a
+        surface, Csg too, up to 100 deep.
 
-    >>> from engine.solids.primitives import Sphere
+    Raises
+    ------
+    InvalidArrayError, InvalidOperationError, EmptyGeometryError, WrongDimensionError, UnsupportedSolidError,
+    TooDeepError
+        For arguments that break a rule.
+    TooComplexError
+        The tree has too many leaves.
+
+    Notes
+    -----
+    Boundary: a label, not necessarily the topological boundary: where a point lies on the boundary of two operands it
+    is BOUNDARY, even if the combination is solid or void all around it.
+
+    Examples
+    --------
+    >>> from engine.solids.sphere import Sphere
     >>> Csg("difference", [Sphere([0, 0], 2), Sphere([0, 0], 1)])
     Csg('difference', 2 operands, 2D)
     """

@@ -21,12 +21,27 @@ PointFunction = Callable[[FloatArray], npt.ArrayLike]
 class Implicit(Solid):
     """All points where ``f(p) >= 0``, f a polynomial with exact sign, in 2D or 3D.
 
-    Parameters: terms, a list of ``{"powers": [i, j, k], "coefficient": c}`` for the sum of c x^i y^j z^k (2D: two
-    powers); or the same as arrays `powers` ``(n, dimension)`` of integers >= 0 and `coefficients` ``(n,)``. Terms with
-    equal powers add up. At most 1,000 terms of total degree at most 16.
-    Boundary: the points where f is exactly zero (all points, if f is zero).
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, InvalidPolynomialError.
+    Parameters
+    ----------
+    terms : list of dict, optional
+        ``{"powers": [i, j, k], "coefficient": c}`` for the sum of c x^i y^j z^k (2D: two powers). Terms with equal
+        powers add up; at most 1,000 terms of total degree at most 16.
+    powers : array_like of int, shape (n, dimension), optional
+        In place of terms: >= 0.
+    coefficients : array_like, shape (n,), optional
+        With `powers`.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, InvalidPolynomialError
+        For terms that break a rule.
+
+    Notes
+    -----
+    Boundary: the points where f is exactly zero (all points, if f is zero).
+
+    Examples
+    --------
     >>> Implicit([{"powers": [2, 0], "coefficient": -1}, {"powers": [0, 0], "coefficient": 4}])  # 4 - x^2 >= 0
     Implicit(2 terms, 2D)
     """
@@ -68,9 +83,20 @@ class Implicit(Solid):
     def from_callable(cls, function: PointFunction, dimension: int) -> Implicit:
         """Return the solid where ``function(points) >= 0``, decided in float64 as the function computes it.
 
-        function: vectorised, points ``(n, dimension)`` float64 to n numbers; called from several threads at once.
-        Accuracy: that of the function; `Accuracy.decisions` says "float64". Pickles if the function does.
+        Parameters
+        ----------
+        function : callable
+            Vectorised: points ``(n, dimension)`` float64 to n numbers; called from several threads at once.
+        dimension : int
+            2 or 3.
 
+        Returns
+        -------
+        Implicit
+            Its accuracy is that of the function; `Accuracy.decisions` is "float64". Pickles if the function does.
+
+        Examples
+        --------
         >>> Implicit.from_callable(lambda p: 1.0 - p[:, 0] ** 2 - p[:, 1] ** 4, dimension=2)
         Implicit(callable, 2D)
         """

@@ -260,21 +260,44 @@ def _unbalanced_edges(
 class Polyhedron(Mesh):
     """All points from which a ray crosses the faces an odd number of times, and the faces themselves; 3D.
 
-    Parameters: vertices, ``(n, 3)`` numbers; faces, an integer array ``(m, k)`` or a list of index lists, three or more
-    each, counter-clockwise seen from outside. Vertices at equal coordinates count as one; vertices that no face names
-    are kept and mean nothing. Faces of more than three vertices are cut into triangles by the rule of
-    `engine.solids.ear_cutting`; the solid is the one bounded by those triangles.
+    Parameters
+    ----------
+    vertices : array_like, shape (n, 3)
+        Vertices at equal coordinates count as one; vertices that no face names are kept and mean nothing.
+    faces : array_like of int, shape (m, k), or list of index lists
+        Three or more each, counter-clockwise seen from outside.
+    deadline : float, optional
+        Seconds; no limit by default.
+    cancel : Cancel, optional
+        A switch with which another thread ends the call.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError
+        For arrays that break a rule.
+    RingTooShortError, IndexOutOfRangeError, RepeatedIndexError, NotClosedError, InconsistentOrientationError
+        For faces that break a rule; the message names the face or edge.
+    FaceNotSimpleError
+        A face of four or more vertices crosses itself in its projection, or has two vertices at one position.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Notes
+    -----
     Closed: each undirected edge is used equally often in both directions. Non-manifold, self-intersecting and globally
     inverted shells are accepted, and so are triangles of zero area with three different indices (also where two of them
-    stand at one position). A face of four or more vertices must be simple in its projection, so no two at one position.
-    Boundary: the points on any face, even on one that another face cancels under even-odd.
-    deadline: seconds, None for no limit; cancel: a switch.
-    Cost: linear in vertices and edges, a face of n vertices is cut in n^2 at most: 1,000 in some milliseconds.
-    1.4 million triangles take about a second and 36 bytes each, vertices included.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, RingTooShortError,
-    IndexOutOfRangeError, RepeatedIndexError, NotClosedError, InconsistentOrientationError, FaceNotSimpleError,
-    DeadlineExceededError, CancelledError.
+    stand at one position).
 
+    Faces of more than three vertices are cut into triangles by the rule of `engine.solids.ear_cutting`; the solid is
+    the one bounded by those triangles.
+
+    Boundary: the points on any face, even on one that another face cancels under even-odd.
+
+    Cost: linear in vertices and edges, a face of n vertices is cut in n^2 at most: 1,000 in some milliseconds. 1.4
+    million triangles take about a second and 36 bytes each, vertices included.
+
+    Examples
+    --------
     >>> Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     Polyhedron(4 vertices, 4 faces)
     """
@@ -288,11 +311,22 @@ class Polyhedron(Mesh):
 class Surface(Mesh):
     """The faces themselves, open or closed, in any orientation; nothing is inside. For collision and bounds; 3D.
 
-    Parameters: as for `Polyhedron`, whose checks it shares but for closedness.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, RingTooShortError,
-    IndexOutOfRangeError, RepeatedIndexError, FaceNotSimpleError, DeadlineExceededError,
-    CancelledError.
+    Parameters
+    ----------
+    vertices, faces, deadline, cancel
+        As for `Polyhedron`, whose checks it shares but for closedness.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError
+        For arrays that break a rule.
+    RingTooShortError, IndexOutOfRangeError, RepeatedIndexError, FaceNotSimpleError
+        For faces that break a rule; the message names the face.
+    DeadlineExceededError, CancelledError
+        The call was ended.
+
+    Examples
+    --------
     >>> Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]).triangles.tolist()
     [[3, 0, 1], [3, 1, 2]]
     """

@@ -21,15 +21,27 @@ _LEAST: Final = 3
 class Polygon(Solid):
     """All points from which a ray crosses the rings an odd number of times, and the rings themselves; 2D.
 
-    Parameters: rings, a list of rings, each a list of positions of 2 numbers; a repeated last vertex is dropped. Rings
-    may cross, touch, overlap and repeat themselves. Or an object with `__geo_interface__`, of shapely for example, a
-    Polygon or a MultiPolygon, whose parts are united.
+    Parameters
+    ----------
+    rings : list of array_like of shape (n, 2), or object with `__geo_interface__`
+        A repeated last vertex is dropped. Rings may cross, touch, overlap and repeat themselves. An object, of shapely
+        for example, is a Polygon or a MultiPolygon, whose parts are united.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, RingTooShortError
+        For rings that break a rule.
+
+    Notes
+    -----
     Boundary: the points on any edge, even on one that another edge cancels under even-odd.
+
     Degenerate input: a ring of two positions is the edge between them, there and back, without area; one that is left
     with fewer is refused. Without rings a polygon is empty, as results of overlays may be: overlays take it, other
     operations refuse it (EmptyGeometryError).
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, RingTooShortError.
 
+    Examples
+    --------
     >>> Polygon([[[0, 0], [4, 0], [4, 4], [0, 4]], [[1, 1], [2, 1], [1, 2]]])
     Polygon(2 rings, 7 vertices)
     """

@@ -37,14 +37,29 @@ _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of 
 class Pose(Immutable):
     """A rigid motion ``p -> rotation @ p + translation`` of one body; the map is exact in these float64 numbers.
 
-    Parameters: rotation, ``(d, d)`` row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= tolerance`` (both decided
-    exactly); translation, d numbers; tolerance, from 0 to 0.1: 1e-6 takes matrices of float32 or of few digits.
-    Which body is meant: up to 1e-12 the image under the matrix as given, though no rotation of floats is quite
-    orthogonal. Beyond, `rotation` is made the rotation nearest to it (the orthogonal factor of its polar form, of the
+    Parameters
+    ----------
+    rotation : array_like, shape (d, d)
+        Row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= tolerance``, both decided exactly.
+    translation : array_like, shape (d,)
+        Added after the rotation.
+    tolerance : float, default 1e-12
+        From 0 to 0.1: 1e-6 accepts matrices of float32 or of few digits.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, NotRigidError
+        For arguments that break a rule.
+
+    Notes
+    -----
+    Up to a deviation of 1e-12 the body is the image under the matrix as given, though no rotation of floats is quite
+    orthogonal. Beyond, `rotation` becomes the rotation nearest to it (the orthogonal factor of its polar form, of the
     least sum of squared differences), each entry the double nearest to the exact one; so lengths are kept, a ball stays
     a ball, and the same matrix gives the same body everywhere. Immutable, picklable, compared by value.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, NotRigidError.
 
+    Examples
+    --------
     >>> Pose([[0, -1], [1, 0]], [5, 0])  # a quarter turn, then a step along x
     Pose(rotation=[[0.0, -1.0], [1.0, 0.0]], translation=[5.0, 0.0])
     """
@@ -81,15 +96,39 @@ class Pose(Immutable):
 
     @classmethod
     def identity(cls, dimension: int = 3) -> Pose:
-        """Return the motion that leaves everything where it is."""
+        """Return the motion that leaves everything where it is.
+
+        Parameters
+        ----------
+        dimension : int, default 3
+            2 or 3.
+
+        Returns
+        -------
+        Pose
+            The identity.
+        """
         check_given_dimension(dimension)
         return cls(np.eye(dimension), np.zeros(dimension))
 
     @classmethod
     def from_quaternion(cls, quaternion: object, translation: object) -> Pose:
-        """Return the rotation of a quaternion ``(w, x, y, z)`` of any length but 0, each entry the nearest double, then
-        the translation; 3D.
+        """Return the pose of a quaternion and a translation; 3D.
 
+        Parameters
+        ----------
+        quaternion : array_like, shape (4,)
+            ``(w, x, y, z)`` of any length but 0.
+        translation : array_like, shape (3,)
+            Added after the rotation.
+
+        Returns
+        -------
+        Pose
+            Each entry of its rotation is the double nearest to that of the exact rotation.
+
+        Examples
+        --------
         >>> Pose.from_quaternion([1, 0, 0, 1], [0, 0, 5]).rotation.tolist()  # a quarter turn around z
         [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
         """
@@ -109,9 +148,22 @@ class Pose(Immutable):
 
     @classmethod
     def from_matrix(cls, matrix: object, *, tolerance: float = 1e-12) -> Pose:
-        """Return the pose of a matrix ``(d + 1, d + 1)`` of homogeneous coordinates: rotation, translation in the last
-        column, last row 0 ... 0 1.
+        """Return the pose of a matrix of homogeneous coordinates.
 
+        Parameters
+        ----------
+        matrix : array_like, shape (d + 1, d + 1)
+            Rotation, translation in the last column, last row 0 ... 0 1.
+        tolerance : float, default 1e-12
+            As for `Pose`.
+
+        Returns
+        -------
+        Pose
+            The same motion.
+
+        Examples
+        --------
         >>> Pose.from_matrix([[0, -1, 5], [1, 0, 0], [0, 0, 1]]) == Pose([[0, -1], [1, 0]], [5, 0])
         True
         """

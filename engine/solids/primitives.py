@@ -15,10 +15,24 @@ from engine.types import FloatArray, IntArray, read_only
 class HalfSpace(Solid):
     """All points with ``dot(normal, p) + offset >= 0``, in 2D or 3D.
 
-    Parameters: normal, 2 or 3 numbers, of any length but zero, pointing into the solid; offset, a number.
-    Boundary: the points where the sum is exactly zero.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, ZeroNormalError.
+    Parameters
+    ----------
+    normal : array_like, shape (2,) or (3,)
+        Points into the solid; of any length but zero.
+    offset : float
+        Over the length of the normal: how far inside the origin lies.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, ZeroNormalError
+        For arguments that break a rule.
+
+    Notes
+    -----
+    Boundary: the points where the sum is exactly zero.
+
+    Examples
+    --------
     >>> HalfSpace(normal=[0.0, 0.0, 1.0], offset=-2.0).row.tolist()
     [0.0, 0.0, 1.0, -2.0]
     """
@@ -46,12 +60,26 @@ class HalfSpace(Solid):
 
 
 class Sphere(Solid):
-    """All points no farther than `radius` from `center`, in 2D or 3D.
+    """All points at most `radius` away from `center`, in 2D or 3D.
 
-    Parameters: center, 2 or 3 numbers; radius, a number >= 0. Boundary: the points at exactly that distance.
-    Degenerate: radius 0 is the single point `center`, all boundary.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, NegativeRadiusError.
+    Parameters
+    ----------
+    center : array_like, shape (2,) or (3,)
+        The centre.
+    radius : float
+        Zero or more.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, NegativeRadiusError
+        For arguments that break a rule.
+
+    Notes
+    -----
+    Boundary: the points at exactly that distance. Degenerate: radius 0 is the single point `center`, all boundary.
+
+    Examples
+    --------
     >>> Sphere([1, 2], 0.5)
     Sphere(center=[1.0, 2.0], radius=0.5)
     """
@@ -77,10 +105,23 @@ class Sphere(Solid):
 class Aabb(Solid):
     """All points with ``min <= p <= max`` on each axis, in 2D or 3D.
 
-    Parameters: min, max, 2 or 3 numbers each. Boundary: the points with some coordinate equal to its bound.
-    Degenerate: min = max on an axis gives a flat box, all boundary.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, MinAboveMaxError.
+    Parameters
+    ----------
+    min, max : array_like, shape (2,) or (3,)
+        The corners with the least and the greatest coordinates.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, MinAboveMaxError
+        For arguments that break a rule.
+
+    Notes
+    -----
+    Boundary: the points with some coordinate equal to its bound. Degenerate: min = max on an axis gives a flat box, all
+    boundary.
+
+    Examples
+    --------
     >>> Aabb(min=[0, 0, 0], max=[1, 2, 3])
     Aabb(min=[0.0, 0.0, 0.0], max=[1.0, 2.0, 3.0])
     """
@@ -123,10 +164,22 @@ def rows_between(low: FloatArray, high: FloatArray) -> FloatArray:
 class Convex(Solid):
     """All points on the inner side of every plane, in 2D or 3D; may be unbounded, flat or empty.
 
-    Parameters: planes, rows ``[a, b, c, d]`` with a x + b y + c z + d >= 0 inside (2D: ``[a, b, c]``), at least one.
-    Boundary: the points of the solid where some row is exactly zero.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError (no rows), ZeroNormalError.
+    Parameters
+    ----------
+    planes : array_like, shape (n, 4) or (n, 3)
+        Rows ``[a, b, c, d]`` with a x + b y + c z + d >= 0 inside (2D: ``[a, b, c]``), at least one.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, ZeroNormalError
+        For rows that break a rule; EmptyGeometryError where there are none.
+
+    Notes
+    -----
+    Boundary: the points of the solid where some row is exactly zero.
+
+    Examples
+    --------
     >>> Convex([[1, 0, 0], [0, 1, 0], [-1, -1, 1]])  # the triangle (0, 0), (1, 0), (0, 1)
     Convex(3 planes, 2D)
     """
@@ -165,12 +218,20 @@ def rows_in_space(rows: FloatArray) -> FloatArray:
 
 
 class Triangle(Solid):
-    """A triangle of three vertices in either order; in 3D `locate` asks for the prism over it, as the textbook does.
+    """A triangle of three vertices in either order; in 3D `locate` tests the prism over it, as the textbook does.
 
-    Parameters: vertices, 3 positions of 2 or 3 numbers.
-    Degenerate: three collinear or equal vertices are accepted.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError.
+    Parameters
+    ----------
+    vertices : array_like, shape (3, 2) or (3, 3)
+        Three collinear or equal vertices are accepted.
 
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError
+        For vertices that break a rule.
+
+    Examples
+    --------
     >>> Triangle([[0, 0], [1, 0], [0, 1]])
     Triangle([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     """

@@ -91,15 +91,40 @@ def next_in_rings(ring_offsets: IntArray) -> IntArray:
 
 
 def polygons(coordinates: object, ring_offsets: object, polygon_offsets: object) -> list[Polygon]:
-    """Return polygons from ragged arrays, as shapely.to_ragged_array, GeoArrow and `OverlayBatch` hold them.
+    """Return polygons from ragged arrays, as shapely.to_ragged_array, GeoArrow and `OverlayBatch` have them.
 
-    Parameters: coordinates: (n, 2) numbers, all rings one after another, each with its first position repeated at its
-    end or not. ring_offsets: whole numbers, ring r holds coordinates ring_offsets[r] up to ring_offsets[r + 1].
-    polygon_offsets: polygon k holds likewise some of the rings, each even-odd.
-    Returns: a list of `Polygon`. Borrowed: a polygon looks at the caller's coordinates, float64 and contiguous, which
-    must not be changed afterwards; one of several rings with repeated ends, or with -0.0 anywhere, has a copy.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, and as `Polygon` for a ring that is too short.
+    Parameters
+    ----------
+    coordinates : array_like, shape (n, 2)
+        All rings one after another, each with its first position repeated at its end or not.
+    ring_offsets : array_like of int, shape (n_rings + 1,)
+        Ring r has the coordinates ``ring_offsets[r]`` up to ``ring_offsets[r + 1]``.
+    polygon_offsets : array_like of int, shape (n_polygons + 1,)
+        Polygon k has the rings ``polygon_offsets[k]`` up to ``polygon_offsets[k + 1]``, even-odd.
 
+    Returns
+    -------
+    list of Polygon
+        Views of the caller's coordinates where these are float64 and contiguous, which must not be changed afterwards;
+        a polygon of several rings with repeated ends, or with -0.0 anywhere, is a copy.
+
+    Raises
+    ------
+    InvalidArrayError, WrongDimensionError, NotFiniteError
+        For arrays that break a rule.
+    RingTooShortError
+        As `Polygon`.
+
+    Notes
+    -----
+    Cost: linear; no object a ring.
+
+    References
+    ----------
+    The GeoArrow specification, layout of polygons.
+
+    Examples
+    --------
     >>> import numpy as np
     >>> square = np.array([[0, 0], [1, 0], [1, 1], [0, 0]], float)
     >>> polygons(square, [0, 4], [0, 1])

@@ -59,10 +59,12 @@ const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" 
 const compared = (state, operation, body, painted) => state.plain ? {
   path: "/v1/compare", body: { operation, ...body },
   figures: ({ method, differing, seconds_exact, seconds_plain }) => ({
-    "float64 wrong": differing.length, "float64 method": method, "exact against float64": `${(seconds_exact / seconds_plain).toPrecision(2)} times as long`,
+    "float64 wrong": differing.length, "float64 method": method, "time: exact / float64": times(seconds_exact / seconds_plain),
   }),
   draw: ({ differing }) => [painted(differing)],
 } : null;
+
+const times = (ratio) => (ratio < 1 ? `exact is ${(1 / ratio).toPrecision(2)}x faster` : `exact takes ${ratio.toPrecision(2)}x`);
 
 const firstItems = (state) => (state.dimension === 3 ? solid3d(state.first, "first", 0.3) : solid2d(state.first, "first"));
 
@@ -101,7 +103,7 @@ export const QUESTIONS = {
       return {
         inside, boundary: boundary.length, outside: contained.length - inside - boundary.length,
         "plain float64, wrong": `${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} (${method})`,
-        "seconds, exact beside plain": `${seconds_exact.toPrecision(2)} beside ${seconds_plain.toPrecision(2)}`,
+        "time: exact / float64": times(seconds_exact / seconds_plain),
       };
     },
     verdict: (state, { contained }, figures, { differing, method }) => `Plain float64 (${method}): ${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} points wrong`,

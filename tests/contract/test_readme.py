@@ -100,6 +100,13 @@ def test_the_python_shown_does_what_it_shows() -> None:
         assert doctest.DocTestRunner().run(test).failed == 0
 
 
+def test_the_tutorial_does_what_it_shows() -> None:
+    page = (ROOT / "docs" / "tutorial.md").read_text("utf-8")
+    test = doctest.DocTestParser().get_doctest(page, {}, "tutorial", "docs/tutorial.md", 0)
+    assert len(test.examples) >= 20
+    assert doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.IGNORE_EXCEPTION_DETAIL).run(test).failed == 0
+
+
 def test_the_two_commands_are_one_line_each_and_ci_runs_the_test_command() -> None:
     commands = [block.strip() for block in blocks("sh") if block.startswith("python3 -m venv")]
     assert [command.split(" && ")[-1] for command in commands] == [

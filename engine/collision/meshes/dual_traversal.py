@@ -5,6 +5,8 @@ Two trees are descended together: a pair of nodes is replaced by those pairs of 
 boxes nor planes part (`lanes/faces.py`); those are classified by signs. All of these are conservative under a pose, so
 no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again,
 and of the faces that meet in a common corner only (`contact_kinds.py`) gets no more than say all.
+
+Source: S. Gottschalk, M. Lin, D. Manocha, OBBTree: a hierarchical structure for rapid interference detection, 1996.
 """
 
 from __future__ import annotations

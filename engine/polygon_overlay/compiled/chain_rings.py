@@ -1,5 +1,8 @@
 """Boundary rings of the regions that a choice of labels keeps, walked over chains.
 
+Source of both walks: K. Weiler, P. Atherton, Hidden surface removal using polygon area sorting, 1977; G. Greiner,
+K. Hormann, Efficient clipping of arbitrary polygons, 1998.
+
 The same rules as in arrangement/rings.py: a walk keeps to its own region, is cut into simple rings where it passes a
 node twice, and lists the points where the boundary turns or rings meet.
 

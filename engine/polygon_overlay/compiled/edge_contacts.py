@@ -1,4 +1,4 @@
-"""Where the edges of rings meet: every contact decided exactly and entered as an event on the edges concerned.
+"""Noding: where the edges of rings meet. Every contact decided exactly and entered as an event on the edges concerned.
 
 Pairs whose boxes meet are looked at in floating point; exact signs decide what that leaves open.
 
@@ -13,6 +13,8 @@ hold its errors.
 
 Points are numbered: vertices first, crossings after them. Equal points are united (the smallest number stands for
 all, so a vertex where there is one), crossings through one point later, when the events of an edge are sorted.
+
+Source: the dual traversal of C. Ericson, Real-Time Collision Detection, 2005; signs after J. R. Shewchuk, 1997.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which faces are inside, and for rounded rings that are arranged again which rings tell so.
+"""Face labelling by a fill rule, with the provenance of rounded rings.
 
 The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the sources that it
 crosses, however many there are; of two polygons, the bits of a label. What is inside is a rule: the table of an
@@ -17,6 +17,8 @@ part by part, what the result came from (in_integers.py states the same rule ove
                     '------'        {}       in none                        outside            {}
 
 Only the few rings that a face lies in are looked at.
+
+Source: K. Weiler, P. Atherton, 1977, for two polygons; winding numbers after K. Hormann, A. Agathos, 2001.
 """
 
 from __future__ import annotations

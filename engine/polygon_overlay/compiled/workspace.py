@@ -152,10 +152,14 @@ def keep(scratch: Scratch) -> None:
 
 
 def release() -> None:
-    """Give back memory that calls keep for later ones: what large overlays wrote to, of arrays of 256 MB at most.
+    """Free the memory that calls cache for later ones: the workspaces of large overlays, at most 256 MB an array.
 
-    The next overlay takes it anew, which lasts 0.3 ms for each megabyte that it writes to.
+    Notes
+    -----
+    The next overlay allocates it again, 0.3 ms for each megabyte that it writes to.
 
+    Examples
+    --------
     >>> import engine
     >>> engine.release()
     """
