@@ -7,8 +7,8 @@ the cycle of a face goes on with the outgoing one next clockwise from the twin o
 A face has one cycle for each connected component of its boundary. Which cycles belong together is found by one exact
 stab per component: from its first node (leftmost, then lowest) straight down to the next edge below.
 
-Source: D. E. Muller, F. P. Preparata, Finding the intersection of two convex polyhedra, 1978 (half-edges, DCEL); winding
-numbers as fill rules: K. Hormann, A. Agathos, The point in polygon problem for arbitrary polygons, 2001.
+Source: D. E. Muller, F. P. Preparata, Finding the intersection of two convex polyhedra, 1978 (half-edges, DCEL);
+winding numbers as fill rules: K. Hormann, A. Agathos, The point in polygon problem for arbitrary polygons, 2001.
 """
 
 from __future__ import annotations

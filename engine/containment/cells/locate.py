@@ -6,7 +6,8 @@ triangle that the segment crosses. Points too close to a plane of an entry are l
 For scenes a point, which may carry a blur (filters.py), is looked up in the cells of one of many polyhedra (`Sides`).
 It must lie in one cell with all of its blur.
 
-Source: space-partitioned point containment with reference points, over the uniform grid of Ericson, 2005. Changed: certified in single precision, exact behind.
+Source: space-partitioned point containment with reference points, over the uniform grid of C. Ericson, 2005.
+Changed: certified in single precision, exact behind.
 """
 
 from __future__ import annotations
