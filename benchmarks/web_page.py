@@ -108,7 +108,7 @@ def _seen(row: Row) -> dict[str, Any]:
 def faults(each: dict[str, Any]) -> str:
     """Say how often one of the `seen` is wrong, refuses or does not take an item."""
     said = [f"{percent(each[kind] / each['judged'])}{' ' * bool(word)}{word}"
-            for kind, word in zip(BAD, ("", "refused", "not taken")) if each[kind]]  # fmt: skip
+            for kind, word in zip(BAD, ("", "raised an error", "unsupported")) if each[kind]]  # fmt: skip
     return f"{each['name']} {', '.join(said) or '0'}"
 
 
