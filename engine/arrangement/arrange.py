@@ -1,23 +1,19 @@
-r"""Exact planar arrangement: segments split wherever they meet, overlaps united.
+r"""Exact planar arrangement of segments (noding), and snap rounding of rings.
 
-    input          result       The pairs of segments whose boxes meet are found in float64 (exact for floats,
-      \  /           \ /        conservative for rationals), a float filter drops those that surely miss, and
-    ---\/----     ----+----    what is left is decided in integers. A crossing becomes a node; equal nodes are one,
-       /\            / \        so several segments through one point meet in one node, and collinear segments that
-                               overlap share the edges between their nodes.
+    input          result       Pairs of segments whose boxes intersect (exact for floats, conservative for rationals)
+      \  /           \ /        pass a float filter for certain misses; the rest is decided in integers. A crossing
+    ---\/----     ----+----     becomes a node; equal nodes are one, so segments through one point meet in one node, and
+       /\            / \        collinear segments that overlap share the edges between their nodes.
 
 The filter. For two segments ab and cd four orientations decide, each with the bound of predicates/orientation.py, many
 pairs at once. Overflow gives inf or NaN, and both comparisons with the bound then fail: UNDECIDED.
-
-`Arrangement` is the ground for everything after it (`subdivide`, labels, rings); a faster way of making one may replace
-`arrange` without touching those.
 
 Classical snap rounding: every vertex to a lattice point, every edge through the hot pixels that it passes.
 
 A pixel is the half-open square of one lattice spacing about a lattice point; it is hot if a vertex lies in it. An edge
 is replaced by the chain of centres of the hot pixels it passes, in that order. Edges that met in vertices only then
 meet in vertices only again (or coincide), and no edge moves by more than half a pixel's diagonal. So the result needs
-no further rounding, which the finer way (round, arrange again, round, ...) cannot promise.
+no further rounding, unlike the finer iteration (round, arrange again, round, ...).
 
 Source: J. D. Hobby, Practical segment intersection with finite precision output, 1999; L. J. Guibas and D. H. Marimont,
 Rounding arrangements dynamically, 1998.
@@ -46,23 +42,25 @@ from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray
 Line = tuple[int, int, int]
 """(a, b, c): a x + b y + c w is positive to the left of the directed line; its direction is (b, -a)."""
 
-_CHUNK: Final = 1 << 14  # pairs at once: 3 ms, and temporaries stay in cache
+_CHUNK: Final = 1 << 14  # pairs of one step: 3 ms, and temporaries stay in cache
 
 MISS: Final = 0
 CROSS: Final = 1
-_POLL = 64  # exact steps of some microseconds between two looks at the clock
+_POLL = 64  # exact steps of some microseconds between two polls
 
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
     """Edges that meet only in their ends.
 
-    nodes: all points; those of no edge (split away, or of zero length) may be among them.
-    tails, heads: the ends of each edge; the tail comes first in the order by x, then y.
-    lines: the line through each edge, directed from tail to head.
-    masks: for each edge the exclusive or of the masks of all input segments that cover it (even-odd by source): sets
-        of bits, or frozen sets. cover: for each edge the inclusive or of them.
-    n_exact: pairs of segments that the float filter left to integers.
+    | field | by | meaning |
+    | --- | --- | --- |
+    | nodes | - | all points; some may belong to no edge |
+    | tails, heads | edge | its ends; the tail is lexicographically smaller (x, then y) |
+    | lines | edge | the line through it, directed from tail to head |
+    | masks | edge | exclusive or of the masks (bits, or frozen sets) of all input segments that cover it |
+    | cover | edge | inclusive or of them |
+    | n_exact | - | pairs of segments decided in integers |
     """
 
     nodes: NodeTable
@@ -79,7 +77,7 @@ class Arrangement:
 
 
 line_through = cross
-"""The line from one point to another, a different one."""
+"""The line from one point to another, distinct one."""
 
 
 def side(line: Line, point: Homogeneous) -> int:
@@ -96,10 +94,10 @@ def crossing(first: Line, second: Line) -> Homogeneous:
 def arrange(
     nodes: NodeTable, segments: Sequence[tuple[int, int]], masks: Sequence[Any], budget: Budget | None = None
 ) -> Arrangement:
-    """Return the arrangement of `segments`, pairs of numbers in `nodes`, which gains the crossings.
+    """Return the arrangement of `segments`, pairs of numbers in `nodes`; crossings are added to `nodes`.
 
-    masks: for each segment the sources it bounds: the bits of an integer, or a frozenset. Segments of zero length bound
-    nothing and are left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves.
+    masks: by segment the sources it bounds: the bits of an integer, or a frozenset. Segments of zero length are left
+    out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves.
     """
     budget = budget or Budget()
     merged: dict[tuple[int, int], list[Any]] = {}
@@ -123,7 +121,7 @@ def arrange(
 def _meet_all(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], budget: Budget
 ) -> tuple[dict[int, set[int]], int]:
-    """Return for each segment that has any the nodes inside it, and how many pairs were decided in integers."""
+    """Return by segment the nodes inside it, if any, and the number of pairs decided in integers."""
     on_segment: dict[int, set[int]] = {}
     if not ends:
         return on_segment, 0
@@ -134,12 +132,12 @@ def _meet_all(
     budget.check()
     if nodes.all_floats:
         verdicts = classify_pairs(coordinates, array, pairs, budget)
-        kept = verdicts != MISS
-        pairs, verdicts = pairs[kept], verdicts[kept]
+        is_hit = verdicts != MISS
+        pairs, verdicts = pairs[is_hit], verdicts[is_hit]
     else:
         verdicts = np.full(len(pairs), UNDECIDED, np.int8)
     n_exact = 0
-    for start in range(0, len(pairs), _POLL):  # a list of millions of pairs holds its caller for seconds
+    for start in range(0, len(pairs), _POLL):  # a list of millions of pairs would take seconds
         budget.check()
         some = slice(start, start + _POLL)
         for (i, j), verdict in zip(pairs[some].tolist(), verdicts[some].tolist()):
@@ -154,7 +152,7 @@ def _meet_all(
 
 
 def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
-    """Return the sign of the turn a, b, c for rows of points, `UNDECIDED` where the bound does not settle it."""
+    """Return the signs of orient2d for rows of points, `UNDECIDED` where the bound does not prove it."""
     left = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
     right = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
     turn = left - right
@@ -169,7 +167,7 @@ def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray,
     """Return for each of `pairs` whether its segments MISS, CROSS in a point inside both, or are UNDECIDED.
 
     coordinates: (n_nodes, 2) float64, exact. segments: (n_segments, 2) int64 nodes. pairs: (n_pairs, 2) int64 segments.
-    Segments that share an end and are surely not collinear count as MISS: no point besides that end is common to them.
+    Segments that share an end and are proven not collinear count as MISS: that end is their only common point.
     """
     result = np.full(len(pairs), UNDECIDED, np.int8)
     for start in range(0, len(pairs), _CHUNK):
@@ -178,11 +176,11 @@ def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray,
         a, b, c, d = (coordinates[nodes] for nodes in (first[:, 0], first[:, 1], second[:, 0], second[:, 1]))
         with np.errstate(all="ignore"):
             sides = [_orientation(a, b, c), _orientation(a, b, d), _orientation(c, d, a), _orientation(c, d, b)]
-        sure = [side != UNDECIDED for side in sides]
+        is_decided = [side != UNDECIDED for side in sides]
         shared = (first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
-        one_sided = (sure[0] & (sides[0] == sides[1])) | (sure[2] & (sides[2] == sides[3]))
-        bent = shared & (sure[0] | sure[1] | sure[2] | sure[3])
-        straddle = sure[0] & sure[1] & sure[2] & sure[3] & ~shared
+        one_sided = (is_decided[0] & (sides[0] == sides[1])) | (is_decided[2] & (sides[2] == sides[3]))
+        bent = shared & (is_decided[0] | is_decided[1] | is_decided[2] | is_decided[3])
+        straddle = is_decided[0] & is_decided[1] & is_decided[2] & is_decided[3] & ~shared
         straddle &= (sides[0] != sides[1]) & (sides[2] != sides[3])
         part = result[start : start + _CHUNK]
         part[straddle] = CROSS
@@ -193,7 +191,7 @@ def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray,
 def _meet(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], i: int, j: int, on_segment: dict[int, set[int]]
 ) -> None:
-    """Enter the common nodes of the segments `i` and `j`, where they lie inside one of them, into `on_segment`."""
+    """Add the common nodes of the segments `i` and `j` that lie inside one of them to `on_segment`."""
     points, (a, b), (c, d) = nodes.points, ends[i], ends[j]
     line_i, line_j = lines[i], lines[j]
     side_c, side_d = side(line_i, points[c]), side(line_i, points[d])
@@ -254,9 +252,8 @@ def arrange_rings(
 ) -> Arrangement:
     """Return the arrangement of closed rings.
 
-    coordinates: (n_vertices, 2) float64, all rings one after another, none repeating its first vertex at its end.
-    ring_offsets: n_rings + 1 numbers, where each ring begins. ring_masks: the mask of each ring's edges; None for edges
-    that are sources of their own: the mask of each is the set of the number of its first vertex.
+    coordinates: (n_vertices, 2) float64, ring after ring, no first vertex repeated. ring_offsets: n_rings + 1 numbers.
+    ring_masks: the mask of each ring's edges; None: the mask of each edge is the set of the number of its first vertex.
     """
     nodes, numbers = float_nodes(coordinates, budget)
     segments: list[tuple[int, int]] = []
@@ -276,7 +273,7 @@ _HALF = Fraction(1, 2)
 
 
 class _Segment:
-    """A segment in whole parts of a lattice spacing."""
+    """A segment in integer fractions of a lattice spacing."""
 
     def __init__(self, start: Point, end: Point) -> None:
         (ax, ay), (bx, by) = (start, end) if start[0] <= end[0] else (end, start)
@@ -284,7 +281,9 @@ class _Segment:
         self.ends = [value.numerator * (self.unit // value.denominator) for value in (ax, ay, bx, by)]
 
     def passes(self, pixel: Pixel) -> bool:
-        """Tell whether it is in the half-open pixel: unless a corner tells that it enters and leaves on one side."""
+        """Return whether it intersects the half-open pixel: unless one corner proves that it enters and leaves on one
+        side.
+        """
         ax, ay, bx, by = self.ends
         left, low = ((2 * centre - 1) * (self.unit // 2) for centre in pixel)
         right, high = left + self.unit, low + self.unit
@@ -302,12 +301,12 @@ class _Segment:
 def snap_rings(
     rings: Sequence[Sequence[Point]], spacing_exponent: int, budget: Budget | None = None
 ) -> tuple[list[list[tuple[float, float]]], list[int]]:
-    """Return the rings snapped to the lattice of spacing ``2**spacing_exponent``, no vertex repeated in succession.
+    """Return the rings snapped to the lattice of spacing ``2**spacing_exponent``, without repeated vertices.
 
-    And for each of their vertices the number of the one, of all of ``rings``, whose edge goes on from there.
+    And by vertex the number of the input vertex, among all of ``rings``, whose edge continues from there.
 
-    rings: exact vertices; the edges of all rings meet only in vertices. Every coordinate must be below ``2**53``
-    spacings, so that lattice points are doubles. A ring may shrink to fewer than three vertices.
+    rings: exact vertices; edges meet only in vertices. Every coordinate must be below ``2**53`` spacings, so that
+    lattice points are doubles. A ring may shrink to fewer than three vertices.
     """
     budget = budget or Budget()
     unit = Fraction(2) ** spacing_exponent
@@ -339,7 +338,7 @@ def snap_rings(
 
 
 def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Point) -> list[int]:
-    """Return the pixels that the segment may pass: those near its box, and of many those near its line, generously.
+    """Return the pixels that the segment may pass: those near its box and its line, conservatively.
 
     hot: sorted; centres: the same as floats.
     """

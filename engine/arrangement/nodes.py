@@ -1,12 +1,12 @@
-"""Exact points of the plane as integers, each known once.
+"""Exact points of the plane as integers, without duplicates.
 
-A point is three integers (x, y, w) with w > 0 and gcd 1: it stands for (x / w, y / w) times a power of two that all
-points of one table share. Every finite float64 is an integer times a power of two, so points given as floats have
-w = 1; a crossing of two segments has w > 1. Equal points are equal tuples, so a dict unites them, and no exponent is
-out of range: 1e300 beside a denormal makes long integers, not wrong ones.
+A point is three integers (x, y, w) with w > 0 and gcd 1: it stands for (x / w, y / w) times a power of two common to
+all points of a table. Every finite float64 is an integer times a power of two, so points given as floats have w = 1; a
+crossing of two segments has w > 1. Equal points are equal tuples, so a dict unites them, and no exponent is out of
+range: 1e300 and a denormal together make long integers, not wrong ones.
 
-Each point also carries the doubles nearest to its coordinates. Rounding to nearest is monotone, so a strict order of
-these doubles is the order of the exact values, and boxes of them are conservative; ties are settled by the integers.
+Each point also has the doubles nearest to its coordinates. Rounding to nearest is monotone, so a strict order of these
+doubles is the order of the exact values, and boxes of them are conservative; integers decide ties.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from engine.types import FloatArray
 Homogeneous = tuple[int, int, int]
 """(x, y, w), w > 0, without a common factor."""
 
-_POLL = 1024  # points, a microsecond each, between two looks at the clock
+_POLL = 1024  # points, a microsecond each, between two polls
 
 
 def nearest_quotient(numerator: int, denominator: int) -> float:
@@ -86,7 +86,7 @@ class NodeTable:
 
     @property
     def all_floats(self) -> bool:
-        """Tell whether every point so far was given as floats."""
+        """Whether every point so far was given as floats."""
         return self._n_floats == len(self.points)
 
     def _new(self, point: Homogeneous, x: float, y: float) -> int:
@@ -97,7 +97,7 @@ class NodeTable:
         return number
 
     def compare(self, first: int, second: int) -> int:
-        """Return -1, 0 or 1 as `first` lies before, at or after `second` in the order by x, then by y."""
+        """Return -1, 0 or 1: `first` is lexicographically smaller than, equal to, larger than `second` (x, then y)."""
         a, b = self.xs[first], self.xs[second]
         if a != b:
             return -1 if a < b else 1
@@ -113,7 +113,7 @@ class NodeTable:
         return Fraction(x << self._up, w << self._down), Fraction(y << self._up, w << self._down)
 
     def displacement(self, number: int) -> float:
-        """Return the distance between a point and the doubles in `xs` and `ys`, rounded up; 0 where it is none."""
+        """Return the distance between a point and its rounded coordinates, rounded up."""
         if number < self._n_floats:
             return 0.0
         x, y, w = self.points[number]
@@ -130,7 +130,7 @@ class NodeTable:
 
 
 def float_nodes(coordinates: FloatArray, budget: Budget | None = None) -> tuple[NodeTable, list[int]]:
-    """Return a table holding the rows of `coordinates`, (n, 2) float64, finite, and the number of each row."""
+    """Return a table of the rows of `coordinates`, (n, 2) float64, finite, and the number of each row."""
     doubles = [value for row in coordinates.tolist() for value in row]
     ratios = [value.as_integer_ratio() for value in doubles]
     # Denominators are powers of two: the largest is common to all.
@@ -156,7 +156,7 @@ Rational = int | float | Fraction
 def rational_nodes(
     coordinates: Iterable[Sequence[Rational]], budget: Budget | None = None
 ) -> tuple[NodeTable, list[int]]:
-    """Return a table holding the points `coordinates`, (x, y) of ints, floats or fractions, and the number of each."""
+    """Return a table of the points `coordinates`, (x, y) of ints, floats or fractions, and the number of each."""
     nodes, numbers = NodeTable(0), []
     for k, (x, y) in enumerate(coordinates):
         if budget is not None and k % _POLL == 0:

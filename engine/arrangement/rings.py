@@ -15,7 +15,7 @@ that meet in one point stay apart:
 Area of rings with exact vertices: as a fraction, and as the nearest double without making the fraction.
 
 Twice the area of a ring is the sum of (x_i y_j - x_j y_i) / (w_i w_j) over its edges. As one fraction the denominators
-of all crossings multiply, so its length grows with their number; the nearest double is found from sums in fixed point,
+of all crossings multiply, so its length grows with their number; the nearest double comes from sums in fixed point,
 whose error is below one unit per term, and the fraction is made only where those cannot settle the rounding.
 """
 
@@ -41,9 +41,9 @@ from engine.types import BoolArray, FloatArray, IntArray
 
 @dataclass(slots=True)
 class Piece:
-    """One region: a shell and the holes in it, by the half-edges that leave their corners.
+    """One region: a shell and the holes in it, each by the half-edges that leave its corners.
 
-    The first corner of a ring is its leftmost, then lowest.
+    The first corner of a ring is the lexicographically smallest (x, then y).
 
     evidence: the union of the evidence of the region's faces; hole_evidence: the same for each hole, of the regions on
     the other side of its ring.
@@ -56,11 +56,10 @@ class Piece:
 
 
 def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequence[frozenset[int]]) -> list[Piece]:
-    """Return the regions that the faces marked `inside` make, in the order of their shells.
+    """Return the regions of the faces marked `inside`, in lexicographic order of their shells.
 
-    inside, evidence: one for each face; face 0 must be outside, marked 0; faces of two marks are two regions. Shells
-    run counter-clockwise, holes clockwise; pieces are in lexicographic order of their shells' nodes, holes likewise:
-    the order does not depend on that of the input.
+    inside, evidence: by face; face 0 must be outside, marked 0; faces of two marks are two regions. Shells run
+    counter-clockwise, holes clockwise, also in lexicographic order: independent of the order of the input.
     """
     arrangement, faces = subdivision.arrangement, subdivision.faces
     bounds = [inside[left] != inside[right] for left, right in polled(zip(faces[0::2], faces[1::2]))]
@@ -101,7 +100,7 @@ def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequ
 
 
 def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int, int]:
-    """Return the place of each node that has boundary edges in the order by x, then by y."""
+    """Return the lexicographic rank (x, then y) of each node that has boundary edges."""
     nodes = arrangement.nodes
     used = sorted((node for node, fan in enumerate(polled(fans)) if fan), key=nodes.xs.__getitem__)
     in_order: list[int] = []
@@ -116,7 +115,7 @@ def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int,
 
 
 def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Sequence[int]) -> list[list[int]]:
-    """Return the cycles of `following` through `starts`, cut where they pass a node twice, as half-edges."""
+    """Return the cycles of `following` through `starts` as half-edges, cut where they pass a node twice."""
     seen = [False] * len(following)
     rings: list[list[int]] = []
     for start in polled(starts):
@@ -145,7 +144,9 @@ def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Se
 def _corners(
     arrangement: Arrangement, fans: Sequence[Sequence[int]], rank: dict[int, int], ring: list[int]
 ) -> tuple[list[int], bool]:
-    """Return the half-edges that leave the corners of a simple ring, from its first on; and whether it is a shell."""
+    """Return the half-edges that leave the corners of a simple ring, from the first corner on; and whether it is a
+    shell.
+    """
     lines = arrangement.lines
     corners: list[int] = []
     first, is_shell = -1, False
@@ -162,7 +163,7 @@ def _corners(
     return corners[first:] + corners[:first], is_shell
 
 
-_PRECISIONS = (160, 640)  # bits of the largest term that are kept; the second for sums that nearly cancel
+_PRECISIONS = (160, 640)  # bits of the largest term that are used; the second for sums that nearly cancel
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,11 +178,11 @@ class ExactRings:
         return len(self.rings)
 
     def exact_rings(self) -> ExactRings:
-        """Return the rings themselves; those of an overlay may first have to be made."""
+        """Return the rings themselves; those of an overlay may have to be computed first."""
         return self
 
     def some(self, rings: Sequence[int]) -> ExactRings:
-        """Return some of the rings, by their numbers."""
+        """Return the rings with these numbers."""
         return ExactRings(tuple(self.rings[ring] for ring in rings), self.exponent)
 
     def places(self) -> list[list[tuple[Fraction, Fraction]]]:
@@ -224,11 +225,12 @@ class ExactRings:
         return _nearest(*_sum(terms), 2 * self.exponent - 1)
 
     def are_shells(self) -> BoolArray:
-        """Tell of each ring whether its exact area is positive, also where that is no double."""
+        """Return by ring whether its exact area is positive, also where that is no double."""
         return np.array([_is_positive(self.some([ring])._terms()) for ring in range(self.n_rings)], np.bool_)
 
 
 def _is_positive(terms: Sequence[tuple[int, int]]) -> bool:
+    """Return whether the sum of terms is positive, by bounds or else exactly."""
     for low, high, _ in _bounds(terms):
         if low > 0 or high < 0:
             return low > 0
@@ -254,7 +256,7 @@ def _nearest(numerator: int, denominator: int, exponent: int) -> float:
 
 
 def _sum(terms: Iterable[tuple[int, int]]) -> tuple[int, int]:
-    """Return the sum of fractions as one, not reduced; halves are added first, so that long numbers meet long ones."""
+    """Return the sum of fractions as one, not reduced; by halves, so that long numbers are added to long ones."""
     level: Sequence[tuple[int, int]] = list(terms)
     while len(level) > 1:  # bound: each turn halves the list
         odd = level[-1:] if len(level) % 2 else []

@@ -1,11 +1,11 @@
-"""Faces of an arrangement: half-edges in exact angular order, boundary cycles, components located in faces.
+"""Faces of an arrangement (DCEL): half-edges in exact angular order, boundary cycles, components located in faces.
 
 Edge e has two half-edges: 2 e runs from tail to head (to the right, or straight up), 2 e + 1 back; ``h ^ 1`` is the
-twin. The face of a half-edge lies to its left. Around a node the outgoing half-edges stand in counter-clockwise order;
-the cycle of a face goes on with the outgoing one next clockwise from the twin of the one that arrived.
+twin. The face of a half-edge lies to its left. Around a node the outgoing half-edges are in counter-clockwise order;
+the cycle of a face continues with the outgoing one next clockwise from the twin of the one that arrived.
 
-A face has one cycle for each connected component of its boundary. Which cycles belong together is found by one exact
-stab per component: from its first node (leftmost, then lowest) straight down to the next edge below.
+A face has one cycle for each connected component of its boundary. Cycles of one face are united by one exact vertical
+ray (stab) per component: from its first node (leftmost, then lowest) straight down to the next edge below.
 
 Source: D. E. Muller, F. P. Preparata, Finding the intersection of two convex polyhedra, 1978 (half-edges, DCEL);
 winding numbers as fill rules: K. Hormann, A. Agathos, The point in polygon problem for arbitrary polygons, 2001.
@@ -28,11 +28,11 @@ from engine.running.budget import poll, polled
 
 @dataclass(frozen=True, slots=True)
 class Subdivision:
-    """The faces that the edges of an arrangement leave.
+    """The faces of an arrangement.
 
-    around: for each node its outgoing half-edges, counter-clockwise, beginning after straight down.
-    faces: for each half-edge the face to its left; face 0 is the unbounded one.
-    n_faces: how many there are.
+    around: by node its outgoing half-edges, counter-clockwise, beginning after straight down.
+    faces: by half-edge the face to its left; face 0 is the unbounded one.
+    n_faces: number of faces.
     """
 
     arrangement: Arrangement
@@ -49,7 +49,7 @@ def turn_of(first: Line, second: Line) -> int:
 
 
 def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
-    """Return for each node its outgoing half-edges, counter-clockwise, beginning after straight down."""
+    """Return by node its outgoing half-edges, counter-clockwise, beginning after straight down."""
     lines = arrangement.lines
 
     # Lines run right or straight up, so all outgoing half-edges of even number lie within one half turn, the odd ones
@@ -71,7 +71,7 @@ def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
 
 
 def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[int]:
-    """Return for each half-edge the one that follows it around the face to its left (-1 for those not in `around`)."""
+    """Return by half-edge the next one around the face to its left (-1 for those not in `around`)."""
     following = [-1] * n_half_edges
     for fan in polled(around):
         before = fan[-1] if fan else -1
@@ -82,7 +82,7 @@ def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[
 
 
 def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
-    """Return for each half-edge the number of its cycle under `following`, and how many cycles there are."""
+    """Return by half-edge the number of its cycle under `following`, and the number of cycles."""
     cycle = [-1] * len(following)
     n_cycles = 0
     for start in polled(range(len(following))):
@@ -96,9 +96,9 @@ def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
 
 
 def subdivide(arrangement: Arrangement) -> Subdivision:
-    """Return the faces of `arrangement`; cost: linear, plus one stab for each connected component of the edges.
+    """Return the faces of `arrangement`; cost: linear, plus one vertical ray for each connected component of the edges.
 
-    Polls, as all functions here do: the time of the call that this is done for ends the work.
+    Polls the deadline of the current call, like all functions here.
     """
     around = half_edges_around(arrangement)
     cycle, n_cycles = cycles_of(next_half_edges(around, 2 * len(arrangement.tails)))
@@ -117,7 +117,7 @@ def subdivide(arrangement: Arrangement) -> Subdivision:
 
 
 def _first_nodes(arrangement: Arrangement) -> list[int]:
-    """Return the first node, by x, then by y, of each connected component of the edges."""
+    """Return the first node (x, then y) of each connected component of the edges."""
     compare = arrangement.nodes.compare
     joined = UnionFind(len(arrangement.nodes.points))
     for tail, head in polled(zip(arrangement.tails, arrangement.heads)):
@@ -132,11 +132,11 @@ def _first_nodes(arrangement: Arrangement) -> list[int]:
 
 
 def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, winds: bool = False) -> list[Any]:
-    """Return for each face the exclusive or of the masks of the edges between it and infinity.
+    """Return by face the exclusive or of the masks of the edges between it and infinity (label propagation).
 
-    masks: one for each edge; left out, those of the arrangement. Bit k of a label tells whether the face lies in source
-    k under the even-odd rule. The labels are well defined where each source is a set of closed rings. winds: masks are
-    how often rings run along each edge, less how often against it, and labels are winding numbers.
+    masks: by edge; default: those of the arrangement. Bit k of a label: the face lies in source k (even-odd), if each
+    source is a set of closed rings. winds: masks are the rings along each edge minus those against it, and labels are
+    winding numbers.
     """
     masks = subdivision.arrangement.masks if masks is None else masks
     faces = subdivision.faces
@@ -159,10 +159,10 @@ def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, wi
 
 
 class EdgesBelow:
-    """The edges of an arrangement, ready for stabs straight down from a node, an infinitesimal step to its right.
+    """The edges of an arrangement, indexed for vertical rays down from a node, an infinitesimal step to its right.
 
-    Arrays of rounded coordinates prune (rounding is monotone), integers decide. A stab counts edges that begin at the
-    node's x and leaves out those that end there, and vertical ones.
+    Arrays of rounded coordinates prune (rounding is monotone), integers decide. Edges that begin at the node's x count,
+    edges that end there and vertical ones do not.
     """
 
     __slots__ = ("_arrangement", "_high", "_low", "_x_max", "_x_min")
@@ -180,10 +180,10 @@ class EdgesBelow:
         tails, heads = self._arrangement.tails, self._arrangement.heads
         x, y, point = nodes.xs[node], nodes.ys[node], nodes.points[node]
         near = np.flatnonzero((self._x_min <= x) & (self._x_max >= x) & (self._low <= y))
-        # An edge that surely spans x and surely lies below bounds the answer from below.
-        sure = near[(self._x_min[near] < x) & (self._x_max[near] > x) & (self._high[near] < y)]
-        if len(sure):
-            near = near[self._high[near] >= self._low[sure].max()]
+        # An edge that certainly spans x and lies below bounds the answer from below.
+        certain = near[(self._x_min[near] < x) & (self._x_max[near] > x) & (self._high[near] < y)]
+        if len(certain):
+            near = near[self._high[near] >= self._low[certain].max()]
         best = -1
         for edge in near.tolist():
             tail, head = nodes.points[tails[edge]], nodes.points[heads[edge]]
@@ -195,7 +195,7 @@ class EdgesBelow:
 
 
 def _is_above(first: Line, second: Line, point: Homogeneous) -> bool:
-    """Tell whether `first` runs above `second` just right of `point`; both run to the right."""
+    """Return whether `first` runs above `second` just right of `point`; both run to the right."""
     # On a x + b y + c w = 0 with b > 0 and w = 1: y = -(a x + c) / b, and the slope is -a / b.
     height = (first[0] * point[0] + first[2] * point[2]) * second[1]
     other = (second[0] * point[0] + second[2] * point[2]) * first[1]

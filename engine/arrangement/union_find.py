@@ -1,4 +1,4 @@
-"""Sets that only ever grow together: forests whose roots stand for them, in Python and compiled."""
+"""Union-find: disjoint sets as forests, in Python and compiled."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class UnionFind:
         self.parent = list(range(n))
 
     def find(self, member: int) -> int:
-        """Return the root of the set that holds `member`."""
+        """Return the root of the set of `member`."""
         parent = self.parent
         while parent[member] != member:
             parent[member] = member = parent[parent[member]]
         return member
 
     def unite(self, first: int, second: int) -> None:
-        """Make one set of those that hold `first` and `second`."""
+        """Unite the sets of `first` and `second`."""
         first, second = self.find(first), self.find(second)
         if first < second:
             self.parent[second] = first
@@ -42,7 +42,7 @@ def root_of(parent: Any, i: int) -> int:
 
 @merged
 def unite(parent: Any, i: int, j: int) -> None:
-    """Make one set of those that hold i and j; its smallest member stands for it."""
+    """Unite the sets of i and j; the smallest member is the root."""
     i, j = root_of(parent, i), root_of(parent, j)
     if i < j:
         parent[j] = i

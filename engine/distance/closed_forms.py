@@ -24,7 +24,7 @@ from engine.predicates.error_free import (
     dd_mul,
     dd_sub,
     fast_two_sum,
-    surely_rounded,
+    is_correctly_rounded,
     two_prod,
     two_sum,
     workspace,
@@ -241,7 +241,7 @@ def gap_of_forms(
         return UNSURE, faces, theirs, rest, error
     if distance.h < -bound or (distance.h == 0.0 and bound == 0.0):
         return 0.0, faces, theirs, rest, error
-    is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
+    is_sure = distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)
     return distance.h if is_sure else UNSURE, faces, theirs, rest, error
 
 
@@ -274,7 +274,7 @@ def nearest_of_forms(
                     bound += 96.0 * U2 * abs(step.h) + _TINY * (1.0 + radius + radius / size.h)
                 bound += error * (1.0 + 4.0 * radius / size.h)
             points[end, k] = x.h + 0.0
-            is_sure = is_sure and surely_rounded(x.h, x.low, bound)
+            is_sure = is_sure and is_correctly_rounded(x.h, x.low, bound)
     return distance, faces if is_sure else -1, theirs
 
 
@@ -304,7 +304,7 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
     bound = 2.0 * slack / norm.h + 128.0 * U2 * abs(away.h) + 4.0 * U2 * abs(distance.h)
     if distance.h < -bound:
         return 0.0, -1, faces
-    if not (distance.h > bound and surely_rounded(distance.h, distance.low, bound)):
+    if not (distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)):
         return UNSURE, -1, faces
     is_sure = True
     for k in range(d):
@@ -315,7 +315,7 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
         bound = 0.0
         if row[k] != 0.0:
             bound = 128.0 * U2 * abs(step.h) + 2.0 * slack * abs(row[k]) / square.h + 4.0 * U2 * abs(foot.h)
-            is_sure = is_sure and surely_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
+            is_sure = is_sure and is_correctly_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
             bound = 128.0 * U2 * abs(outward.h) + 4.0 * U2 * abs(p.h) + _PLANE_TINY if form[RADIUS] > 0.0 else 0.0
-        is_sure = is_sure and surely_rounded(p.h, p.low, bound + error)
+        is_sure = is_sure and is_correctly_rounded(p.h, p.low, bound + error)
     return distance.h, 0 if is_sure else -1, faces

@@ -26,7 +26,7 @@ from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.distance.closed_forms import Wide, Wide3, dot3, gap_of_forms, less, less3, root
 from engine.distance.refined import ROUNDING, corner_of, ends_of, height_above
-from engine.predicates.error_free import surely_rounded, two_diff, two_sum, workspace
+from engine.predicates.error_free import is_correctly_rounded, two_diff, two_sum, workspace
 from engine.predicates.vectors import dot, largest_of, length, minus, negative
 from engine.types import FlagArray, FloatArray, IntArray, Point3
 
@@ -173,7 +173,7 @@ def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach:
     beyond = max(_beyond(pool, a, n, p_end, here, whole), _beyond(pool, b, less3(here, n), q_end, there, whole))
     size, radii = root(square), Wide(*two_sum(a.round, b.round))
     distance, bound = less(size, radii), 2.0 * beyond / size.h + ROUNDING * (whole + radii.h)
-    is_sure = distance.h > bound and surely_rounded(distance.h, distance.low, bound)
+    is_sure = distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)
     return distance.h if is_sure else np.nan
 
 

@@ -15,7 +15,7 @@ from engine.collision.outline_batch import BLOCK, inside, n_blocks, relate_place
 from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, measure, minus2, place, point
-from engine.predicates.error_free import U2, surely_rounded, two_sum, workspace
+from engine.predicates.error_free import U2, is_correctly_rounded, two_sum, workspace
 from engine.predicates.orientation import lower
 from engine.predicates.parameters import compare_differences
 from engine.predicates.vectors import as_point2
@@ -294,7 +294,7 @@ def _write(
         if radius > 0.0:
             x = plus(x, times(over(way.x if k == 0 else way.y, found.distance), Wide(radius, 0.0)))
             bound += radius * (4.0 * errors / found.distance.h + 2.0**-98) + 2.0**-100 * abs(x.h)
-        is_sure = is_sure and surely_rounded(x.h, x.low, bound) and (bound == 0.0 or abs(x.h) > 2.0**-800)
+        is_sure = is_sure and is_correctly_rounded(x.h, x.low, bound) and (bound == 0.0 or abs(x.h) > 2.0**-800)
         points[end, k] = x.h + 0.0
     return is_sure
 
@@ -319,7 +319,7 @@ def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: F
     bound += 4.0 * U2 * abs(distance.h) if both.h > 0.0 else 0.0
     if distance.h < -bound:
         return 0.0, -1, -1
-    if not (distance.h > bound and surely_rounded(distance.h, distance.low, bound)):
+    if not (distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)):
         return UNSURE, -1, -1
     if not is_sure:
         return distance.h, -1, -1

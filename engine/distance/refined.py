@@ -36,7 +36,7 @@ from engine.distance.closed_forms import Wide, Wide3, along3, dot3, less, less3,
 from engine.lanes.boxes import FRAME_ROWS
 from engine.lanes.faces import FIXED_ROWS, GAP_ROWS
 from engine.lanes.tracing import LANES
-from engine.predicates.error_free import surely_rounded, two_diff
+from engine.predicates.error_free import is_correctly_rounded, two_diff
 from engine.types import FloatArray, Point3
 
 ROOT: Final = -1
@@ -252,7 +252,7 @@ def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, 
     distance = less(less(least, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
     value = distance.h / unit
     is_sure = 2.0**-1000 < value < 2.0**1000
-    is_sure = is_sure and surely_rounded(distance.h, distance.low, less(least, lowest).h + ROUNDING)
+    is_sure = is_sure and is_correctly_rounded(distance.h, distance.low, less(least, lowest).h + ROUNDING)
     return value if is_sure else -1.0, n
 
 
@@ -287,7 +287,7 @@ def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: 
             continue
         end = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
         point[k] = end.h / view.unit
-        is_sure = is_sure and surely_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
+        is_sure = is_sure and is_correctly_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
     return is_sure
 
 

@@ -19,12 +19,12 @@ from engine.types import FloatArray, IntArray
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 _SOUPS: Final = ("stl",)
-"""Formats of triangles without numbers of vertices."""
+"""Formats of triangles without vertex numbers."""
 M = TypeVar("M", bound=Mesh)
 _ELEMENT: Final = re.compile(rb"^[ \t]*([vf])(?=\s|\Z)([^\n#]*)", re.MULTILINE)
-"""The lines of an OBJ file that say something of its shape."""
+"""The lines of an OBJ file that define vertices and faces."""
 _BESIDE: Final = re.compile(rb"/\S*")
-"""The numbers of texture and normal behind that of a vertex."""
+"""The texture and normal numbers after that of a vertex."""
 
 
 class _Arrays(NamedTuple):
@@ -193,7 +193,7 @@ def _read_off(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
 
 
 def _read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
-    """Return vertices and faces of a PLY file before trimesh cuts them, as fans."""
+    """Return vertices and faces of a PLY file; trimesh itself would cut them as fans."""
     from trimesh.exchange.ply import load_ply
 
     elements = load_ply(file, skip_materials=True)["metadata"]["_ply_raw"]
@@ -213,11 +213,11 @@ _READERS: Final[dict[str, Callable[[IO[bytes]], tuple[FloatArray, Any]]]] = {
     "off": _read_off,
     "ply": _read_ply,
 }
-"""Of formats that have polygons: trimesh cuts them as fans, also those that are not convex."""
+"""Readers of formats with polygons: trimesh cuts them as fans, also those that are not convex."""
 
 
 def _cut(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
-    """Return the triangles of faces, cut by the rule of constructors (ear_cutting.py), and the face that each is of."""
+    """Return the triangles of faces, cut like in the constructors (ear_cutting.py), and the face of each."""
     counts, numbers = np.fromiter(map(len, faces), np.int64), np.arange(len(faces))
     indices = (
         np.asarray(faces, np.int64).ravel()
@@ -254,8 +254,7 @@ def _cut(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
 
 
 def _merged(vertices: FloatArray, faces: IntArray, numbers: IntArray, file_format: str) -> MeshOfFile:
-    """Return the vertices at different coordinates in their first order, and the faces with their new indices but for
-    those that this collapses."""
+    """Return the vertices without duplicates, by first occurrence, and the faces that this does not collapse."""
     n_faces, remaining = len(faces), np.arange(len(faces))
     first, originals = first_equal(frozen(vertices)), np.arange(len(vertices))
     if first is not None:
@@ -278,5 +277,5 @@ def _merged(vertices: FloatArray, faces: IntArray, numbers: IntArray, file_forma
 
 
 def _has_equal(faces: IntArray) -> Any:
-    """Tell of each triangle whether two of its corners are one vertex."""
+    """Return by triangle whether two of its corners are one vertex."""
     return (faces == np.roll(faces, 1, axis=1)).any(axis=1)

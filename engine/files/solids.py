@@ -1,7 +1,4 @@
-"""Solids from files: meshes, GeoJSON polygons, and the JSON of the HTTP interface.
-
-Arrays of numbers from and to .npy, .csv and GeoJSON files.
-"""
+"""Reads solids from files (meshes, GeoJSON polygons, the JSON of the HTTP interface), and arrays from and to files."""
 
 from __future__ import annotations
 
@@ -27,14 +24,17 @@ from engine.types import FloatArray
 POSITIONS: Final = {
     "Point": lambda at: [at], "MultiPoint": list, "LineString": lambda at: [at], "MultiLineString": list,
 }  # fmt: skip
-"""What makes a list of items of the coordinates of a GeoJSON geometry."""
+"""By type of a GeoJSON geometry, the function from its coordinates to a list of items."""
 
 
 def read_rows(source: str, shape: tuple[int, ...]) -> FloatArray:
-    """Return an array ``(n, *shape)``; in `shape` a -1 stands for the dimension that the file tells.
+    """Return an array ``(n, *shape)``; a -1 in `shape` is the dimension of the file.
 
-    .npy: any array of that many numbers a row. .csv: a row a line, a header is skipped. .geojson: points, or line
-    strings of two positions.
+    | suffix | contents |
+    | --- | --- |
+    | .npy | any array of that many numbers a row |
+    | .csv | a row a line, a header is skipped |
+    | .geojson, .json | points, or line strings of two positions |
     """
     path = Path(source)
     suffix = path.suffix.lower()
@@ -86,7 +86,7 @@ def _positions(value: Any) -> list[Any]:
 def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> None:
     """Write columns of equal length, ``(n,)`` or ``(n, k)`` each: .npz by name, .npy if there is one column, else .csv.
 
-    target: a path; None writes .csv to the standard output. Doubles are written so that they read back the same.
+    target: a path; None: .csv to the standard output. Doubles are written so that they read back the same.
     """
     suffix = "" if target is None else Path(target).suffix.lower()
     if suffix == ".npy" and len(columns) == 1:
@@ -112,10 +112,10 @@ def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
 
 
 def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
-    """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if there is one."""
+    """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if any."""
     with _opened(target) as file:
-        told = "" if crs is None else f'"crs": {json.dumps(crs)}, '
-        file.write(f'{{"type": "FeatureCollection", {told}"features": [')
+        member = "" if crs is None else f'"crs": {json.dumps(crs)}, '
+        file.write(f'{{"type": "FeatureCollection", {member}"features": [')
         for number, feature in enumerate(features):
             file.write(",\n" if number else "\n")
             file.write(json.dumps(feature, default=lambda array: array.tolist()))
@@ -143,7 +143,7 @@ def read_solid(source: str, note: Note | None = None) -> Solid:
 
 
 def read_solids(source: str, note: Note | None = None) -> list[Solid]:
-    """Return all solids of `source`: several only where it is a GeoJSON collection."""
+    """Return all solids of `source`: several only for a GeoJSON collection."""
     if source.lstrip().startswith("{"):
         return from_json(_parsed(source, "the argument"))
     path = Path(source)
@@ -169,7 +169,7 @@ def read_solids(source: str, note: Note | None = None) -> list[Solid]:
 
 
 def read_features(source: str) -> Any:
-    """Return the FeatureCollection of a GeoJSON file; a feature or a geometry alone is one of one feature."""
+    """Return the FeatureCollection of a GeoJSON file; a single feature or geometry becomes a collection of one."""
     value = _parsed(source if source.lstrip().startswith("{") else Path(source).read_text("utf-8"), source)
     if not isinstance(value, dict) or value.get("type") == "FeatureCollection":
         return value

@@ -1,9 +1,9 @@
-"""Layers as GeoJSON (RFC 7946): FeatureCollections in, features out; what HTTP and the command line speak.
+"""Layers as GeoJSON (RFC 7946): FeatureCollections in, features out; for HTTP and the command line.
 
-What a feature holds beside its geometry goes through untouched: properties, id, the `crs`. It is written as JSON once a
-feature (json_text.py), and rows are put together of these texts: how long an answer gets is known before it is made.
-A row that comes from features of both layers has the properties of both, names that both layers have with _1 and _2,
-as geopandas names them; `left` and `right` say which features these were.
+What a feature has besides its geometry (properties, id) and the `crs` is copied unchanged: written as JSON once a
+feature (json_text.py), and joined to rows, so that the length of an answer is known before it is made. A row from
+features of both layers has the properties of both, names that both layers have with _1 and _2, as in geopandas; `left`
+and `right` are the numbers of these features.
 """
 
 from __future__ import annotations
@@ -17,9 +17,17 @@ from typing import Any, Final
 import numpy as np
 
 from engine.errors import CancelledError, DeadlineExceededError, EngineError, InvalidInputError
-from engine.layers.geojson import checked_each, collection_of, crs_of, groups_of, members_of, polygons_of, texts_of
+from engine.layers.geojson import check_each, collection_of, crs_of, groups_of, members_of, polygons_of, texts_of
 from engine.layers.json_text import text_of
-from engine.layers.rows import NONE, LayerRows, Limits, dissolved, held, overlay_rows, with_alone
+from engine.layers.rows import (
+    NONE,
+    LayerRows,
+    Limits,
+    dissolve_rows,
+    locate_points_in_layer,
+    overlay_rows,
+    with_unmatched_points,
+)
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
 from engine.solids.checks import as_points, shown
@@ -27,11 +35,11 @@ from engine.solids.ragged import summed
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
 _CHECKED: Final = 1000
-"""Features made at once."""
+"""Features made in one step."""
 _ROW: Final = 55
-"""Bytes of JSON of a row at least, without what is copied into it and its positions."""
+"""Lower bound of the bytes of JSON of a row, without copied members and positions."""
 _POSITION: Final = 10
-"""Bytes of JSON of a position at least."""
+"""Lower bound of the bytes of JSON of a position."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,11 +172,11 @@ def overlay_features(
     limits = Limits(deadline, cancel)
     sides = [collection_of(value, (name,), limits) for value, name in ((left, "left"), (right, "right"))]
     crs = crs_of(sides, limits)
-    told, n_bytes = members_of(sides, ("left", "right"), limits)
+    members_of_row, n_bytes = members_of(sides, ("left", "right"), limits)
     layers = [polygons_of(side, limits) for side in sides]
     rows = overlay_rows(layers[0], layers[1], how, limits)
     made = _with_areas(
-        rows, lambda row: told(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
+        rows, lambda row: members_of_row(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
     )
     return (made, limits.accuracy) if report else made
 
@@ -225,23 +233,26 @@ def dissolve_features(
     side = collection_of(layer, ("layer",), limits)
     crs = crs_of([side], limits)
     names = _checked_names(by)
-    for member, kept in (("properties", side.properties), ("id", ({"id": each.get("id")} for each in side.features))):
-        checked = texts_of(side, kept, member, limits)  # none may be what JSON cannot hold
+    for member, values_of_member in (
+        ("properties", side.properties),
+        ("id", ({"id": each.get("id")} for each in side.features)),
+    ):
+        checked = texts_of(side, values_of_member, member, limits)  # none may be what JSON cannot hold
         limits.budget().take(-sum(map(len, checked)))
         del checked
     groups, values = groups_of(side, names, limits)
-    rows = dissolved(polygons_of(side, limits), groups, len(values), limits)
+    rows = dissolve_rows(polygons_of(side, limits), groups, len(values), limits)
     counts = np.bincount(groups, minlength=len(rows)).tolist()
     texts = [b"%b:null" % text_of(name) for name in names]
 
-    def told(row: int) -> bytes:
+    def members_of_row(row: int) -> bytes:
         own = texts.copy()
         for place, value in values[row].items():
             own[place] = own[place][:-4] + value
         return b'"properties":{%b}' % b",".join([*own, b'"count":%d' % counts[row]])
 
     lengths = [sum(len(value) - 4 for value in each.values()) for each in polled(values)]
-    made = _with_areas(rows, told, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
+    made = _with_areas(rows, members_of_row, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
     return (made, limits.accuracy) if report else made
 
 
@@ -315,18 +326,18 @@ def locate_features(
         except (DeadlineExceededError, CancelledError):
             raise
         except EngineError:
-            positions = checked_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
+            positions = check_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
     geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
-    told, n_bytes = members_of(sides, ("point", "polygon"), limits)
+    members_of_row, n_bytes = members_of(sides, ("point", "polygon"), limits)
     layer = polygons_of(sides[1], limits)
-    first, second, on_boundary = held(positions, layer, limits)
+    first, second, on_boundary = locate_points_in_layer(positions, layer, limits)
     first = np.array(there, np.int64)[first]
     if outside:
-        first, second, on_boundary = with_alone(len(sides[0].features), first, second, on_boundary)
+        first, second, on_boundary = with_unmatched_points(len(sides[0].features), first, second, on_boundary)
 
     def members(row: int) -> bytes:
         more = (b',"boundary":false', b',"boundary":true')[int(on_boundary[row])] if second[row] != NONE else b""
-        return told(int(first[row]), int(second[row])) + more
+        return members_of_row(int(first[row]), int(second[row])) + more
 
     sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
     offsets, n_bytes_before = read_only(np.arange(len(first) + 1)), summed(_ROW + sizes)
@@ -335,7 +346,7 @@ def locate_features(
 
 
 def _with_areas(rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None) -> FeatureRows:
-    """Return features of rows: n_bytes says of each how long its members beside the geometry are at least."""
+    """Return features of rows; n_bytes: by row a lower bound of its members besides the geometry."""
     positions, (rings, pieces, ends) = rows.ragged
     offsets = rings[pieces[ends]]
     n_bytes = summed(_ROW + n_bytes) + _POSITION * offsets

@@ -14,11 +14,11 @@ from engine.layers.rows import (
     LayerRows,
     Limits,
     check_how,
-    dissolved,
-    held,
+    dissolve_rows,
     layer_of,
+    locate_points_in_layer,
     overlay_rows,
-    with_alone,
+    with_unmatched_points,
 )
 from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
 from engine.polygon_overlay.touching import Touching
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from geopandas import GeoDataFrame
 
 _POLYGONS = (3, 6)
-"""Shapely's numbers of polygons and of such of several parts."""
+"""Type ids of Polygon and MultiPolygon in shapely."""
 _ABOUT_ATTRIBUTES = (
     *("as_index", "level", "sort", "observed", "dropna"), *("numeric_only", "min_count", "engine", "engine_kwargs"),
 )  # fmt: skip
-"""Options of dissolve that geopandas answers: how rows are grouped, and what the functions on columns take."""
+"""Options of dissolve that geopandas handles: how rows are grouped, and arguments of the functions on columns."""
 _POINT = 0
 _LINE = 1
 
@@ -182,19 +182,19 @@ def dissolve(
     points = geopandas.points_from_xy(np.arange(len(layer)), np.zeros(len(layer)), crs=layer.crs)
     places = layer.copy()
     places[name] = points
-    # geopandas gathers rows and attributes; points on a line tell which features are in which group
+    # geopandas gathers rows and attributes; points on a line encode the group of each feature
     try:
-        found = places.dissolve(by, aggfunc, method="unary", **options)
+        frame = places.dissolve(by, aggfunc, method="unary", **options)
     except Exception as error:  # whatever pandas makes of them
         given = f"by={shown(by)}, aggfunc={shown(aggfunc)}"
         what = f"the layer cannot be dissolved with {given}: {type(error).__name__}: {error!s:.200}"
         raise InvalidInputError(what, ("by",)) from error
-    at, group = shapely.get_coordinates(np.asarray(found.geometry.array), return_index=True)
+    at, group = shapely.get_coordinates(np.asarray(frame.geometry.array), return_index=True)
     groups = np.full(len(layer), NONE)
     groups[at[:, 0].astype(int)] = group
-    rows = dissolved(solids, groups, len(found), limits)
-    found[name] = geopandas.array.GeometryArray(_geometries(rows, shapely.Polygon()), crs=layer.crs)
-    return found
+    rows = dissolve_rows(solids, groups, len(frame), limits)
+    frame[name] = geopandas.array.GeometryArray(_geometries(rows, shapely.Polygon()), crs=layer.crs)
+    return frame
 
 
 def sjoin(
@@ -259,10 +259,10 @@ def sjoin(
             UnsupportedSolidError, left, ("left", int(wrong[0])), "is no point; sjoin joins points to polygons"
         )
     places, numbers = shapely.get_coordinates(points, return_index=True)
-    first, second, on_boundary = held(places, _layer(right, "right", limits), limits)
+    first, second, on_boundary = locate_points_in_layer(places, _layer(right, "right", limits), limits)
     first = numbers[first]
     if how == "left":
-        first, second, _ = with_alone(len(left), first, second, on_boundary)
+        first, second, _ = with_unmatched_points(len(left), first, second, on_boundary)
     attributes = right.drop(columns=right.geometry.name)
     shared = set(attributes.columns) & set(left.columns)
     joined = left.iloc[first].rename(columns={column: f"{column}_left" for column in shared})
@@ -283,7 +283,7 @@ def _geopandas() -> tuple[Any, Any]:
 
 
 def _check_frames(function: str, others: Any, taken: tuple[str, ...] = (), **frames: object) -> None:
-    """Raise on an option that is not ours, though geopandas may have it, and on what is no GeoDataFrame."""
+    """Raise on an option that is not supported, though geopandas may have it, and on what is no GeoDataFrame."""
     geopandas, _ = _geopandas()
     if others.keys() - set(taken):
         name = sorted(others.keys() - set(taken))[0]
@@ -338,18 +338,18 @@ def _geometries(rows: LayerRows, empty: Any = None) -> Any:
     positions, (rings, pieces, ends) = rows.ragged
     single = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
     sizes = np.diff(ends)
-    found = np.full(len(rows), empty, object)
-    found[sizes == 1] = single[ends[:-1][sizes == 1]]
+    geometries = np.full(len(rows), empty, object)
+    geometries[sizes == 1] = single[ends[:-1][sizes == 1]]
     if (several := sizes > 1).any():
         owner = np.repeat(np.cumsum(several) - 1, np.where(several, sizes, 0))
-        found[several] = shapely.multipolygons(single[np.repeat(several, sizes)], indices=owner)
+        geometries[several] = shapely.multipolygons(single[np.repeat(several, sizes)], indices=owner)
     if rows.touching is not None and len(rows.touching.lines) + len(rows.touching.points):
-        _add_touching(found, rows.touching)
-    return found
+        _add_touching(geometries, rows.touching)
+    return geometries
 
 
 def _add_touching(geometries: Any, touching: Touching) -> None:
-    """Add lines and points to the geometries of rows: alone they are of one type, with others in a collection."""
+    """Add lines and points to the geometries of rows; mixed types become a GeometryCollection."""
     _, shapely = _geopandas()
     lines = shapely.from_ragged_array(shapely.GeometryType.LINESTRING, touching.vertices, (touching.offsets,))
     rows, owners = np.unique(np.append(touching.points, touching.lines), return_inverse=True)

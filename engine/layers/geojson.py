@@ -1,6 +1,6 @@
-"""FeatureCollections of GeoJSON (RFC 7946) read: what a layer holds, and errors that name the feature at fault.
+"""Reads GeoJSON FeatureCollections (RFC 7946); errors name the feature at fault.
 
-What rows copy of features: properties, ids and the `crs`, each written as JSON once; and groups by properties.
+What rows copy of features (properties, ids, the `crs`) is written as JSON once; features are grouped by properties.
 """
 
 from __future__ import annotations
@@ -34,16 +34,22 @@ from engine.solids.ragged import summed
 from engine.types import FloatArray, IntArray
 
 _NAME_BYTES: Final = 200
-"""Bytes that a name and the sets it is in hold."""
+"""Bytes of a name and its entries in sets."""
 _NOUNS: Final = {"properties": "a property", "id": "an id", "geometry": "a geometry"}
-_TOLD: Final = 2**20
-"""Bytes of texts after which the budget hears of them."""
+_BUDGET_STEP: Final = 2**20
+"""Bytes of texts after which they are charged to the budget."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Copied:
-    """What rows copy of the features of a layer, as JSON: the inside of their properties, and of an object with their
-    id, if any; n_bytes, id_bytes: (n + 1,) how long both are, and the second alone; 0 stands last, for -1, none."""
+    """JSON that rows copy from the features of a layer.
+
+    | field | by | meaning |
+    | --- | --- | --- |
+    | properties | feature | the inside of its properties |
+    | ids | feature | the inside of an object with its id, if any |
+    | n_bytes, id_bytes | feature | (n + 1,) length of both, of the second; the last is 0, for feature -1 |
+    """
 
     properties: list[bytes]
     ids: list[bytes]
@@ -52,7 +58,7 @@ class _Copied:
 
 
 def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
-    """Return the `crs` of the layers as JSON; they may not differ."""
+    """Return the `crs` of the layers as JSON; raise if they differ."""
     there = [side for side in sides if side.crs is not None]
     texts = []
     with limits.budget() as budget:
@@ -72,7 +78,7 @@ def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
 
 
 def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limits) -> list[bytes]:
-    """Return a value of each feature as JSON, which stands in this member of it."""
+    """Return a value of each feature as JSON; member: the member of the feature that it is, for errors."""
     texts: list[bytes] = []
     taken = 0
     with limits.budget() as budget:
@@ -88,7 +94,7 @@ def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limit
                     kind, side, number, what, error.path if member == "id" else (member, *error.path)
                 ) from None
             taken += len(text)
-            if taken > _TOLD:
+            if taken > _BUDGET_STEP:
                 budget.take(taken)
                 taken = 0
             texts.append(text)
@@ -99,8 +105,9 @@ def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limit
 def members_of(
     sides: list[Collection], names: tuple[str, str], limits: Limits
 ) -> tuple[Callable[[int, int], bytes], Callable[[IntArray, IntArray], IntArray]]:
-    """Return what makes the members beside type and geometry of a row from both features' numbers, -1 for none, and
-    what says of many rows how many bytes these are at least."""
+    """Return two functions of the features of a row (-1: none): its members besides type and geometry, as JSON; and,
+    for many rows, a lower bound of their bytes.
+    """
     columns: list[set[str]] = [set(), set()]
     with limits.budget() as budget:
         for side, column in zip(sides, columns):
@@ -123,7 +130,7 @@ def members_of(
         )
     left, right = (_copied(side, shared, end, limits) for side, end in zip(sides, ("_1", "_2")))
 
-    def told(first: int, second: int) -> bytes:
+    def members(first: int, second: int) -> bytes:
         inside, sources, ids = [], b"", b""
         for name, number, copied in zip(names, (first, second), (left, right)):
             if number != NONE:
@@ -137,11 +144,11 @@ def members_of(
         alone = np.where((first == NONE) | (second == NONE), left.id_bytes[first] + right.id_bytes[second], 0)
         return alone + left.n_bytes[first] + right.n_bytes[second]
 
-    return told, n_bytes
+    return members, n_bytes
 
 
 def _copied(side: Collection, shared: set[str], end: str, limits: Limits) -> _Copied:
-    """Return what rows copy of a layer; names that both layers have get an ending."""
+    """Return the JSON that rows copy of a layer; names that both layers have get an ending."""
 
     def renamed() -> Iterator[dict[str, Any]]:
         for each in side.properties:
@@ -156,8 +163,11 @@ def _copied(side: Collection, shared: set[str], end: str, limits: Limits) -> _Co
 
 
 def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntArray, list[dict[int, bytes]]]:
-    """Return the group of each feature by its properties of these names, and the values of each group as JSON, by the
-    places of the names; the first group has the first feature in it, and so on."""
+    """Return the group of each feature by the properties `names`, and the values of each group as JSON, by place in
+    `names`.
+
+    Groups are numbered by their first features.
+    """
     places = {name: place for place, name in enumerate(names)}
     order: dict[Any, int] = {} if names else {(): 0}
     values: list[dict[int, bytes]] = [] if names else [{}]
@@ -191,7 +201,7 @@ class Collection:
 
 
 def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ...] = AREAS) -> Collection:
-    """Return a FeatureCollection whose features are of these kinds, or have null as geometry; coordinates unchecked."""
+    """Return a FeatureCollection whose geometries are of these kinds, or null; coordinates are not checked."""
     features = value.get("features") if _type_of(value) == "FeatureCollection" else None
     if not isinstance(features, list):
         raise InvalidInputError(f"{where[0]} must be a GeoJSON FeatureCollection, got {shown(value)}", where)
@@ -214,7 +224,7 @@ def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ..
 
 
 def _type_of(value: Any) -> str:
-    """Return the member `type` of a GeoJSON object; nothing if it has none."""
+    """Return the member `type` of a GeoJSON object; empty if it has none."""
     kind = value.get("type") if isinstance(value, dict) else None
     return kind if isinstance(kind, str) else ""
 
@@ -252,13 +262,13 @@ def polygons_of(side: Collection, limits: Limits) -> Layer:
         except (DeadlineExceededError, CancelledError):
             raise
         except (EngineError, TypeError, ValueError, KeyError):
-            checked_each(there, side, _check_rings)
+            check_each(there, side, _check_rings)
             raise
     return layer_of(arrays, summed(counts), is_missing, limits)
 
 
 def _positions(rings: list[Any]) -> FloatArray:
-    """Return the positions of rings, lists or arrays, one after another."""
+    """Return the positions of rings, lists or arrays, concatenated."""
     if not any(isinstance(ring, np.ndarray) for ring in rings):
         return as_points(list(chain.from_iterable(polled(rings))), 2)
     return np.concatenate([as_points(ring, 2) for ring in polled(rings)])
@@ -273,8 +283,8 @@ def _check_rings(geometry: dict[str, Any]) -> None:
                 raise RingTooShortError("a ring of one position; a ring needs 3", ())
 
 
-def checked_each(there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any]) -> Any:
-    """Check geometries one by one; raise for the first at fault, naming its feature; else return all made."""
+def check_each(there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any]) -> Any:
+    """Check geometries one by one; raise for the first at fault, naming its feature; else return all results."""
     made = []
     for number in polled(there):
         try:

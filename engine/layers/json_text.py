@@ -1,7 +1,7 @@
-"""JSON values that layers pass through untouched: their text, written in short steps, and keys to compare them by.
+"""JSON values that layers copy unchanged: their text, written in short steps, and keys to compare them by.
 
-`json` holds the interpreter's lock while it writes: a third of a second for 20 MB. Here it is given at most `_FEW`
-values at a time, and the deadline is polled in between.
+`json` does not release the interpreter's lock while it writes: a third of a second for 20 MB. Here it writes at most
+`_FEW` values in one call, and the deadline is polled in between.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ import numpy as np
 from engine.running.budget import poll
 
 _FEW: Final = 256
-"""Values written at once: some 30 us."""
+"""Values written in one call: some 30 us."""
 _LETTERS: Final = 1000
-"""Letters of texts that take as long as a value."""
+"""Letters of text that take as long as a value."""
 _SCALARS: Final = frozenset({str, int, float, bool, type(None)})
 Path = tuple[str | int, ...]
 
 
 class NotJsonError(ValueError):
-    """A value has no JSON; says why, and where in it. is_number: it is infinite or NaN."""
+    """A value has no JSON; path: where in it. is_number: it is infinite or NaN."""
 
     def __init__(self, error: Exception, path: Path, is_number: bool) -> None:
         super().__init__(str(error))
@@ -33,7 +33,7 @@ class NotJsonError(ValueError):
 
 
 def text_of(value: Any) -> bytes:
-    """Return a value's JSON, numbers exactly as they are; arrays are written as lists.
+    """Return a value as JSON, numbers exactly as they are; arrays are written as lists.
 
     Raises: NotJsonError; what `poll` raises.
     """
@@ -48,11 +48,11 @@ def text_of(value: Any) -> bytes:
 
 
 def key_of(value: Any) -> bytes:
-    """Return what is equal for equal JSON values: numbers by their exact value (1 is 1.0 but not true), objects
-    whatever the order of their names.
+    """Return a key that is equal for equal JSON values: numbers by exact value (1 is 1.0 but not true), objects
+    regardless of the order of names.
 
-    Of a list or an object it is a SHA-256, so that a key is short however long the value. Raises: TypeError where JSON
-    has no such value; what `poll` raises.
+    For a list or an object it is a SHA-256, so that keys are short. Raises: TypeError where JSON has no such value;
+    what `poll` raises.
     """
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and not value.ndim):
         value = value.tolist()
@@ -122,7 +122,7 @@ class _Writer:
         self.text += b"]" if names is None else b"}"
 
     def _write_few(self, names: list[Any] | None, items: Any, start: int, stop: int) -> None:
-        """Write the items from one place up to another, and a comma."""
+        """Write the items ``start`` .. ``stop - 1``, and a comma."""
         poll()
         if start == stop:
             return
@@ -148,7 +148,7 @@ def _encoded(value: Any) -> bytes:
 
 
 def _listed(value: Any) -> Any:
-    """Return a list of numbers that was read as an array."""
+    """Return an array of numbers as a list."""
     if not isinstance(value, (np.ndarray, np.generic)):
         raise TypeError(f"it is of type {type(value).__name__}")
     return value.tolist()
@@ -159,8 +159,8 @@ _encode_ascii = json.JSONEncoder(allow_nan=False, separators=(",", ":"), default
 
 
 def _count(value: Any, most: int) -> int:
-    """Return how many values there are in a value, itself included, or more where texts are long; where they are more
-    than `most`, some such number.
+    """Return the number of values in a value, itself included, long texts counted by length; if above `most`, any such
+    number.
 
     depth: at most `most`.
     """
@@ -186,7 +186,7 @@ def _count(value: Any, most: int) -> int:
 
 
 def _place(value: Any) -> tuple[Path, bool]:
-    """Return where in a value of few parts the first stands that has no JSON, and whether that is a float."""
+    """Return the path to the first part of a small value that has no JSON, and whether that is a float."""
     items: Iterable[tuple[Any, Any]] = ()
     if isinstance(value, dict):
         items = value.items()

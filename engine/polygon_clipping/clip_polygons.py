@@ -88,10 +88,11 @@ class ClippedPolygons(Ragged):
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
-"""Coordinates of vertices that are clipped in the time that it takes to plan more."""
+"""Number of coordinates that are clipped faster than a batch is planned."""
 _USUAL: Final = (2.0**-100, 2.0**120)
-"""Sums of the squares of so few between which nothing is scaled: the largest coordinate lies between the root of such a
-sum, and that over the root of how many there are. `numpy.vdot` does not warn where they overflow, as `dot` does."""
+"""Range of the sum of squares of few coordinates in which nothing is scaled: the largest coordinate lies between the
+root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does.
+"""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
 
 
@@ -197,15 +198,15 @@ def clip_polygons(
 
 
 def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> ClippedPolygons | None:
-    """Clip an array of few polygons; None where an item is for the general way, which checks the array."""
+    """Clip an array of few polygons; None where it needs the general path, which checks the array."""
     if plan.tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], dimension):
         return None
     n, size, _ = polygons.shape
     flat = polygons.reshape(-1)
     if not (0 < len(flat) <= _FEW and _USUAL[0] < np.vdot(flat, flat) < _USUAL[1]):
         return None
-    found = _clip_few(flat, plan.tables, *_few_rings(n, size), UNLIMITED)
-    return None if found is None else found[0]
+    result = _clip_few(flat, plan.tables, *_few_rings(n, size), UNLIMITED)
+    return None if result is None else result[0]
 
 
 def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
@@ -215,7 +216,7 @@ def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
 
 
 _few_rings = functools.lru_cache(64)(_equal_rings)
-"""Those of arrays that are clipped in one piece, of up to `_FEW` coordinates."""
+"""Offsets of arrays that are clipped in one piece, of up to `_FEW` coordinates."""
 
 
 class Contours(NamedTuple):
@@ -231,7 +232,7 @@ class Contours(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Polygons, what they are clipped by, and what becomes of them: see `Clipped` and `ClippedPolygons`."""
+    """Polygons, the planes, and the results to fill: see `Clipped` and `ClippedPolygons`."""
 
     contours: Contours
     plan: Plan
@@ -243,7 +244,7 @@ class Batch(NamedTuple):
 
 
 def as_contours(polygons: Any, dimension: int) -> Contours:
-    """Return all rings; none at all are welcome, an array is borrowed.
+    """Return all rings, possibly none; an array is borrowed.
 
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, each naming the element.
     """
@@ -268,20 +269,20 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
             if polygon.dimension != dimension:
                 check_dimension(polygon.dimension, dimension, ("polygons", i))
             n_rings = len(polygon.ring_offsets) - 1
-            found = [polygon.vertices] if n_rings == 1 else np.split(polygon.vertices, polygon.ring_offsets[1:-1])
+            own = [polygon.vertices] if n_rings == 1 else np.split(polygon.vertices, polygon.ring_offsets[1:-1])
         elif isinstance(polygon, (list, tuple)) or (isinstance(polygon, np.ndarray) and polygon.ndim == 3):
-            found = [as_points(ring, dimension, ("polygons", i, j)) for j, ring in enumerate(polygon)]
+            own = [as_points(ring, dimension, ("polygons", i, j)) for j, ring in enumerate(polygon)]
         else:
             raise InvalidArrayError(
                 f"polygons[{i}] must be a Polygon or a list of rings, got {type(polygon).__name__}", ("polygons", i)
             )
-        if not found:
+        if not own:
             raise EmptyGeometryError(f"polygons[{i}] has no rings; leave it out", ("polygons", i))
-        for j, ring in enumerate(found):
+        for j, ring in enumerate(own):
             if not len(ring):
                 raise EmptyGeometryError(f"polygons[{i}][{j}] has no vertices; leave it out", ("polygons", i, j))
-        rings += found
-        counts.append(len(found))
+        rings += own
+        counts.append(len(own))
     vertices = np.concatenate(rings).reshape(-1) if rings else np.zeros(0)
     return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), _size_of(vertices))
 
@@ -293,19 +294,19 @@ def _size_of(vertices: FloatArray) -> float:
 
 
 def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArray:
-    """Clip polygons first .. last - 1; return the vertices left, in order, and fill what becomes of the polygons."""
+    """Clip polygons first .. last - 1; return their vertices, in order, and fill the results."""
     (d, _, ring_offsets, polygon_offsets, _), _, scene, sizes, state, *_ = batch
     done, parts = first, list[FloatArray]()
     if scene is None:
         state[first:last], done = OPEN, last
     else:
-        flat, tables, clip, found = read_only(scene.vertices), scene.tables, entry_of(clip_rings, d), batch[3:6]
+        flat, tables, clip, outputs = read_only(scene.vertices), scene.tables, entry_of(clip_rings, d), batch[3:6]
         n_vertices = int(ring_offsets[polygon_offsets[last]] - ring_offsets[polygon_offsets[first]])
         room = d * (n_vertices + 4 * len(tables.high) + 64)
     while done < last:
         out = np.empty(room)
         reached, written = clip(
-            flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *found, _AXES[d]
+            flat, ring_offsets, polygon_offsets, tables, done, last, budget.flag, out, *outputs, _AXES[d]
         )
         parts.append(out[: written * d].reshape(-1, d))
         budget.check()
@@ -327,28 +328,28 @@ def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArra
     settled, taken = list[FloatArray](), 0
     for i in open_ones:
         budget.check()
-        settled += [left[taken : before[i - first]], _settle(batch, int(i), budget)]
+        settled += [left[taken : before[i - first]], _clip_in_integers(batch, int(i), budget)]
         taken = int(before[i - first])
     return np.concatenate([*settled, left[taken:]])
 
 
-def _settle(batch: Batch, i: int, budget: Budget) -> FloatArray:
-    """Return the vertices left of a polygon by exact integers, and fill what becomes of it."""
+def _clip_in_integers(batch: Batch, i: int, budget: Budget) -> FloatArray:
+    """Return the vertices left of a polygon by exact integers, and fill its results."""
     d, vertices, ring_offsets, polygon_offsets, _ = batch.contours
     rings, points = range(polygon_offsets[i], polygon_offsets[i + 1]), vertices.reshape(-1, d)
     contours = [points[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
     try:
-        found, batch.may_have_bridges[i] = clip_polygon(contours, batch.plan.rows, budget.check)
+        clipped, batch.may_have_bridges[i] = clip_polygon(contours, batch.plan.rows, budget.check)
     except TooComplexError:
-        batch.status[i], found = PolygonStatus.TOO_COMPLEX, [[] for _ in rings]
-    batch.sizes[rings.start : rings.stop] = [len(contour) for contour in found]
-    return np.array([vertex for contour in found for vertex in contour], np.float64).reshape(-1, d)
+        batch.status[i], clipped = PolygonStatus.TOO_COMPLEX, [[] for _ in rings]
+    batch.sizes[rings.start : rings.stop] = [len(contour) for contour in clipped]
+    return np.array([vertex for contour in clipped for vertex in contour], np.float64).reshape(-1, d)
 
 
 def _clip(
     contours: Contours, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ClippedPolygons, int, int]:
-    """Clip every polygon; return the result, how many polygons needed more than the filter, and rational arithmetic."""
+    """Clip every polygon; return the result, the number of polygons beyond the filter, and in rational arithmetic."""
     d, vertices, ring_offsets, polygon_offsets, size = contours
     scene = kernel_scene(plan, vertices, size, budget.check)
     if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
@@ -366,16 +367,16 @@ def _clip(
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
     left = np.concatenate([np.zeros((0, d)), *(parts[first] for first in sorted(parts))])
-    clipped = _gathered(left, sizes, polygon_offsets, status, may_have_bridges)
+    clipped = _assemble(left, sizes, polygon_offsets, status, may_have_bridges)
     return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))
 
 
 def _clip_few(
     vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons, vertices as one row; return the result, and how many needed more than the filter.
+    """Clip few polygons, vertices flat; return the result, and the number of polygons beyond the filter.
 
-    None where one is left open, or there is no room.
+    None where one is left open, or does not fit.
     """
     d = tables.high.shape[1] - 1
     n, n_rings, clip = len(polygon_offsets) - 1, len(ring_offsets) - 1, entry_of(clip_rings, d)
@@ -395,13 +396,13 @@ def _clip_few(
     if n == n_rings and all(each):
         ends, contours = np.array([0, *accumulate(each)], np.int64), np.zeros(n, np.int64)
         return ClippedPolygons(left, ends, polygon_offsets, contours, status, bridges), n_beyond
-    return _gathered(left, sizes, polygon_offsets, status, bridges), n_beyond
+    return _assemble(left, sizes, polygon_offsets, status, bridges), n_beyond
 
 
-def _gathered(
+def _assemble(
     vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
 ) -> ClippedPolygons:
-    """Return what is left of polygons; sizes: the vertices of each ring, those that vanished with none."""
+    """Return the clipped polygons; sizes: the vertices of each ring, 0 for those that vanished."""
     left = np.flatnonzero(sizes)
     owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
     contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]

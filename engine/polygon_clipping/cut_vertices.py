@@ -1,16 +1,16 @@
-"""Vertices that planes cut, coordinate by coordinate, as a double, what it leaves over and a bound: arithmetic only.
+"""Vertices cut by planes: each coordinate as a double, its remainder and an error bound.
 
-An original vertex leaves nothing over and has the bound zero, and so has a coordinate that is known to be a double.
+An original vertex has remainder and bound zero, and so has a coordinate that is known to be a double. With u = 2^-53:
 
-Bound of a coordinate of a part of an original edge, x + t (y - x), with u = 2^-53 and t = a / (a - b) from differences
-to the plane, which are exact as double-doubles: t loses 1 u^2 of a for each of 2 products and 2 sums, and twice the
-square of the first quotient's error (2 u), below 20 u^2 in all; the products and sums of `on_edge` add four roundings
-of low parts, none above 3 u |t (y - x)| + u |x|; below 40 u^2 (|x| + |t (y - x)|). Of one between vertices that were
-cut: the larger bound of both ends (it lies between them), the roundings of cut_point.py, and r |y - x| for weights
-known to a relative r: the parameter moves by at most 2 r t (1 - t) <= r / 2.
+    part of an original edge      x + t (y - x), t = a / (a - b), a and b exact differences to the plane
+      t                           1 u^2 of a for each of 2 products, 2 sums, + 2 (2 u)^2 (first quotient): < 20 u^2
+      `point_on_edge`             + 4 roundings of low parts, each <= 3 u |t (y - x)| + u |x|
+      total                       error <= 40 u^2 (|x| + |t (y - x)|)
+    between cut vertices          max of both ends' bounds + roundings of cut_point.py + r |y - x|
+      r                           relative error of the weights: t moves by at most 2 r t (1 - t) <= r / 2
 
-Range: coordinates below 2^64. Numbers that t or a quotient divides by are above `WIDEST`, so what underflows, below
-2^-1074, comes to less than 2^-870 and is covered by `TINY`.
+Range: coordinates below 2^64. Divisors are above `WIDEST`, so underflows (2^-1074) amount to less than 2^-870, which
+`TINY` covers.
 """
 
 from __future__ import annotations
@@ -21,7 +21,17 @@ from typing import Final, NamedTuple
 from engine.compiling.jit import inline, merged
 from engine.polygon_clipping.rings import Plane
 from engine.predicates.cut_point import CUT_BOUND, POINT_BOUND, point_along
-from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, fma, surely_rounded, two_diff, two_prod, two_sum
+from engine.predicates.error_free import (
+    U2,
+    dd_add,
+    dd_div,
+    dd_mul,
+    fma,
+    is_correctly_rounded,
+    two_diff,
+    two_prod,
+    two_sum,
+)
 
 VALUE_BOUND: Final = 16.0 * 2.0**-53
 """Signs in doubles: a term loses the low parts of row and vertex, a product, three sums; its size as much again."""
@@ -34,7 +44,7 @@ Triple = tuple[float, float, float]
 
 
 @inline
-def share_of_edge(a: float, b: float, place: float) -> tuple[float, float, bool]:
+def edge_parameter(a: float, b: float, place: float) -> tuple[float, float, bool]:
     """Return t = (a - place) / (a - b) as a double-double for place between a and b; False where it underflows."""
     h, low = two_diff(a, place)
     length, rest = two_diff(a, b)
@@ -44,16 +54,16 @@ def share_of_edge(a: float, b: float, place: float) -> tuple[float, float, bool]
 
 
 @inline
-def on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, float, float]:
-    """Return x + t (y - x) and its bound, for original x and y."""
+def point_on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, float, float]:
+    """Return x + t (y - x) as a double and its remainder, and the error bound, for original x and y."""
     h, low, mh, _ = point_along(x, y, th, tl)
     h, rest = two_sum(h, low)
     return h, rest, (EDGE_BOUND * (abs(x) + abs(mh)) + TINY if x != y else 0.0)
 
 
 @inline
-def is_at(x: float, y: float, a: float, b: float, place: float, guess: float) -> bool:
-    """Tell whether x + (a - place) / (a - b) (y - x) is surely `guess`: products of differences that are doubles."""
+def is_exactly_at(x: float, y: float, a: float, b: float, place: float, guess: float) -> bool:
+    """Return whether x + (a - place) / (a - b) (y - x) is proven to be `guess`, by products of exact differences."""
     x_off, x_low = two_diff(x, guess)
     y_off, y_low = two_diff(y, guess)
     a_off, a_low = two_diff(a, place)
@@ -69,7 +79,7 @@ def is_at(x: float, y: float, a: float, b: float, place: float, guess: float) ->
 
 @inline
 def distance_across(x: float, low: float, bound: float, at: float) -> tuple[float, float, float]:
-    """Return x - at as a double-double, and its bound."""
+    """Return x - at as a double-double, and its error bound."""
     if low == 0.0:
         h, rest = two_diff(x, at)
         return h, rest, bound
@@ -77,8 +87,10 @@ def distance_across(x: float, low: float, bound: float, at: float) -> tuple[floa
     return h, rest, bound + 4.0 * U2 * abs(h)
 
 
-class Share(NamedTuple):
-    """Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, t known to a relative r."""
+class CutWeights(NamedTuple):
+    """Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, and the relative error r of
+    t.
+    """
 
     ph: float
     pl: float
@@ -92,8 +104,8 @@ class Share(NamedTuple):
 
 
 @inline
-def between(x: Triple, y: Triple, s: Share) -> Triple:
-    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x) for coordinates given as double, rest and bound."""
+def interpolate(x: Triple, y: Triple, s: CutWeights) -> Triple:
+    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x) as double, remainder and bound, like x and y."""
     x_h, x_low, x_bound = x
     y_h, y_low, y_bound = y
     if x_low != 0.0 or y_low != 0.0 or x_bound != 0.0 or y_bound != 0.0:
@@ -111,18 +123,20 @@ def between(x: Triple, y: Triple, s: Share) -> Triple:
 
 
 Vertices = namedtuple("Vertices", "pool rests edges names")
-"""The vertices of a ring, those that it came with first, then the cut ones.
+"""The vertices of a ring, original ones first, then the cut ones.
 
-pool: (room * dim,) float64, their doubles. rests: (room * dim * 2,) float64, for each coordinate of a cut what its
-double leaves over, and the bound of its error. edges: (room,) int32, the original edge that goes on from a vertex, by
-its first vertex, -1 for one along a plane. names: as many numbers as there are axes, so that their count is known when
-this is compiled.
+| field | dtype, shape | meaning |
+| --- | --- | --- |
+| pool | float64 (room * dim,) | their doubles |
+| rests | float64 (room * dim * 2,) | by coordinate of a cut vertex its remainder and error bound |
+| edges | int32 (room,) | the original edge that leaves a vertex, by its first vertex, -1: along a plane |
+| names | tuple | one number an axis: the dimension is a compile-time constant |
 """
 
 
 @merged
 def are_same(s: Vertices, v: int, u: int) -> bool:
-    """Tell whether the doubles of two vertices are equal."""
+    """Return whether the doubles of two vertices are equal."""
     d, is_same = len(s.names), True
     for k in range(d):
         is_same = is_same & (s.pool[v * d + k] == s.pool[u * d + k])
@@ -131,14 +145,14 @@ def are_same(s: Vertices, v: int, u: int) -> bool:
 
 @merged
 def coordinate(s: Vertices, v: int, k: int, n_ring: int) -> Triple:
-    """Return a coordinate of a vertex: its double, what that leaves over, and the bound."""
+    """Return a coordinate of a vertex: its double, remainder and error bound."""
     place = v * len(s.names) + k
     rest, bound = (s.rests[2 * place], s.rests[2 * place + 1]) if v >= n_ring else (0.0, 0.0)
     return s.pool[place], rest, bound
 
 
 @merged
-def put_coordinate(s: Vertices, v: int, k: int, h: float, rest: float, bound: float) -> None:
+def set_coordinate(s: Vertices, v: int, k: int, h: float, rest: float, bound: float) -> None:
     """Set a coordinate of a cut vertex."""
     place = v * len(s.names) + k
     s.pool[place], s.rests[2 * place], s.rests[2 * place + 1] = h, rest, bound
@@ -146,7 +160,7 @@ def put_coordinate(s: Vertices, v: int, k: int, h: float, rest: float, bound: fl
 
 @merged
 def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
-    """Return the value of a plane at a vertex as a double-double, and its bound."""
+    """Return the value of a plane at a vertex as a double-double, and its error bound."""
     if plane.axis >= 0:
         x, rest, bound = coordinate(s, v, plane.axis, n_ring)
         return distance_across(x, rest, bound, plane.place)
@@ -163,27 +177,27 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
 
 @merged
 def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
-    """Set vertex j to where an original edge crosses a plane across an axis; return whether its doubles are sure."""
+    """Set vertex j to where an original edge crosses a plane across an axis; return whether it is correctly rounded."""
     d, axis, place = len(s.names), plane.axis, plane.place
     a, b = s.pool[p * d + axis], s.pool[q * d + axis]
-    th, tl, is_sure = share_of_edge(a, b, place)
+    th, tl, is_certified = edge_parameter(a, b, place)
     for k in range(d):
         h, rest, bound = place, 0.0, 0.0
         if k != axis:
             x, y = s.pool[p * d + k], s.pool[q * d + k]
-            h, rest, bound = on_edge(x, y, th, tl)
+            h, rest, bound = point_on_edge(x, y, th, tl)
             if abs(rest) <= bound:
                 near_double = h if abs(h) > bound else 0.0
-                if is_at(x, y, a, b, place, near_double):
+                if is_exactly_at(x, y, a, b, place, near_double):
                     h, rest, bound = near_double, 0.0, 0.0
-            is_sure = is_sure & surely_rounded(h, rest, bound)
-        put_coordinate(s, j, k, h, rest, bound)
-    return is_sure
+            is_certified = is_certified & is_correctly_rounded(h, rest, bound)
+        set_coordinate(s, j, k, h, rest, bound)
+    return is_certified
 
 
 @merged
 def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
-    """Tell whether p and q have the same doubles as coordinates, but for those of an axis."""
+    """Return whether p and q have the same double coordinates except along an axis."""
     d, is_along = len(s.names), True
     for k in range(d):
         is_double = (p < n_ring or s.rests[2 * (p * d + k) + 1] == 0.0) and (
@@ -194,8 +208,8 @@ def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
 
 
 @merged
-def cut_anew(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to where an edge between any vertices crosses a plane; return whether its doubles are sure."""
+def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> bool:
+    """Set vertex j to where an edge between any vertices crosses a plane; return whether it is correctly rounded."""
     d = len(s.names)
     ph, pl, p_bound = value_of(s, plane, p, n_ring)
     qh, ql, q_bound = value_of(s, plane, q, n_ring)
@@ -208,21 +222,21 @@ def cut_anew(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> 
     r = 1.01 * max(p_bound / ph, q_bound / qh) if p_bound > 0.0 or q_bound > 0.0 else 0.0
     sum_h, sum_l = dd_add(ph, pl, qh, ql)
     th, tl = dd_div(ph, pl, sum_h, sum_l)
-    share, is_sure = Share(ph, pl, qh, ql, sum_h, sum_l, th, tl, r), True
+    share, is_certified = CutWeights(ph, pl, qh, ql, sum_h, sum_l, th, tl, r), True
     for k in range(d):
         h, rest, bound = plane.place, 0.0, 0.0
         if k != plane.axis:
-            h, rest, bound = between(coordinate(s, p, k, n_ring), coordinate(s, q, k, n_ring), share)
-        is_sure = is_sure & surely_rounded(h, rest, bound)
-        put_coordinate(s, j, k, h, rest, bound)
-    return is_sure
+            h, rest, bound = interpolate(coordinate(s, p, k, n_ring), coordinate(s, q, k, n_ring), share)
+        is_certified = is_certified & is_correctly_rounded(h, rest, bound)
+        set_coordinate(s, j, k, h, rest, bound)
+    return is_certified
 
 
 @merged
 def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to where the edge v w crosses a plane; return whether its doubles are sure.
+    """Set vertex j to where the edge v w crosses a plane; return whether it is correctly rounded.
 
-    A part of an original edge is cut as the whole of it is.
+    A part of an original edge is cut as the whole edge.
     """
     edge, p, q = s.edges[v], v, w
     if edge >= 0:
@@ -231,6 +245,6 @@ def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> 
             return cut_original(s, plane, p, q, j)
     elif plane.axis >= 0 and is_along_axis(s, plane.axis, p, q, n_ring):
         for k in range(len(s.names)):  # case: along a plane across another axis, to a corner of a box
-            put_coordinate(s, j, k, plane.place if k == plane.axis else s.pool[p * len(s.names) + k], 0.0, 0.0)
+            set_coordinate(s, j, k, plane.place if k == plane.axis else s.pool[p * len(s.names) + k], 0.0, 0.0)
         return True
-    return cut_anew(s, plane, p, q, n_ring, j)
+    return recompute_intersection(s, plane, p, q, n_ring, j)

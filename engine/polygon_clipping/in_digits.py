@@ -1,13 +1,12 @@
-"""Sutherland-Hodgman in exact whole numbers, compiled: settles the polygons that in_doubles.py leaves open.
+"""Sutherland-Hodgman in exact multi-digit integers, compiled: for the polygons that in_doubles.py leaves open.
 
-It is in_integers.py once more, with two things that keep it fast. A vertex that was cut holds whole numbers
-(x, y[, z], w) for the point (x / w, y / w, z / w) and also the doubles nearest to it. Rounding keeps order, so a plane
-across an axis is decided by these doubles unless they lie on it, two vertices whose doubles differ are two points, and
-other planes take their sign from doubles with a bound; whole numbers are asked only where that fails. And numbers stay
-short: parts of an original edge are cut from the whole edge, and in the plane a cut of an edge that runs along a plane
-is where two planes meet.
+The algorithm of in_integers.py with two accelerations. A cut vertex has the integers (x, y[, z], w) of the point
+(x / w, y / w, z / w) and also the doubles nearest to it. Rounding is monotone, so these doubles decide a plane across
+an axis unless they lie on it, vertices with different doubles are distinct, and other planes take their sign from
+doubles with a bound; integers are used only where that fails. And numbers stay short: parts of an original edge are cut
+from the whole edge, and in the plane a cut of an edge along a plane is the intersection of two planes.
 
-What does not fit digits.py (edges of space cut anew several times, sizes far apart) is left to Python's integers.
+What does not fit digits.py (edges of space cut repeatedly, exponents far apart) is left to Python's integers.
 """
 
 from __future__ import annotations
@@ -39,19 +38,26 @@ _VALUES = SLOT
 _FREE = 3 * SLOT
 _LOADED = 6 * SLOT
 _ROWS = 16 * SLOT
-"""Places of a heap: the number 1, two values, slots to work in, two loaded vertices, rows; then numbers that stay."""
+"""Places of a heap: the number 1, two values, working slots, two loaded vertices, rows; then numbers that stay."""
 _TINY = 2.0**-1000
-"""Products that underflow."""
+"""Bound of products that underflow."""
 
 
 class ExactScratch(NamedTuple):
-    """heap: int64, see digits.py; n_rows: how much of it the planes take. terms: (4, 3) int64, for sums. loaded:
-    (2, dim + 1) int64, places of two vertices. rows: (planes, dim + 1) int64, places of the planes' numbers.
+    """Scratch of `clip_exactly`.
 
-    points: (room, dim) float64, the doubles nearest to vertices; places: (room, dim + 1) int64, numbers of cut ones.
-    rings: (2, room) int64, a ring as numbers of vertices. edges, along: (room,) int64, the original edge that goes on
-    from a vertex, by its first vertex, and the plane that it runs along, else -1. signs: (room,) int64. on_plane:
-    (room,) bool, for places of the ring made. used: (2,) int64, how many vertices there are, and numbers of the heap.
+    | field | dtype, shape | meaning |
+    | --- | --- | --- |
+    | heap, n_rows | int64 | see digits.py; how much of it the planes take |
+    | terms | int64 (4, 3) | for sums of products |
+    | loaded | int64 (2, dim + 1) | places of two vertices |
+    | rows | int64 (planes, dim + 1) | places of the planes' numbers |
+    | points | float64 (room, dim) | the doubles nearest to vertices |
+    | places | int64 (room, dim + 1) | places of the numbers of cut vertices |
+    | rings | int64 (2, room) | a ring as numbers of vertices, and the next one |
+    | edges, along | int64 (room,) | the original edge that leaves a vertex; the plane that it runs along; else -1 |
+    | signs, on_plane | int64, bool (room,) | of vertices; of places of the ring made |
+    | used | int64 (2,) | numbers of vertices, and of used heap places |
     """
 
     heap: Any
@@ -71,7 +77,7 @@ class ExactScratch(NamedTuple):
 
 @allocating
 def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: IntArray) -> Any:
-    """Return what `clip_exactly` works in: for rings that grow to `room` vertices, those that were dropped included."""
+    """Return scratch of `clip_exactly` for rings that grow to `room` vertices, dropped ones included."""
     first = _ROWS + row_heap.size
     heap = np.empty(first + 8 * SLOT + 48 * room, np.int64)
     heap[_ONE], heap[_ONE + 1], heap[_ONE + 2] = 1, 0, 1
@@ -87,7 +93,7 @@ def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: Int
 
 @inline
 def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
-    """Set ``loaded[side]`` to the places of vertex v's numbers; those of an original vertex are made there."""
+    """Set ``loaded[side]`` to the places of vertex v's numbers; for an original vertex they are created."""
     d = s.points.shape[1]
     for k in range(d + 1):
         if v >= n_ring:
@@ -101,7 +107,7 @@ def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
 
 @inline
 def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
-    """Put the value of a plane at a loaded vertex at `place`; False where it is too long."""
+    """Store the value of a plane at a loaded vertex at `place`; False where it is too long."""
     n = s.loaded.shape[1]
     for k in range(n):
         s.terms[k, 0], s.terms[k, 1], s.terms[k, 2] = s.rows[plane, k], s.loaded[side, k], 1
@@ -132,7 +138,7 @@ def sign_of_vertex(s: ExactScratch, plane: Plane, v: int, n_ring: int) -> tuple[
 
 @inline
 def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
-    """Tell whether two vertices are the same point; the second is False where numbers are too long."""
+    """Return whether two vertices are the same point; the second is False where numbers are too long."""
     d = s.points.shape[1]
     for k in range(d):
         if s.points[v, k] != s.points[u, k]:
@@ -152,8 +158,8 @@ def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
 
 
 @inline
-def put_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
-    """Make number k of the vertex at `place` of two terms, on top of the heap; False where it is too long."""
+def store_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
+    """Set number k of vertex `place` to the sum of two terms, on top of the heap; False where it is too long."""
     top = s.used[1]
     if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
         return False
@@ -164,7 +170,7 @@ def put_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
 
 @inline
 def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
-    """Make the numbers of vertex j, where the edge p q crosses a plane; False where they are too long."""
+    """Compute vertex j, where the edge p q crosses a plane; False where its numbers are too long."""
     load_vertex(s, p, n_ring, 0)
     load_vertex(s, q, n_ring, 1)
     if not (value_at(s, plane, 0, _VALUES) and value_at(s, plane, 1, _VALUES + SLOT)):
@@ -173,19 +179,19 @@ def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -
     for k in range(s.places.shape[1]):  # |s_p| q + |s_q| p, with values of two signs
         s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = _VALUES, s.loaded[1, k], factor
         s.terms[1, 0], s.terms[1, 1], s.terms[1, 2] = _VALUES + SLOT, s.loaded[0, k], -factor
-        if not put_sums(s, j, k, 0):
+        if not store_sums(s, j, k, 0):
             return False
     return True
 
 
 @inline
 def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
-    """Make the numbers of vertex j, where two lines of the plane meet; False where they are too long."""
+    """Compute vertex j, the intersection of two lines of the plane; False where its numbers are too long."""
     for k in range(3):  # the cross product of both rows
         a, b = (k + 1) % 3, (k + 2) % 3
         s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = s.rows[plane, a], s.rows[other, b], 1
         s.terms[1, 0], s.terms[1, 1], s.terms[1, 2] = s.rows[plane, b], s.rows[other, a], -1
-        if not put_sums(s, j, k, 1):  # one place more, for a carry
+        if not store_sums(s, j, k, 1):  # one place more, for a carry
             return False
     if sign_of(s.heap, s.places[j, 2]) < 0:
         for k in range(3):
@@ -194,8 +200,8 @@ def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
 
 
 @inline
-def cut(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
-    """Return the vertex made where the edge v w crosses a plane, leaving its inner side or not; TOO_LONG."""
+def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
+    """Return the new vertex where the edge v w crosses a plane, leaving its inner side or not; TOO_LONG."""
     j, edge, d = s.used[0], s.edges[v], s.points.shape[1]
     if j + 1 >= s.points.shape[0]:
         return TOO_LONG
@@ -215,35 +221,35 @@ def cut(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int)
 
 
 @inline
-def push(s: ExactScratch, made: IntArray, kept: int, v: int, is_on: bool, n_ring: int) -> int:
-    """Append a vertex, on the plane or not, to the `kept` ones of a ring; return how many there are then, or TOO_LONG.
+def append_vertex(s: ExactScratch, made: IntArray, n_left: int, v: int, is_on: bool, n_ring: int) -> int:
+    """Append a vertex, on the plane or not, to the n_left ones of a ring; return their number then, or TOO_LONG.
 
-    One that is the same point as the vertex before hands its edge on to that one.
+    A duplicate of the previous vertex is merged into it, and its outgoing edge inherited.
     """
-    s.on_plane[kept] = is_on
-    if kept > 0 and is_on and s.on_plane[kept - 1]:
-        before = made[kept - 1]
+    s.on_plane[n_left] = is_on
+    if n_left > 0 and is_on and s.on_plane[n_left - 1]:
+        before = made[n_left - 1]
         is_same, is_known = are_same(s, v, before, n_ring)
         if not is_known:
             return TOO_LONG
         if is_same:
             s.edges[before], s.along[before] = s.edges[v], s.along[v]
-            return kept
-    made[kept] = v
-    return kept + 1 if kept + 1 < s.points.shape[0] else TOO_LONG
+            return n_left
+    made[n_left] = v
+    return n_left + 1 if n_left + 1 < s.points.shape[0] else TOO_LONG
 
 
 @inline
-def close_ring(s: ExactScratch, made: IntArray, kept: int, n_ring: int) -> int:
-    """Return how many vertices of a ring stay, without last ones that are the first point; TOO_LONG."""
-    while kept > 1 and s.on_plane[kept - 1] and s.on_plane[0]:
-        is_same, is_known = are_same(s, made[kept - 1], made[0], n_ring)
+def close_ring(s: ExactScratch, made: IntArray, n_left: int, n_ring: int) -> int:
+    """Return the number of vertices of a ring without last ones equal to the first; TOO_LONG."""
+    while n_left > 1 and s.on_plane[n_left - 1] and s.on_plane[0]:
+        is_same, is_known = are_same(s, made[n_left - 1], made[0], n_ring)
         if not is_known:
             return TOO_LONG
         if not is_same:
             break
-        kept -= 1
-    return kept
+        n_left -= 1
+    return n_left
 
 
 @inline
@@ -262,26 +268,26 @@ def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int)
 @inline
 def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray, n_ring: int) -> tuple[int, int]:
     """Cut a ring of n vertices with signs by a plane into `made`; return how many are left (TOO_LONG), and are cuts."""
-    kept, n_cuts = 0, 0
+    n_left, n_cuts = 0, 0
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
         v, sign, sign_after = ring[i], s.signs[i], s.signs[following]
         if sign >= 0:
             if sign == 0 and sign_after < 0:
                 s.edges[v], s.along[v] = -1, plane
-            kept = push(s, made, kept, v, sign == 0, n_ring)
-        if sign * sign_after < 0 and kept >= 0:
+            n_left = append_vertex(s, made, n_left, v, sign == 0, n_ring)
+        if sign * sign_after < 0 and n_left >= 0:
             n_cuts += 1
-            j = cut(s, plane, v, ring[following], sign > 0, n_ring)
-            kept = push(s, made, kept, j, True, n_ring) if j >= 0 else TOO_LONG
-        if kept < 0:
+            j = cut_vertex(s, plane, v, ring[following], sign > 0, n_ring)
+            n_left = append_vertex(s, made, n_left, j, True, n_ring) if j >= 0 else TOO_LONG
+        if n_left < 0:
             return TOO_LONG, 0
-    return close_ring(s, made, kept, n_ring), n_cuts
+    return close_ring(s, made, n_left, n_ring), n_cuts
 
 
 @inline
 def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> int:
-    """Load a ring without vertices equal to the one before, around the ring; return how many."""
+    """Load a ring without repeated vertices, cyclically; return their number."""
     n, d = 0, s.points.shape[1]
     for i in range(first, last):
         is_same = n > 0
@@ -305,7 +311,7 @@ def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> i
 def cut_by_planes(
     s: ExactScratch, planes: PlaneTables, cutting: Cutting, n_cutting: int, n_ring: int, stop: FlagArray
 ) -> tuple[int, int]:
-    """Cut the ring that is loaded by one plane after another; return how many vertices are left, in which of `rings`.
+    """Cut the loaded ring by the planes in order; return how many vertices are left, and in which of `rings`.
 
     TOO_LONG or NO_ROOM instead. Adds to the contacts of the planes, and to which dropped a vertex.
     """
@@ -331,11 +337,11 @@ def clip_exactly(
     s: ExactScratch, polygons: Polygons, polygon: int, planes: PlaneTables, cutting: Cutting, n_cutting: int,
     stop: FlagArray, clipped: Clipped, written: int,
 ) -> int:  # fmt: skip
-    """Clip a polygon by the planes of `cutting`, whose contacts begin anew; `written` vertices are there already.
+    """Clip a polygon by the planes of `cutting`, whose contacts are reset; `written` vertices are there already.
 
-    Returns the vertices written then, or NO_ROOM. What is too long is left OPEN.
+    Returns the number of vertices then, or NO_ROOM. A polygon with too long numbers is left OPEN.
     """
-    begun, d = written, s.points.shape[1]
+    written_before, d = written, s.points.shape[1]
     first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]
     for i in range(n_cutting):
         cutting.contacts[i], cutting.dropped[i] = 0, False
@@ -347,7 +353,7 @@ def clip_exactly(
             clipped.state[polygon] = OPEN
             for other in range(first_ring, last_ring):
                 clipped.sizes[other] = 0
-            return begun
+            return written_before
         if n == NO_ROOM or (written + n) * d > clipped.vertices.size:
             return NO_ROOM
         for i in range(n):
@@ -355,5 +361,5 @@ def clip_exactly(
                 clipped.vertices[(written + i) * d + k] = s.points[s.rings[now, i], k]
         clipped.sizes[ring] = n
         written += n
-    clipped.may_have_bridges[polygon] = written > begun and has_bridges(cutting, n_cutting)
+    clipped.may_have_bridges[polygon] = written > written_before and has_bridges(cutting, n_cutting)
     return written

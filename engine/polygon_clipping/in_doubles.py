@@ -1,18 +1,18 @@
-"""Sutherland-Hodgman on rings whose every decision and coordinate doubles and double-doubles prove.
+"""Sutherland-Hodgman on rings whose decisions and coordinates are proven by doubles and double-doubles.
 
-That is nearly every ring, so the work is that of careless code: vertices stay where they are and a ring is a list of
-their numbers; only cuts are made in double-double (cut_vertices.py). A cut is kept only where its doubles are surely
-the nearest ones. Rounding keeps order: where such a double lies beside a wall of a box so does the vertex, and vertices
-whose doubles differ are two. Original vertices are doubles, so on a wall they are decided too. At the first doubt the
-polygon is left open, and in_digits.py begins anew.
+That is nearly every ring: vertices stay in place and a ring is a list of their numbers; only cuts are computed in
+double-double (cut_vertices.py). A cut is accepted only where its doubles are certainly the nearest. Rounding is
+monotone: where such a double lies off a wall of a box so does the vertex, and vertices with different doubles are
+distinct. Original vertices are doubles, so on a wall they are decided too. At the first doubt the polygon is left open,
+and in_digits.py starts again.
 
-    load a ring -> take it as runs -> for each plane: classify, cut -> emit
+    load a ring -> group into runs -> for each plane: classify, cut -> emit
 
-Neighbours on the same side of every plane stay and go together: a long ring is first taken as runs of them, each
-standing as its first vertex, up to ``ends`` of it.
+Consecutive vertices on the same side of every plane are clipped together: a long ring is first grouped into runs, each
+represented by its first vertex, up to ``ends`` of it.
 
-Slack of planes across no axis: every vertex lies in the box of its polygon, so a value in doubles is wrong by less than
-2^-49 of the plane's row on that box.
+Slack of planes across no axis: every vertex lies in the box of its polygon, so
+``|value - exact| < 2^-49 * (|row| at the box)``.
 """
 
 from __future__ import annotations
@@ -39,21 +39,24 @@ from engine.polygon_clipping.rings import (
 from engine.types import FlagArray, FloatArray, Int32Array
 
 DOUBT: Final = -1
-"""Instead of a number of vertices: doubles do not prove something."""
+"""Instead of a number of vertices: doubles do not prove a decision."""
 _SLACK: Final = 2.0**-45
 LONG: Final = 8
-"""Vertices from which on a ring is taken as runs: of fewer, nearly every one is a run of its own."""
+"""Vertices from which on a ring is grouped into runs: in shorter ones nearly every vertex is its own run."""
 MOST_BITS: Final = 30
 ALONE: Final = 1 << MOST_BITS
 """Mark of a vertex on a plane (or near it): a run of its own."""
 
 
 class Scratch(NamedTuple):
-    """What rings are clipped in.
+    """Scratch for clipping rings.
 
-    rings: (2, room) int32, a ring as numbers of vertices, and the one that is made of it. signs: (room,) int8, of its
-    vertices. ends, codes: (room,) int32, of original vertices the last one of the run, and the planes that it is
-    outside of. lows, highs: (3,) float64, the box of a polygon.
+    | field | dtype, shape | meaning |
+    | --- | --- | --- |
+    | rings | int32 (2, room) | the ring as numbers of vertices, and the next one |
+    | signs | int8 (room,) | of its vertices |
+    | ends, codes | int32 (room,) | by original vertex the last one of its run; planes that it is outside of |
+    | lows, highs | float64 (3,) | the box of a polygon |
     """
 
     vertices: Vertices
@@ -68,7 +71,7 @@ class Scratch(NamedTuple):
 
 @allocating
 def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
-    """Return what to clip in, for rings that grow to `room` vertices, those that were dropped included."""
+    """Return scratch for rings that grow to `room` vertices, dropped ones included."""
     d = len(names)
     return Scratch(
         Vertices(np.empty(room * d), np.empty(2 * room * d), np.empty(room, np.int32), names),
@@ -88,7 +91,7 @@ def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
 def load_ring(
     s: Scratch, vertices: FloatArray, begin: int, end: int
 ) -> tuple[int, float, float, float, float, float, float]:
-    """Load a ring without vertices equal to the one before; return how many, and the bounds of each axis.
+    """Load a ring without repeated vertices; return their number, and the bounds of each axis.
 
     Zeros become +0.0. The first vertex may still be repeated at the end.
     """
@@ -113,7 +116,9 @@ def load_ring(
 
 @merged
 def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
-    """Set the box of the polygon of rings first .. last - 1; returns how many vertices of the last one are loaded."""
+    """Set the box of the polygon of rings first .. last - 1; return the number of vertices of the last one, which is
+    loaded.
+    """
     vertices, offsets = polygons.vertices, polygons.ring_offsets
     n, x_low, x_high, y_low, y_high, z_low, z_high = load_ring(s, vertices, offsets[first], offsets[first + 1])
     for ring in range(first + 1, last):
@@ -128,9 +133,9 @@ def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
 
 @merged
 def choose_planes(s: Scratch, planes: PlaneTables) -> tuple[int, bool]:
-    """List the planes that may cut a polygon; return how many, and whether one has all of it outside.
+    """List the planes that may cut a polygon; return their number, and whether one has all of it outside.
 
-    A plane that has all vertices inside cuts nothing: what later planes see are points between the vertices.
+    A plane with all vertices inside cuts nothing: later planes see convex combinations of the vertices.
     """
     cutting, lows, highs, d = s.cutting, s.lows, s.highs, len(s.vertices.names)
     n, is_outside = 0, False
@@ -192,8 +197,8 @@ def mark_sides(s: Scratch, planes: PlaneTables, n_cutting: int, n: int) -> None:
 
 
 @merged
-def take_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int) -> int:
-    """List the ring that is loaded as runs of vertices that stay and go together; return how many."""
+def group_into_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int) -> int:
+    """Group the loaded ring into runs of vertices on the same sides; return their number."""
     ring, edges, ends, codes = s.rings[0], s.vertices.edges, s.ends, s.codes
     if n_cutting == 0:
         ring[0], ends[0] = 0, n_ring - 1
@@ -237,7 +242,7 @@ def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: 
 
 @merged
 def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n: int) -> tuple[int, int]:
-    """Set the signs of n vertices at a plane across no axis; see `classify_across`. None is on it for sure."""
+    """Set the signs of n vertices at a plane across no axis; see `classify_across`. None is proven to be on it."""
     row, n_in = row_of(s, plane), 0
     for i in range(n):
         value = value_at(s, row, ring[i])
@@ -252,43 +257,43 @@ def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n
 def cut_ring(
     s: Scratch, plane: Plane, ring: Int32Array, n: int, made: Int32Array, n_ring: int, n_made: int
 ) -> tuple[int, int]:
-    """Cut a ring of n vertices by a plane at which they have their signs, into `made`: keep, cross or drop each edge.
+    """Cut a ring of n vertices with signs by a plane into `made`: append, cross or drop each edge.
 
-    n_made: how many vertices there are, cut ones included. Returns how many are left (DOUBT), and how many there are.
+    n_made: number of vertices, cut ones included. Returns how many are left (DOUBT), and n_made then.
     """
     signs, edges = s.signs, s.vertices.edges
-    kept, was_on, first_on = 0, False, False
+    n_left, was_on, first_on = 0, False, False
     signs[n] = signs[0]
     for i in range(n):
         v, sign, sign_after = ring[i], signs[i], signs[i + 1]
         if sign >= 0:
-            if sign == 0 and was_on and are_same(s.vertices, v, made[kept - 1]):
+            if sign == 0 and was_on and are_same(s.vertices, v, made[n_left - 1]):
                 return DOUBT, n_made
             was_on = sign == 0
-            first_on = was_on if kept == 0 else first_on
+            first_on = was_on if n_left == 0 else first_on
             if was_on and sign_after < 0:
                 edges[v] = -1
-            made[kept] = v
-            kept += 1
+            made[n_left] = v
+            n_left += 1
         if sign * sign_after >= 0:
             continue
         if not cut_edge(s.vertices, plane, v, ring[i + 1] if i + 1 < n else ring[0], n_ring, n_made):
             return DOUBT, n_made
-        if was_on and are_same(s.vertices, n_made, made[kept - 1]):
+        if was_on and are_same(s.vertices, n_made, made[n_left - 1]):
             return DOUBT, n_made
-        was_on, first_on = True, first_on or kept == 0
+        was_on, first_on = True, first_on or n_left == 0
         edges[n_made] = -1 if sign > 0 else edges[v]
-        made[kept] = n_made
-        kept += 1
+        made[n_left] = n_made
+        n_left += 1
         n_made += 1
-    if kept > 1 and was_on and first_on and are_same(s.vertices, made[kept - 1], made[0]):
+    if n_left > 1 and was_on and first_on and are_same(s.vertices, made[n_left - 1], made[0]):
         return DOUBT, n_made
-    return kept, n_made
+    return n_left, n_made
 
 
 @merged
 def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
-    """Cut the ring of n runs by one plane after another; return how many are left (DOUBT), and in which of `rings`."""
+    """Cut the ring of n runs by the planes in order; return how many are left (DOUBT), and in which of `rings`."""
     n_made, now, cutting = n_ring, 0, s.cutting
     for i_plane in range(n_cutting):
         plane = plane_of(planes, cutting.planes[i_plane])
@@ -326,14 +331,13 @@ def emit(s: Scratch, ring: Int32Array, n: int, n_ring: int, out: FloatArray, pla
 
 
 @called
-def clip_plainly(
+def clip_in_doubles(
     polygons: Polygons, planes: PlaneTables, first: int, last: int, stop: FlagArray, clipped: Clipped, written: int,
     s: Scratch,
 ) -> tuple[int, int, int, int]:  # fmt: skip
-    """Clip polygons from `first` on, up to one that needs care; `written` vertices are there already.
+    """Clip polygons from `first` on, up to the first doubt; `written` vertices are there already.
 
-    Returns the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut the polygon
-    reached.
+    Returns the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut that polygon.
     """
     d, offsets = len(s.vertices.names), polygons.ring_offsets
     for polygon in range(first, last):
@@ -347,20 +351,20 @@ def clip_plainly(
             for ring in range(first_ring, last_ring):
                 clipped.sizes[ring] = 0
             continue
-        begun = written
+        written_before = written
         for ring in range(first_ring, last_ring):
             if last_ring > first_ring + 1:
                 n_ring = load_ring(s, polygons.vertices, offsets[ring], offsets[ring + 1])[0]
             while n_ring > 1 and are_same(s.vertices, n_ring - 1, 0):
                 n_ring -= 1
-            n = take_runs(s, planes, n_cutting, n_ring)
+            n = group_into_runs(s, planes, n_cutting, n_ring)
             n, now = cut_by_planes(s, planes, n_cutting, n, n_ring)
             if n == DOUBT:
-                return polygon, begun, DOUBT, n_cutting
+                return polygon, written_before, DOUBT, n_cutting
             if (written + n_ring + n) * d > clipped.vertices.size:
-                return polygon, begun, NO_ROOM, n_cutting
+                return polygon, written_before, NO_ROOM, n_cutting
             end = emit(s, s.rings[now], n, n_ring, clipped.vertices, written * d) // d
             clipped.sizes[ring], written = end - written, end
-        if written > begun:
+        if written > written_before:
             clipped.may_have_bridges[polygon] = has_bridges(s.cutting, n_cutting)
     return last, written, DONE, 0

@@ -1,4 +1,4 @@
-"""Sutherland-Hodgman in exact integers: the definition of `clip_polygons`, and what settles the kernel's open items.
+"""Sutherland-Hodgman in exact integers: the definition of `clip_polygons`, and the exact fallback of the kernel.
 
 A vertex is a tuple of integers (x, y[, z], w) with w > 0 and no common divisor, standing for (x / w, y / w, z / w), so
 equal points are equal tuples. A plane is a row of integers; its value at a vertex is one dot product. With values
@@ -39,12 +39,12 @@ def plane_through(a: Sequence[float], b: Sequence[float], c: Sequence[float]) ->
     return (*(x * scale for x in normal), -dot(normal, p))
 
 
-def merged(contour: list[Vertex]) -> list[Vertex]:
-    """Return the contour without each vertex that equals the one before it, around the ring; the first one stays."""
-    kept = [vertex for i, vertex in enumerate(contour) if i == 0 or vertex != contour[i - 1]]
-    while len(kept) > 1 and kept[-1] == kept[0]:
-        kept.pop()
-    return kept
+def merge_repeated(contour: list[Vertex]) -> list[Vertex]:
+    """Return the contour without repeated vertices, cyclically; the first of them stays."""
+    inside = [vertex for i, vertex in enumerate(contour) if i == 0 or vertex != contour[i - 1]]
+    while len(inside) > 1 and inside[-1] == inside[0]:
+        inside.pop()
+    return inside
 
 
 def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bool]:
@@ -52,35 +52,37 @@ def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bo
     values = [sum(a * x for a, x in zip(row, vertex)) for vertex in contour]
     if min(values) >= 0:
         return contour, values.count(0), False
-    kept: list[Vertex] = []
+    inside: list[Vertex] = []
     n_contacts = values.count(0)
     for (p, s_p), (q, s_q) in pairwise([*zip(contour, values), (contour[0], values[0])]):
         if s_p >= 0:
-            kept.append(p)
+            inside.append(p)
         if (s_p > 0 > s_q) or (s_p < 0 < s_q):
             forward, back = (s_p, s_q) if s_p > 0 else (-s_p, -s_q)
             cut = reduced([forward * y - back * x for x, y in zip(p, q)])
             if max(map(int.bit_length, cut)) > MOST_BITS:
                 raise TooComplexError(f"an exact vertex needs more than {MOST_BITS} bits; use fewer planes")
-            kept.append(cut)
+            inside.append(cut)
             n_contacts += 1
-    return merged(kept), n_contacts, True
+    return merge_repeated(inside), n_contacts, True
 
 
 def clip_polygon(
     rings: Sequence[Sequence[Sequence[float]]], planes: Sequence[Row], check: Callable[[], object]
 ) -> tuple[list[list[list[float]]], bool]:
-    """Return the contours of one polygon after all planes, correctly rounded, and whether it may hold bridge edges.
+    """Return the contours of one polygon after all planes, correctly rounded, and whether it may have bridge edges.
 
     rings: contours of at least one vertex each. planes: integer rows, applied in order. check: called for each plane.
-    An empty list stands for a contour of which nothing is left.
+    A contour that vanishes is an empty list.
     Raises: TooComplexError.
     """
     contours = []
     for ring in rings:
         dimension = len(ring[0])
         numbers, w = common_integers([x for vertex in ring for x in vertex])
-        contours.append(merged([reduced((*numbers[i : i + dimension], w)) for i in range(0, len(numbers), dimension)]))
+        contours.append(
+            merge_repeated([reduced((*numbers[i : i + dimension], w)) for i in range(0, len(numbers), dimension)])
+        )
     may_have_bridges = False
     for row in planes:
         check()

@@ -1,11 +1,11 @@
-"""The planes of a region that Sutherland-Hodgman clips on: in integers, as double-doubles, and of a convex polyhedron.
+"""The planes of a region for Sutherland-Hodgman: as integer rows, as double-doubles, and those of a convex polyhedron.
 
-A polyhedron's planes are rarely rows of doubles, so they stay implicit: three vertices each. It is convex when no
-vertex lies outside of any of its planes (exact orientation) and a point inside of all planes is inside of it. Then all
-faces lie on the hull of the vertices; inside the hull there is no face, so the even-odd location is the same
-everywhere there and INSIDE makes every point of the hull's boundary lie on some face: the solid is the hull. Asking
-every vertex about every face is left to what `engine.solids.convexity`, one question an edge, does not certify: faces
-without area, and solids that are not convex, so that the answer can say why.
+The planes of a polyhedron are rarely rows of doubles, so they stay implicit: three vertices each. It is convex if no
+vertex lies outside any of its planes (exact orientation) and a point inside all planes is inside it. Then all faces lie
+on the hull of the vertices; inside the hull there is no face, so the even-odd location is constant there, and INSIDE
+makes every point of the hull's boundary lie on some face: the solid is the hull. All vertices are tested against all
+faces only where `engine.solids.convexity`, one test an edge, gives no certificate: faces without area, and solids that
+are not convex, so that the error can name the reason.
 """
 
 from __future__ import annotations
@@ -51,15 +51,16 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
 
 
 class Plan(NamedTuple):
-    """What polygons are clipped by, kept with the region: its planes as integer rows in clipping order, repeated ones
-    once, since they cut nothing twice; and as the kernel takes them, None where numbers lie too far apart for it."""
+    """The planes of a region, stored with it: integer rows in clipping order without duplicates; tables: for the
+    kernel, None where exponents are too far apart.
+    """
 
     rows: list[Row]
     tables: PlaneTables | None
 
 
 def plan_of(region: Solid, check: Check) -> Plan:
-    """Return the plan kept with a region.
+    """Return the plan of a region, stored with it.
 
     Raises: UnsupportedSolidError, where a polyhedron is not convex naming a face and a vertex beyond it.
     """
@@ -69,12 +70,12 @@ def plan_of(region: Solid, check: Check) -> Plan:
         raise refused(region, "clip_polygons does not take", lambda row: row.planes, more, ("region",))
 
     def build() -> Plan:
-        found: dict[Row, None] = {}
+        unique: dict[Row, None] = {}
         for turn, row in enumerate(planes(region, check)):
             if turn % _CHECK_EVERY == 0:
                 check()
-            found[reduced(row)] = None
-        return Plan(list(found), _plane_tables(list(found), 0, check))
+            unique[reduced(row)] = None
+        return Plan(list(unique), _plane_tables(list(unique), 0, check))
 
     return region.prepared("clipping_plan", build, check)
 
@@ -90,7 +91,7 @@ def planes_of_faces(region: Polyhedron, check: Check) -> Iterable[Row]:
 
 
 class KernelScene(NamedTuple):
-    """What the kernel takes of a scene: vertices (m, dim) float64 times 2^-exponent, and the planes for them."""
+    """Input of the kernel: vertices (m, dim) float64 times 2^-exponent, and the planes for them."""
 
     vertices: FloatArray
     exponent: int
@@ -98,7 +99,7 @@ class KernelScene(NamedTuple):
 
 
 def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check) -> KernelScene | None:
-    """Return a scene as the kernel takes it, None where numbers lie too far apart for it.
+    """Return the input of the kernel, None where exponents are too far apart.
 
     largest: magnitude of any coordinate.
     """
@@ -111,8 +112,9 @@ def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check)
 
 
 def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
-    """Return planes as the kernel takes them, for vertices times 2^-exponent; None where numbers lie too far apart, or
-    there are no planes."""
+    """Return the plane tables for vertices times 2^-exponent; None where exponents are too far apart, or without
+    planes.
+    """
     if not planes:
         return None
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))
@@ -139,7 +141,7 @@ def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables
 
 
 def _double_double(number: int, shift: int) -> tuple[float, float]:
-    """Return number / 2^shift as a double-double, whose low part is zero only where the high part is exact."""
+    """Return number / 2^shift as a double-double; its low part is zero only if the high part is exact."""
     high, low = nearest_pair(number, 1 << shift)
     if low == 0.0 and Fraction(high) * (1 << shift) != number:
         raise OverflowError(number)  # the low part underflows
@@ -147,7 +149,7 @@ def _double_double(number: int, shift: int) -> tuple[float, float]:
 
 
 def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:
-    """Return the triangles with area, counter-clockwise from outside, or raise if the polyhedron is not convex."""
+    """Return the triangles with area, counter-clockwise from outside; raise if the polyhedron is not convex."""
     vertices, triangles = region.vertices, region.triangles
     if (certificate := convexity(region)) is not None:
         return triangles if certificate.is_outward else triangles[:, ::-1]
@@ -162,22 +164,22 @@ def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:
         behind[first : first + step], before[first : first + step] = (signs < 0).any(1), (signs > 0).any(1)
         for row in np.flatnonzero((behind & before)[first : first + step])[:1]:
             sides = [used[np.argmax(signs[row] == side)] for side in (-1, 1)]
-            told = " and ".join(f"{vertex} at {digits(vertices[vertex])}" for vertex in sides)
-            raise _not_convex(f"vertices {told} lie on both sides of face", region, first + int(row))
+            named = " and ".join(f"{vertex} at {digits(vertices[vertex])}" for vertex in sides)
+            raise _not_convex(f"vertices {named} lie on both sides of face", region, first + int(row))
     if not (behind | before).any():
         raise _not_convex("it has no interior, all vertices lie in the plane of face", region, 0)
     if behind.any() and before.any():
         odd = np.argmax(before if behind[np.argmax(behind | before)] else behind)
         raise _not_convex("other faces are turned the other way round than face", region, int(odd))
-    kept = triangles[behind | before]
-    kept = kept if behind.any() else kept[:, ::-1]
-    a, b, c = (np.tile(vertices[kept[0, k]], (len(used), 1)) for k in range(3))
+    oriented = triangles[behind | before]
+    oriented = oriented if behind.any() else oriented[:, ::-1]
+    a, b, c = (np.tile(vertices[oriented[0, k]], (len(used), 1)) for k in range(3))
     signs = orientations(a, b, c, vertices[used])
-    simplex = [*vertices[kept[0]], vertices[used[np.argmax(signs != 0)]]]
+    simplex = [*vertices[oriented[0]], vertices[used[np.argmax(signs != 0)]]]
     middle = [sum(map(Fraction, column)) / 4 for column in np.array(simplex).T.tolist()]
     if rational_location(middle, region, None, check) != Location.INSIDE:
         raise _not_convex("its faces cover the hull an even number of times, among them face", region, 0)
-    return kept
+    return oriented
 
 
 def _not_convex(what: str, region: Polyhedron, triangle: int) -> UnsupportedSolidError:

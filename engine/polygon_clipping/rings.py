@@ -1,4 +1,4 @@
-"""What the compiled clipping of polygons hands on: polygons, planes, results, and which planes cut."""
+"""Data types of the compiled clipping of polygons: polygons, planes, results, and which planes cut."""
 
 from __future__ import annotations
 
@@ -9,26 +9,28 @@ from engine.compiling.jit import merged
 
 CLIPPED: Final = 0
 EXACT: Final = 1
-"""States of a polygon, beside OPEN: settled by doubles, by whole numbers."""
+"""States of a polygon, besides OPEN: decided by doubles, by multi-digit integers."""
 DONE: Final = 0
-"""Outcome of a run that reached its last polygon."""
+"""Outcome: the last polygon is reached."""
 NO_ROOM: Final = -2
-"""Instead of a number of vertices: they have no room, or the kernel was stopped."""
+"""Instead of a number of vertices: they do not fit, or the kernel was stopped."""
 
 Polygons = namedtuple("Polygons", "vertices ring_offsets polygon_offsets")
-"""vertices: (m * dim,) float64, as one row of numbers; offsets of rings and of polygons: see `ClippedPolygons`."""
+"""vertices: (m * dim,) float64, flat; offsets of rings and of polygons: see `ClippedPolygons`."""
 
 PlaneTables = namedtuple("PlaneTables", "high low axes at row_heap row_places")
-"""Planes as the kernel takes them; prepared once a region where nothing is scaled.
+"""Planes for the kernel; prepared once a region where nothing is scaled.
 
-high, low: (planes, dim + 1) float64, rows as double-doubles, every number zero or in the safe range. axes: (planes,)
-int64, the axis that a plane cuts across in one known double `at`, else -1. row_heap, row_places: the rows in whole
-numbers, see digits.py.
+| field | dtype, shape | meaning |
+| --- | --- | --- |
+| high, low | float64 (planes, dim + 1) | rows as double-doubles, every number zero or in the safe range |
+| axes, at | int64, float64 (planes,) | the axis that a plane crosses at one double `at`, else -1 |
+| row_heap, row_places | | the rows as multi-digit integers, see digits.py |
 """
 
 
 class Plane(NamedTuple):
-    """One of the planes: its number, and the axis that it cuts across at `place`, else -1."""
+    """One of the planes: its number, and the axis that it crosses at `place`, else -1."""
 
     high: Any
     low: Any
@@ -38,17 +40,21 @@ class Plane(NamedTuple):
 
 
 Clipped = namedtuple("Clipped", "vertices sizes state may_have_bridges")
-"""What is left of polygons.
+"""The clipped polygons.
 
-vertices: (room * dim,) float64, rings one after another. sizes: (n_rings,) int64, vertices left of each. state: (n,)
-uint8, CLIPPED, EXACT or OPEN; an open polygon has sizes 0 and no vertices. may_have_bridges: (n,) bool.
+| field | dtype, shape | meaning |
+| --- | --- | --- |
+| vertices | float64 (room * dim,) | ring after ring |
+| sizes | int64 (n_rings,) | vertices left of each ring |
+| state | uint8 (n,) | CLIPPED, EXACT or OPEN; an open polygon has sizes 0 and no vertices |
+| may_have_bridges | bool (n,) | see `ClippedPolygons` |
 """
 
 Cutting = namedtuple("Cutting", "planes slack contacts dropped")
 """The planes that may cut a polygon, in order.
 
-planes: their numbers. slack: how far values in doubles may be wrong. contacts: in how many points all rings together
-met a plane. dropped: whether one lost a vertex to it.
+planes: their numbers. slack: error bounds of values in doubles. contacts: number of points in which all rings
+together met a plane. dropped: whether a ring lost a vertex to it.
 """
 
 
@@ -60,7 +66,7 @@ def plane_of(planes: PlaneTables, number: int) -> Plane:
 
 @merged
 def has_bridges(cutting: Cutting, n_cutting: int) -> bool:
-    """Tell whether a plane that dropped a vertex was met in more than two points."""
+    """Return whether a plane that dropped a vertex was met in more than two points."""
     may_have = False
     for i in range(n_cutting):
         may_have |= cutting.dropped[i] and cutting.contacts[i] > 2

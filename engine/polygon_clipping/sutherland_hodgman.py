@@ -1,13 +1,13 @@
-"""Sutherland-Hodgman over batches: doubles and double-doubles for nearly every ring, whole numbers for the others.
+"""Sutherland-Hodgman over batches: doubles and double-doubles for nearly every ring, multi-digit integers for the
+others.
 
-Each plane takes the sign of every vertex, keeps those on its inner side and cuts the edges that change sides:
+Each plane takes the sign of every vertex, retains those on its inner side and cuts the edges that change sides:
 
     s_p > 0 > s_q        p ------ x -- q            x = (p |s_q| + q |s_p|) / (|s_p| + |s_q|)
 
-A later plane decides about x itself, not about the doubles nearest to it. `clip_plainly` does that for vertices known
-as double-doubles, as long as the bounds of their errors leave nothing open; at the first doubt a polygon is begun anew
-by `clip_exactly`, in whole numbers. What is too long for those is left open, and Python's integers settle it
-(in_integers.py).
+A later plane decides about x itself, not about the doubles nearest to it. `clip_in_doubles` does that for vertices in
+double-double, as long as the error bounds decide; at the first doubt `clip_exactly` clips the polygon again in
+multi-digit integers. What is too long for those is left open for Python's integers (in_integers.py).
 
 A plane that has all original vertices inside is left out, for what other planes leave lies between them; one that has
 all of them outside leaves nothing.
@@ -21,14 +21,14 @@ from typing import Any
 
 from engine.compiling.jit import allocating_kernel, inline
 from engine.polygon_clipping.in_digits import clip_exactly, exact_scratch
-from engine.polygon_clipping.in_doubles import DOUBT, clip_plainly, scratch_for
+from engine.polygon_clipping.in_doubles import DOUBT, clip_in_doubles, scratch_for
 from engine.polygon_clipping.rings import NO_ROOM, Clipped, PlaneTables, Polygons
 from engine.types import BoolArray, FlagArray, FloatArray, IntArray
 
 
 @inline
 def room_for(ring_offsets: IntArray, first: int, last: int, n_planes: int) -> int:
-    """Return to how many vertices, dropped ones included, one of some rings may grow; what outgrows it is left open.
+    """Return to how many vertices, dropped ones included, a ring may grow; polygons that outgrow it are left open.
 
     A convex ring gains one vertex a plane.
     """
@@ -43,10 +43,10 @@ def clip_rings(
     vertices: FloatArray, ring_offsets: IntArray, polygon_offsets: IntArray, planes: PlaneTables, first: int, last: int,
     stop: FlagArray, out: FloatArray, sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray, names: Any,
 ) -> tuple[int, int]:  # fmt: skip
-    """Clip polygons first .. last - 1 by all planes; returns the polygon reached and the vertices written.
+    """Clip polygons first .. last - 1 by all planes; return the polygon reached and the vertices written.
 
     vertices .. polygon_offsets: see `Polygons`; out .. may_have_bridges: see `Clipped`. stop: one uint8, polled.
-    names: see `Vertices`. Stops before a polygon that has no room in `out`.
+    names: see `Vertices`. Stops before a polygon that does not fit `out`.
     """
     polygons, clipped = Polygons(vertices, ring_offsets, polygon_offsets), Clipped(out, sizes, state, may_have_bridges)
     n_planes = planes.high.shape[0]
@@ -55,7 +55,7 @@ def clip_rings(
     is_ready, exact = False, exact_scratch(0, len(names), planes.row_heap[:0], planes.row_places[:0])
     polygon, written = first, 0
     while polygon < last:
-        polygon, written, outcome, n_cutting = clip_plainly(
+        polygon, written, outcome, n_cutting = clip_in_doubles(
             polygons, planes, polygon, last, stop, clipped, written, scratch
         )
         if outcome != DOUBT:

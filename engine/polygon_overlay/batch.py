@@ -1,4 +1,4 @@
-"""Overlays of many pairs: flat arrays in, flat arrays out, objects only for who asks for one."""
+"""Overlays of many pairs: flat arrays in, flat arrays out, objects on request."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of, check
 from engine.polygon_overlay.overlay import accuracy_of, check_operation, overlay_rings, rings_of, ulps_moved
 from engine.polygon_overlay.pair_arrays import (
     NO_PAIRS,
-    Chosen,
-    Found,
+    PairResults,
     PolygonArrays,
-    chained,
-    gathered,
-    joined,
+    PolygonSelection,
+    concatenate_offsets,
+    concatenate_pairs,
     one_pair,
-    taken,
+    polygon_arrays_of,
+    take_pairs,
 )
 from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.rounds import SettledPairs, settle_pairs
-from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, arranged_again, as_overlay, run_kernel
+from engine.polygon_overlay.rounds import ValidPairs, make_pairs_valid
+from engine.polygon_overlay.run import SELECTED_ARRAYS, Operation, as_overlay, rebuild_from_rounded_rings, run_kernel
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
@@ -38,9 +38,9 @@ from engine.types import OPEN, Accuracy, BoolArray, FloatArray, Int8Array, IntAr
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8
 _FIRST_VERTICES: Final = 16_384
-"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: a chunk costs 20 us besides."""
+"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: the overhead of a chunk is 20 us."""
 _DOUBTFUL: Final = 256
-"""Pairs whose rings are arranged again together, whatever their time: a call costs as much as some hundred of them."""
+"""Pairs whose rings are arranged again together: the overhead of a call is that of some hundred of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class OverlayBatch(Ragged):
     _subjects: Sequence[Solid] = field(repr=False)
     _clips: Sequence[Solid] = field(repr=False)
     _operation: Operation = field(repr=False)
-    _exact: Found = field(repr=False)
+    _exact: PairResults = field(repr=False)
     _is_rounded_again: BoolArray = field(repr=False)
     _apart: dict[int, Overlay] = field(repr=False)
 
@@ -95,7 +95,7 @@ class OverlayBatch(Ragged):
         as_nested_offsets(len(exact.vertices), rings=exact.ring_offsets, pieces=exact.piece_offsets)
         for column, items in enumerate((exact.piece_offsets[1:], exact.ring_offsets[1:], exact.vertices)):
             as_nested_offsets(len(items), counts=summed(exact.counts[:, column]))
-        n_inputs = _gathered(made._subjects).sizes() + _gathered(made._clips).sizes()
+        n_inputs = _polygon_arrays(made._subjects).sizes() + _polygon_arrays(made._clips).sizes()
         check_sources(exact.sources, np.repeat(n_inputs, exact.counts[:, 2]))
         return made
 
@@ -117,7 +117,7 @@ class OverlayBatch(Ragged):
         subject, clip = rings_of(self._subjects[pair]), rings_of(self._clips[pair])
         if self._is_rounded_again[pair]:
             return overlay_rings(subject, clip, self._operation, Budget())[0]
-        one = taken(self._exact, np.array([pair]))
+        one = take_pairs(self._exact, np.array([pair]))
         exact = ImplicitRings(subject, clip, read_only(one.sources), one.ring_offsets)
         return as_overlay(read_only(one.vertices), one.piece_offsets, float(one.displacement[0]), exact)
 
@@ -129,11 +129,13 @@ class OverlayBatch(Ragged):
         """
         exact = self._exact
         groups = exact.piece_offsets[summed(exact.counts[:, 0])]
-        sides = [(RingArrays(*each[:2]), each[2]) for each in (_gathered(self._subjects), _gathered(self._clips))]
+        sides = [
+            (RingArrays(*each[:2]), each[2]) for each in (_polygon_arrays(self._subjects), _polygon_arrays(self._clips))
+        ]
         areas, _ = areas_of(*sides[0], *sides[1], read_only(exact.sources), read_only(exact.ring_offsets), groups)
-        unsure = np.isnan(areas) | (exact.status == OPEN)
+        uncertified = np.isnan(areas) | (exact.status == OPEN)
         areas[self.status != PairStatus.DONE] = np.nan
-        for pair in np.flatnonzero(unsure & (self.status == PairStatus.DONE)).tolist():
+        for pair in np.flatnonzero(uncertified & (self.status == PairStatus.DONE)).tolist():
             try:
                 areas[pair] = cast("Overlay", self[pair]).area
             except NotRepresentableError:
@@ -161,11 +163,19 @@ class OverlayBatch(Ragged):
 
 
 def _n_vertices(solids: Sequence[Solid]) -> int:
-    return solids.n_vertices if isinstance(solids, Chosen) else sum(len(rings_of(each).vertices) for each in solids)
+    return (
+        solids.n_vertices
+        if isinstance(solids, PolygonSelection)
+        else sum(len(rings_of(each).vertices) for each in solids)
+    )
 
 
-def _gathered(solids: Sequence[Solid]) -> PolygonArrays:
-    return solids.together() if isinstance(solids, Chosen) else gathered(cast("Sequence[Polygon]", solids))
+def _polygon_arrays(solids: Sequence[Solid]) -> PolygonArrays:
+    return (
+        solids.arrays()
+        if isinstance(solids, PolygonSelection)
+        else polygon_arrays_of(cast("Sequence[Polygon]", solids))
+    )
 
 
 def overlay_batch(
@@ -223,66 +233,68 @@ def overlay_batch(
     check_operation(operation)
     check_options(workers, progress, report=report)
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, (list, tuple, Chosen)):
+        if not isinstance(solids, (list, tuple, PolygonSelection)):
             raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))
-    subjects, clips = (each if isinstance(each, Chosen) else tuple(each) for each in (subjects, clips))
+    subjects, clips = (each if isinstance(each, PolygonSelection) else tuple(each) for each in (subjects, clips))
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
     for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, Chosen) and set(map(type, solids)) - {Polygon}:
+        if not isinstance(solids, PolygonSelection) and set(map(type, solids)) - {Polygon}:
             for i_pair, solid in enumerate(solids):
                 rings_of(solid, name, i_pair)
-    parts: dict[int, Found] = {}
-    kept = KEPT_ARRAYS[operation]
+    parts: dict[int, PairResults] = {}
+    selected = SELECTED_ARRAYS[operation]
     with Budget(deadline, cancel) as budget:
 
         def task(start: int, stop: int) -> None:
             # Gathered here, chunk by chunk: one thread does while another's kernel runs, and what it wrote is near.
-            parts[start] = run_kernel(_gathered(subjects[start:stop]), _gathered(clips[start:stop]), kept, budget)
+            parts[start] = run_kernel(
+                _polygon_arrays(subjects[start:stop]), _polygon_arrays(clips[start:stop]), selected, budget
+            )
 
         n_few = max(1, _n_vertices(subjects[:_FIRST_CHUNK]) + _n_vertices(clips[:_FIRST_CHUNK]))
         first_chunk = _FIRST_CHUNK * min(64, max(1, _FIRST_VERTICES // n_few))
         run_chunks(task, len(subjects), budget=budget, first_chunk=first_chunk, workers=workers, progress=progress)
-        found = first_found = joined([parts[start] for start in sorted(parts)] or [NO_PAIRS])
+        outcome = first_outcome = concatenate_pairs([parts[start] for start in sorted(parts)] or [NO_PAIRS])
         rest = np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), dict[int, Overlay]()
         status, is_rounded_again, apart = rest
         ulps, n_rational = 0.5, 0
-        if found.status.any():
-            found, ulps, n_rational = _settled(found, rest, subjects, clips, operation, workers, budget)
-    for array in (status, *found, *(first_found if first_found is not found else ())):
+        if outcome.status.any():
+            outcome, ulps, n_rational = _resolve(outcome, rest, subjects, clips, operation, workers, budget)
+    for array in (status, *outcome, *(first_outcome if first_outcome is not outcome else ())):
         array.setflags(write=False)
     batch = OverlayBatch(
-        status=status, vertices=found.vertices, ring_offsets=found.ring_offsets, piece_offsets=found.piece_offsets,
-        pair_offsets=summed(found.counts[:, 0]), displacement=found.displacement,
-        _subjects=subjects, _clips=clips, _operation=operation, _exact=first_found,
+        status=status, vertices=outcome.vertices, ring_offsets=outcome.ring_offsets,
+        piece_offsets=outcome.piece_offsets, pair_offsets=summed(outcome.counts[:, 0]),
+        displacement=outcome.displacement, _subjects=subjects, _clips=clips, _operation=operation, _exact=first_outcome,
         _is_rounded_again=is_rounded_again, _apart=apart,
     )  # fmt: skip
     if not report:
         return batch
     n_edges = _n_vertices(subjects) + _n_vertices(clips)
-    return batch, accuracy_of(ulps, n_edges, int(found.counts[:, 3].sum()), n_rational)
+    return batch, accuracy_of(ulps, n_edges, int(outcome.counts[:, 3].sum()), n_rational)
 
 
-def _settled(
-    found: Found, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
+def _resolve(
+    outcome: PairResults, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
     clips: Sequence[Solid], operation: Operation, workers: int | None, budget: Budget,
-) -> tuple[Found, float, int]:  # fmt: skip
-    """Return all pairs settled, `Accuracy.coordinates_ulp`, and how many decisions took rationals.
+) -> tuple[PairResults, float, int]:  # fmt: skip
+    """Return all pairs valid, `Accuracy.coordinates_ulp`, and the number of rational decisions.
 
-    rest: filled with `OverlayBatch.status`, `_is_rounded_again` and `_apart`.
+    rest: `OverlayBatch.status`, `_is_rounded_again` and `_apart`, to be filled.
     """
     status, is_rounded_again, apart = rest
-    settled: dict[int, SettledPairs] = {}
+    valid: dict[int, ValidPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}
-    doubtful = np.flatnonzero(found.status == PairStatus.MAY_CROSS)
+    doubtful = np.flatnonzero(outcome.status == PairStatus.MAY_CROSS)
 
-    def settle(start: int, stop: int) -> None:
+    def make_valid(start: int, stop: int) -> None:
         some = doubtful[start * _DOUBTFUL : stop * _DOUBTFUL]
-        pairs = taken(found, some)
-        more = settle_pairs(pairs, arranged_again, budget)
-        settled[start] = more._replace(pairs=some[more.pairs])
+        pairs = take_pairs(outcome, some)
+        results = make_pairs_valid(pairs, rebuild_from_rounded_rings, budget)
+        valid[start] = results._replace(pairs=some[results.pairs])
 
     def overlay_alone(start: int, stop: int) -> None:
         for pair in left[start:stop].tolist():
@@ -293,22 +305,22 @@ def _settled(
             except NotRepresentableError:
                 status[pair] = NOT_REPRESENTABLE
 
-    run_chunks(settle, -(-len(doubtful) // _DOUBTFUL), budget=budget, first_chunk=1, workers=workers)
-    together = [settled[start] for start in sorted(settled)]
+    run_chunks(make_valid, -(-len(doubtful) // _DOUBTFUL), budget=budget, first_chunk=1, workers=workers)
+    together = [valid[start] for start in sorted(valid)]
     for each in together:
         is_rounded_again[each.pairs] = True
-    left = np.flatnonzero((found.status != PairStatus.DONE) & ~is_rounded_again)
+    left = np.flatnonzero((outcome.status != PairStatus.DONE) & ~is_rounded_again)
     run_chunks(overlay_alone, len(left), budget=budget, first_chunk=1, workers=workers)
     apart.update((pair, result) for pair, (result, _, _) in alone.items())
-    more = [each.found for each in together]
+    results = [each.rings for each in together]
     for result, n_exact, _ in alone.values():
         rings = result.vertices, result.ring_offsets, result.piece_offsets
-        more.append(one_pair(*rings, result.largest_displacement, n_exact))
+        results.append(one_pair(*rings, result.largest_displacement, n_exact))
     pairs = np.concatenate([*(each.pairs for each in together), np.array([*alone], np.int64)])
-    rows = np.arange(len(found.status))
+    rows = np.arange(len(outcome.status))
     rows[pairs] = len(rows) + np.arange(len(pairs))
     ulps = [0.5, *(each.ulps for each in together), *(ulps_moved(result) for result, _, _ in alone.values())]
-    return taken(joined([found, *more]), rows), max(ulps), sum(n for _, _, n in alone.values())
+    return take_pairs(concatenate_pairs([outcome, *results]), rows), max(ulps), sum(n for _, _, n in alone.values())
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
@@ -321,12 +333,12 @@ def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
     return OverlayBatch(
         status=read_only(np.concatenate([part.status for part in batches])),
         vertices=read_only(np.concatenate([part.vertices for part in batches])),
-        ring_offsets=chained([part.ring_offsets for part in batches]),
-        piece_offsets=chained([part.piece_offsets for part in batches]),
-        pair_offsets=chained([part.pair_offsets for part in batches]),
+        ring_offsets=concatenate_offsets([part.ring_offsets for part in batches]),
+        piece_offsets=concatenate_offsets([part.piece_offsets for part in batches]),
+        pair_offsets=concatenate_offsets([part.pair_offsets for part in batches]),
         displacement=read_only(np.concatenate([part.displacement for part in batches])),
         _subjects=tuple(solid for part in batches for solid in part._subjects),
         _clips=tuple(solid for part in batches for solid in part._clips), _operation=batches[0]._operation,
-        _exact=joined([part._exact for part in batches]),
+        _exact=concatenate_pairs([part._exact for part in batches]),
         _is_rounded_again=np.concatenate([part._is_rounded_again for part in batches]), _apart=apart,
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""Rings of an overlay whose vertices are named by the input: a vertex of it, or the crossing of two of its edges.
+"""Rings of an overlay with implicit vertices: a vertex of the input, or the crossing of two of its edges.
 
-The compiled overlay decides without ever writing a crossing as a fraction. Who asks for the exact area gets the
-fractions made then, from the polygons given.
+The compiled overlay never computes a crossing as a fraction. The exact area needs fractions; they are computed then,
+from the input polygons.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ NOTHING: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, n
 
 
 def edges_along(sources: npt.NDArray[np.signedinteger]) -> IntArray:
-    """Return by vertex of a ring the input edge, by its first vertex, along which the ring goes on from there."""
+    """Return by vertex of a ring the input edge, by its first vertex, along which the ring continues."""
     return np.where(sources[:, 1] < LEFT_OUT, LEFT_OUT - 1 - sources[:, 1], sources[:, 0]).astype(np.int64)
 
 
@@ -45,15 +45,17 @@ def areas_of(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray,
     sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray,
 ) -> tuple[FloatArray, int]:  # fmt: skip
-    """Return what `sum_areas` fills, and how many it is not sure of."""
+    """Return the areas that `sum_areas` fills, and how many are not certified."""
     areas = np.empty(len(groups) - 1)
     sum_them = entry_of(sum_areas)
     return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas)
 
 
 def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArray) -> None:
-    """Raise unless sources, of a pickle, name input vertices alone, of which there are n_inputs, one number or by row;
-    kernels look no further."""
+    """Raise unless sources, from a pickle, name existing input vertices; kernels do not check.
+
+    n_inputs: number of input vertices, one number or by row.
+    """
     if sources.shape != (np.size(n_inputs) if np.ndim(n_inputs) else len(sources), 2) or sources.dtype.kind != "i":
         raise InvalidArrayError(f"sources have dtype {sources.dtype} and shape {sources.shape}", ("sources",))
     firsts, seconds = sources.astype(np.int64).T
@@ -63,11 +65,10 @@ def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArr
 
 
 class ImplicitRings(NamedTuple):
-    """Exact rings over two polygons, made when asked for.
+    """Exact rings over two polygons, computed on request.
 
-    sources: (n, 2) integers: an input vertex and a negative number, or the first vertices of two edges that cross, as
-    `overlay_pairs` tells them; those of `clip` are counted after those of `subject`. offsets: (n_rings + 1,) int64,
-    where each ring begins.
+    sources: (n, 2) integers, see `overlay_pairs`; vertices of `clip` are counted after those of `subject`. offsets:
+    (n_rings + 1,) int64, where each ring begins.
     """
 
     subject: RingArrays
@@ -86,31 +87,32 @@ class ImplicitRings(NamedTuple):
         as_nested_offsets(len(self.sources), offsets=self.offsets)
         check_sources(self.sources, len(self.subject.vertices) + len(self.clip.vertices))
 
-    def sure_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
-        """Return (n,) float64, the doubles nearest to the areas of the rings groups[k] .. groups[k + 1] - 1, or NaN.
+    def certified_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
+        """Return (n,) float64, the nearest doubles of the areas of the rings groups[k] .. groups[k + 1] - 1, NaN if not
+        certified.
 
-        And how many are NaN.
+        And the number of NaN.
         """
         items = one_polygon(len(self.subject.offsets) - 1), one_polygon(len(self.clip.offsets) - 1)
         return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
-        """Return those areas, the exact sums where a bound is not enough.
+        """Return those areas, by exact sums where the error bound does not certify them.
 
         Raises `NotRepresentableError` where one is beyond the largest double.
         """
-        areas, n_unsure = self.sure_areas(groups)
-        for k in np.flatnonzero(np.isnan(areas)).tolist() if n_unsure else ():
+        areas, n_uncertified = self.certified_areas(groups)
+        for k in np.flatnonzero(np.isnan(areas)).tolist() if n_uncertified else ():
             areas[k] = self.some(range(groups[k], groups[k + 1])).nearest_area()
         return areas
 
     def are_shells(self) -> BoolArray:
-        """Tell of each ring whether its exact area is positive, also where that is no double."""
-        areas, n_unsure = self.sure_areas(np.arange(self.n_rings + 1))
+        """Return by ring whether its exact area is positive, also where that is no double."""
+        areas, n_uncertified = self.certified_areas(np.arange(self.n_rings + 1))
         is_shell = areas > 0.0
-        if n_unsure:
-            unsure = np.flatnonzero(np.isnan(areas)).tolist()
-            is_shell[unsure] = self.some(unsure).are_shells()
+        if n_uncertified:
+            uncertified = np.flatnonzero(np.isnan(areas)).tolist()
+            is_shell[uncertified] = self.some(uncertified).are_shells()
         return is_shell
 
     def some(self, rings: Sequence[int]) -> ExactRings:
@@ -120,7 +122,7 @@ class ImplicitRings(NamedTuple):
         return self._replace(sources=np.concatenate(sources), offsets=offsets).exact_rings()
 
     def exact_rings(self) -> ExactRings:
-        """Return the rings as integers, with all that can be asked of them."""
+        """Return the rings in integers."""
         vertices = np.concatenate([self.subject.vertices, self.clip.vertices])
         offsets = np.concatenate([self.subject.offsets, self.clip.offsets[1:] + len(self.subject.vertices)])
         firsts = np.unique(np.append(self.sources[:, 0], self.sources[self.sources[:, 1] >= 0, 1])).astype(np.int64)
@@ -140,7 +142,7 @@ class ImplicitRings(NamedTuple):
         return ExactRings(tuple(tuple(made[a:b]) for a, b in itertools.pairwise(stops)), nodes.exponent)
 
 
-def rings_alone(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
+def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
     """Return rings of doubles as rings over themselves."""
     own = RingArrays(read_only(vertices), read_only(offsets))
     n, few = len(vertices), _FEW_THEMSELVES
@@ -155,11 +157,11 @@ def _themselves(n: int) -> npt.NDArray[np.int32]:
 
 
 _FEW_THEMSELVES: Final = _themselves(1024)
-"""Those of small rings, which are asked for often."""
+"""Sources of small rings, which are requested often."""
 
 
 def _ends_of_edges(vertices: FloatArray, offsets: IntArray, firsts: IntArray) -> IntArray:
-    """Return of each vertex the next one of its ring that is not at its place (itself if there is none)."""
+    """Return by vertex the next distinct vertex of its ring (itself if there is none)."""
     rings = np.searchsorted(offsets, firsts, side="right") - 1
     starts, stops = offsets[rings], offsets[rings + 1]
     ends = firsts.copy()

@@ -1,7 +1,7 @@
-"""The overlay in Python integers: right for every input, and slow; for what the compiled one leaves open.
+"""The overlay in Python integers, the exact fallback of the kernel: correct for every input, and slow.
 
-The steps are those of overlay.py, the rules those of ring_nesting.py; a label is the set of sources, by their numbers,
-that a face lies in.
+The steps are those of overlay.py, the rules those of ring_nesting.py; a label is the set of sources (numbers) that a
+face lies in.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.grid import snapped_to_units
-from engine.polygon_overlay.pair_arrays import Found, one_pair, ring_sizes
+from engine.polygon_overlay.pair_arrays import PairResults, one_pair, ring_sizes
 from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.rounds import settle_rings
-from engine.polygon_overlay.run import KEPT, UNNAMED, Operation
+from engine.polygon_overlay.rounds import make_valid_after_rounding
+from engine.polygon_overlay.run import SELECTED, UNNAMED, Operation
 from engine.running.budget import Budget, polled
 from engine.types import FloatArray, IntArray
 
@@ -35,36 +35,38 @@ def overlay_exactly(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:  # fmt: skip
-    """Return the overlay of checked rings (either may be empty), and how many pairs of edges the filter left open."""
-    subdivision, inside = _labelled(subject, clip, KEPT[operation], budget, nesting)
+    """Return the overlay of checked rings (either may be empty), and the number of edge pairs decided exactly."""
+    subdivision, inside = _label_arrangement(subject, clip, SELECTED[operation], budget, nesting)
     arrangement = subdivision.arrangement
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces)
     nodes = arrangement.nodes
     corners = [[arrangement.origin(half_edge) for half_edge in ring] for ring in rings_of(pieces)]
     exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in corners), nodes.exponent)
-    first = rounded(arrangement, pieces)
+    first = round_pieces(arrangement, pieces)
     moved = first.displacement
     first = first._replace(displacement=np.where(moved, np.nextafter(moved, np.inf), 0.0))
-    result = settle_rings(first, exact, arranged_again, True, budget, snapped_to_units if is_on_grid else None)
+    result = make_valid_after_rounding(
+        first, exact, rebuild_from_rounded_rings, True, budget, snapped_to_units if is_on_grid else None
+    )
     if result is None:
         raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
     return replace(result, _starts=np.array([len(subject.vertices)])), arrangement.n_exact
 
 
-def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[Found, IntArray]:
-    """Return what the kernel does that keeps each part, and of each vertex a number of its exact place."""
-    subdivision, inside = _labelled(subject, clip, range(4), budget)
+def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[PairResults, IntArray]:
+    """Return the result of the kernel with `EACH_PART`, and by vertex the number of its exact place."""
+    subdivision, inside = _label_arrangement(subject, clip, range(4), budget)
     pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside])
-    found = rounded(subdivision.arrangement, pieces)
+    result = round_pieces(subdivision.arrangement, pieces)
     parts = [part for piece in pieces for part in (*piece.evidence,) * (1 + len(piece.holes))]
     places = [subdivision.arrangement.origin(half_edge) for ring in rings_of(pieces) for half_edge in ring]
-    return found._replace(evidence=np.array([range(len(parts)), parts], np.int64).T), np.array(places, np.int64)
+    return result._replace(evidence=np.array([range(len(parts)), parts], np.int64).T), np.array(places, np.int64)
 
 
-def _labelled(
-    subject: RingArrays, clip: RingArrays, kept: Sequence[int], budget: Budget, nesting: Nesting = UNNAMED
+def _label_arrangement(
+    subject: RingArrays, clip: RingArrays, selected: Sequence[int], budget: Budget, nesting: Nesting = UNNAMED
 ) -> tuple[Subdivision, list[int]]:
-    """Return the faces of an arrangement of checked rings, and of each the part of the result that it is in, or 0."""
+    """Return the faces of the arrangement of checked rings, and by face the part of the result, or 0."""
     vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
     arrangement = arrange_rings(vertices, offsets, None, budget)
@@ -80,26 +82,26 @@ def _labelled(
         ]
     else:
         source_of = np.repeat(sources, np.diff(offsets)).tolist()
-        masks = [_odd(source_of[k] for k in edges) for edges in polled(arrangement.cover)]
+        masks = [_odd_sources(source_of[k] for k in edges) for edges in polled(arrangement.cover)]
         labels = [label or frozenset() for label in label_faces(subdivision, masks)]  # 0 where there is no edge
         if nesting.rule == Rule.PAIR:
-            inside = [kept[sum(1 << source for source in label)] for label in labels]
+            inside = [selected[sum(1 << source for source in label)] for label in labels]
         else:
             inside = [label == {0} if nesting.rule == Rule.FIRST_ALONE else bool(label) for label in labels]
     budget.check()
     return subdivision, inside
 
 
-def _odd(sources: Iterable[int]) -> _Sources:
-    """Return those that are there an odd number of times."""
-    found: set[int] = set()
+def _odd_sources(sources: Iterable[int]) -> _Sources:
+    """Return the sources that occur an odd number of times."""
+    odd: set[int] = set()
     for source in sources:
-        found ^= {source}
-    return frozenset(found)
+        odd ^= {source}
+    return frozenset(odd)
 
 
 def _windings(arrangement: Arrangement, vertices: FloatArray, offsets: Sequence[int]) -> list[int]:
-    """Return for each edge how often rings run along it, less how often they run against it."""
+    """Return by edge the number of rings along it minus the number against it."""
     places = list(map(tuple, vertices.tolist()))
     along = [0] * len(places)
     for start, stop in itertools.pairwise(offsets):
@@ -113,10 +115,10 @@ def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
     return [ring for piece in pieces for ring in (piece.shell, *piece.holes)]
 
 
-def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
-    """Return the nearest doubles of the nodes of all rings; done where nothing moves.
+def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResults:
+    """Return the nearest doubles of the nodes of all rings; DONE if nothing moves.
 
-    sources: twice the first of the edges along which the ring goes on, since no vertex is told from a crossing.
+    sources: twice the first of the edges along which the ring continues; vertices and crossings are not distinguished.
     """
     rings, nodes = rings_of(pieces), arrangement.nodes
     half_edges = [half_edge for ring in rings for half_edge in ring]
@@ -130,8 +132,8 @@ def rounded(arrangement: Arrangement, pieces: Sequence[Piece]) -> Found:
     )  # fmt: skip
 
 
-def arranged_again(rings: Found, budget: Budget) -> Found:
-    """Trace the pieces of one pair anew from the exact arrangement of rounded rings."""
+def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
+    """Arrange the rounded rings of one pair again, exactly, and trace the pieces."""
     ends = rings.piece_offsets.tolist()
     holes_of = {shell: frozenset(range(shell + 1, end)) for shell, end in itertools.pairwise(ends)}
     sizes = np.repeat(ring_sizes(rings)[rings.piece_offsets[:-1]], np.diff(rings.piece_offsets)).tolist()
@@ -141,17 +143,17 @@ def arranged_again(rings: Found, budget: Budget) -> Found:
     budget.check()
 
     @functools.cache
-    def verdict(label: _Sources) -> tuple[bool, _Sources]:
-        """Tell whether a face is inside, and name the shells it lies in, or else the innermost holes."""
+    def classify(label: _Sources) -> tuple[bool, _Sources]:
+        """Return whether a face is inside, and the shells it lies in, or else the innermost holes."""
         inside = frozenset(ring for ring in label if ring in holes_of and not label & holes_of[ring])
         holes = [] if inside else [ring for ring in label if ring not in holes_of]
         least = min((sizes[hole] for hole in holes), default=0.0)
         return bool(inside), inside or frozenset(hole for hole in holes if sizes[hole] == least)
 
-    masks = [_odd(ring_of[k] for k in edges) for edges in polled(arrangement.cover)]
+    masks = [_odd_sources(ring_of[k] for k in edges) for edges in polled(arrangement.cover)]
     labels = [label or frozenset() for label in label_faces(subdivision, masks)]
-    inside, evidence = zip(*map(verdict, labels), strict=True)
+    inside, evidence = zip(*map(classify, labels), strict=True)
     pieces = trace_pieces(subdivision, inside, evidence)
     meant = [sorted(named) for piece in pieces for named in (piece.evidence, *piece.hole_evidence)]
-    told = [(ring, source) for ring, sources in enumerate(meant) for source in sources]
-    return rounded(arrangement, pieces)._replace(evidence=np.array(told, np.int64).reshape(-1, 2))
+    provenance = [(ring, source) for ring, sources in enumerate(meant) for source in sources]
+    return round_pieces(arrangement, pieces)._replace(evidence=np.array(provenance, np.int64).reshape(-1, 2))

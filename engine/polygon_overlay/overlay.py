@@ -1,21 +1,19 @@
 """Polygon on polygon: intersection, union, difference and symmetric difference, concave on concave, with holes.
 
-    subject + clip  ->  arrangement  ->  faces with two labels  ->  faces kept  ->  rings  ->  doubles
+    subject + clip  ->  arrangement  ->  faces with two labels  ->  selected faces  ->  rings  ->  doubles
         (floats)         (exact)             (exact)                 (a table)      (exact)    (rounded, made valid)
 
-All rings of both polygons are split where they meet. Each face of that arrangement is known to lie in the subject or
-not, in the clip or not (even-odd over the polygon's rings); the operation is a table over these two. Edges between a
-kept face and one that is not bound the result. Decisions end there: rounding only moves vertices, and where it would
-make rings invalid the rounded rings are arranged once more (in_integers.py).
+All rings of both polygons are noded. Each face of that arrangement lies in the subject or not, in the clip or not
+(even-odd over the polygon's rings); the operation is a table over these two labels. Edges between a selected face and
+another bound the result. Decisions end there: rounding only moves vertices, and where it would make rings invalid the
+rounded rings are arranged once more (in_integers.py).
 
 Sources: the textbook's exercise on clipping a polygon by a concave one; exact arrangements as in D. Halperin and
 M. Sharir, Arrangements, Handbook of Discrete and Computational Geometry, 2018.
 
-The union of any number of polygons, and rings under the fill rules of drawings: one exact arrangement of all rings.
-
-Pair by pair, a union of n polygons arranges edges again that were arranged before, and rounds crossings of crossings.
-Here all rings are split where they meet, once; each face of that arrangement knows which polygons it lies in, or its
-winding number, from a walk over all faces (compiled/ring_nesting.py).
+The union of any number of polygons, and rings under a fill rule: one exact arrangement of all rings. A union pair by
+pair would node edges repeatedly, and round crossings of crossings. Here all rings are noded once; the sources or the
+winding number of each face are propagated over all faces (compiled/ring_nesting.py).
 """
 
 from __future__ import annotations
@@ -31,16 +29,16 @@ from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.grid import from_units, grid_of
 from engine.polygon_overlay.implicit_rings import NOTHING
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.pair_arrays import gathered
+from engine.polygon_overlay.pair_arrays import polygon_arrays_of
 from engine.polygon_overlay.result import Overlay, OverlayOptions
 from engine.polygon_overlay.run import (
-    KEPT,
-    KEPT_ARRAYS,
+    SELECTED,
+    SELECTED_ARRAYS,
     UNNAMED,
     Operation,
-    arranged_again,
     overlay_compiled,
     overlay_few,
+    rebuild_from_rounded_rings,
 )
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Progress, check_options, is_unlimited
@@ -140,9 +138,9 @@ def overlay(
     (4.0, [[2.0, 2.0], [4.0, 2.0], [4.0, 4.0], [2.0, 4.0]])
     """
     if type(subject) is Polygon and type(clip) is Polygon and report is False and grid is None:
-        kept = KEPT_ARRAYS.get(operation) if isinstance(operation, str) else None
-        if kept is not None and is_unlimited(workers, deadline, cancel, progress):
-            few = overlay_few(subject, clip, kept)
+        selected = SELECTED_ARRAYS.get(operation) if isinstance(operation, str) else None
+        if selected is not None and is_unlimited(workers, deadline, cancel, progress):
+            few = overlay_few(subject, clip, selected)
             if few is not None:
                 return few
     check_operation(operation)
@@ -159,9 +157,9 @@ def overlay(
 
 
 def check_operation(operation: str) -> None:
-    if not isinstance(operation, str) or operation not in KEPT:
+    if not isinstance(operation, str) or operation not in SELECTED:
         raise InvalidOperationError(
-            f"operation must be one of {', '.join(KEPT)}; got {shown(operation)}", ("operation",)
+            f"operation must be one of {', '.join(SELECTED)}; got {shown(operation)}", ("operation",)
         )
 
 
@@ -181,9 +179,9 @@ def overlay_rings(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     grid: float | None = None,
 ) -> tuple[Overlay, int, int]:  # fmt: skip
-    """Return the overlay of checked rings (either may be empty), pairs of edges beyond the filter, and in rationals.
+    """Return the overlay of checked rings (either may be empty), and the edge pairs decided exactly, and in rationals.
 
-    nesting: of the rings of the subject, for another rule than even-odd in either; no clip then, and "union".
+    nesting: of the rings of the subject, for a rule other than even-odd in either; then no clip, and "union".
     """
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
@@ -197,21 +195,21 @@ def overlay_rings(
         result, n_exact = overlay_exactly(first, second, operation, budget, nesting, units is not None)
         n_rational = n_exact
         if units is not None:
-            result = from_units(result, units, len(subject.vertices), arranged_again, budget)
+            result = from_units(result, units, len(subject.vertices), rebuild_from_rounded_rings, budget)
     if result._lost is not None and budget.deadline is not None:  # who set one waits no longer for what was lost
         vars(result)["collapsed"] = result._lost.parts(budget)
     return result, n_exact, n_rational
 
 
 def ulps_moved(result: Overlay) -> float:
-    """Return by how many units in the last place of the largest coordinate a vertex may be off."""
+    """Return the largest displacement of a vertex in units in the last place of the largest coordinate."""
     if not result.vertices_moved:
         return 0.5
     return max(0.5, result.largest_displacement / float(np.spacing(np.abs(result.vertices).max())))
 
 
 def accuracy_of(ulps: float, n_edges: int, n_exact: int, n_rational: int) -> Accuracy:
-    """Return the report of one or many overlays; ulps: of the worst of them."""
+    """Return the report of one or many overlays; ulps: the largest of them."""
     return Accuracy(
         decisions="exact", coordinates_ulp=ulps, n_items=n_edges, n_beyond_filter=n_exact, n_rational=n_rational,
         method="arrangement",
@@ -286,15 +284,15 @@ def union_all(
     if not isinstance(polygons, (list, tuple)):
         raise InvalidArrayError(f"polygons must be a list of polygons, got {type(polygons).__name__}", ("polygons",))
     with Budget(deadline, cancel) as budget:
-        result, accuracy = _arranged(polygons, Rule.ANY, budget, grid)
+        result, accuracy = _arrange_all(polygons, Rule.ANY, budget, grid)
     if progress is not None:
         progress(1)
     return (result, accuracy) if report else result
 
 
 def less_all(subject: Polygon, clips: Sequence[Polygon], budget: Budget) -> tuple[Overlay, Accuracy]:
-    """Return what is left of a polygon, which has rings, without any of some others, which may overlap each other."""
-    return _arranged([subject, *clips], Rule.FIRST_ALONE, budget)
+    """Return a polygon, which has rings, minus the union of others."""
+    return _arrange_all([subject, *clips], Rule.FIRST_ALONE, budget)
 
 
 def filled(rings: object, rule: FillRule, *, deadline: float | None = None, cancel: Cancel | None = None) -> Polygon:
@@ -350,21 +348,21 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
     return Polygon(result.rings)
 
 
-def _arranged(
+def _arrange_all(
     polygons: Sequence[Solid], rule: Rule, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
-    """Arrange the rings of all polygons, each a source of its own."""
-    rings, sources, starts = _together(polygons)
+    """Arrange the rings of all polygons, each polygon a source."""
+    rings, sources, starts = _rings_of_all(polygons)
     nesting = Nesting(sources, np.zeros(0), int(rule))
     result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", budget, nesting, grid)
     object.__setattr__(result, "_starts", starts)
     return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
 
 
-def _together(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
-    """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of all but the first.
+def _rings_of_all(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
+    """Return the rings of all polygons, by ring the number of its polygon, and the first vertices of all but the first.
 
-    Polygons without rings have no number, so that of a ring is no less than that of its polygon.
+    Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
     """
     if set(map(type, polygons)) - {Polygon}:
         for k, polygon in enumerate(polygons):
@@ -372,7 +370,7 @@ def _together(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray
     each = cast("Sequence[Polygon]", polygons)
     if not each:
         return NOTHING, np.zeros(0, np.int64), np.zeros(0, np.int64)
-    flat = gathered(each)
+    flat = polygon_arrays_of(each)
     n_rings = np.diff(flat.polygon_offsets)
     sources = np.repeat(np.cumsum(n_rings > 0) - 1, n_rings)
     return RingArrays(*flat[:2]), sources, flat.ring_offsets[flat.polygon_offsets[1:-1]]

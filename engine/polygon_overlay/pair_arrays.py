@@ -1,7 +1,4 @@
-"""What overlays of some pairs found, as flat arrays: one pair after another, and the parts of that.
-
-Many polygons as three arrays, without an object for each: what layers and batches of their pairs are made of.
-"""
+"""Results of overlays of pairs, and many polygons, as flat arrays without an object for each."""
 
 from __future__ import annotations
 
@@ -22,13 +19,17 @@ from engine.types import FloatArray, Int8Array, Int32Array, IntArray, read_only
 NO_EVIDENCE: Final = np.zeros((0, 2), np.int64)
 
 
-class Found(NamedTuple):
-    """What the kernel found for some pairs, one after another.
+class PairResults(NamedTuple):
+    """Results of the kernel, pair after pair.
 
-    status: (pairs,) int8, DONE, OPEN or MAY_CROSS; counts: (pairs, 4) int64, pieces, rings, vertices and pairs of edges
-    beyond the filter; displacement: (pairs,) float64. vertices, sources: of all pairs that are not OPEN; ring_offsets
-    into them; piece_offsets: into the rings. evidence: (m, 2) int64, of pairs whose rings are sources of their own: a
-    ring, and one that it comes from.
+    | field | dtype, shape | meaning |
+    | --- | --- | --- |
+    | status | int8 (pairs,) | DONE, OPEN or MAY_CROSS |
+    | counts | int64 (pairs, 4) | pieces, rings, vertices, exactly decided edge pairs |
+    | displacement | float64 (pairs,) | largest displacement by rounding |
+    | vertices, sources | float64, int32 (n, 2) | of all pairs that are not OPEN |
+    | ring_offsets, piece_offsets | int64 | into the vertices, into the rings |
+    | evidence | int64 (m, 2) | rounded rings: a ring, and a ring it comes from |
     """
 
     status: Int8Array
@@ -41,7 +42,7 @@ class Found(NamedTuple):
     evidence: IntArray
 
 
-NO_PAIRS: Final = Found(
+NO_PAIRS: Final = PairResults(
     np.zeros(0, np.int8), np.zeros((0, 4), np.int64), np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2), np.int32),
     np.zeros(1, np.int64), np.zeros(1, np.int64), NO_EVIDENCE,
 )  # fmt: skip
@@ -50,58 +51,58 @@ NO_PAIRS: Final = Found(
 def one_pair(
     vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, displacement: float, n_exact: int,
     sources: Int32Array | None = None, status: int = PairStatus.DONE,
-) -> Found:  # fmt: skip
-    """Return what was found for one pair; sources left out: vertices that may be any."""
+) -> PairResults:  # fmt: skip
+    """Return the result of one pair; without sources: all zero."""
     counts = np.array([[len(piece_offsets) - 1, len(ring_offsets) - 1, len(vertices), n_exact]])
     sources = np.zeros((len(vertices), 2), np.int32) if sources is None else sources
     outcome = np.array([status], np.int8), counts, np.array([displacement])
-    return Found(*outcome, vertices, sources, ring_offsets, piece_offsets, NO_EVIDENCE)
+    return PairResults(*outcome, vertices, sources, ring_offsets, piece_offsets, NO_EVIDENCE)
 
 
-def taken(found: Found, items: IntArray) -> Found:
-    """Return some of the pairs found, in the order of ``items``; no evidence."""
-    of_pieces, of_rings, of_vertices = (places_of(summed(found.counts[:, k]), items) for k in range(3))
-    return Found(
-        found.status[items], found.counts[items], found.displacement[items], found.vertices[of_vertices],
-        found.sources[of_vertices], summed(np.diff(found.ring_offsets)[of_rings]),
-        summed(np.diff(found.piece_offsets)[of_pieces]), NO_EVIDENCE,
+def take_pairs(pairs: PairResults, items: IntArray) -> PairResults:
+    """Return the results of the pairs ``items``, in this order, without evidence."""
+    of_pieces, of_rings, of_vertices = (places_of(summed(pairs.counts[:, k]), items) for k in range(3))
+    return PairResults(
+        pairs.status[items], pairs.counts[items], pairs.displacement[items], pairs.vertices[of_vertices],
+        pairs.sources[of_vertices], summed(np.diff(pairs.ring_offsets)[of_rings]),
+        summed(np.diff(pairs.piece_offsets)[of_pieces]), NO_EVIDENCE,
     )  # fmt: skip
 
 
 def places_of(offsets: IntArray, items: IntArray) -> IntArray:
-    """Return the places that belong to ``items``, one item after another, those of item k from offsets[k] on."""
+    """Return the concatenated ranges offsets[k] .. offsets[k + 1] - 1 for k in ``items``."""
     sizes = offsets[items + 1] - offsets[items]
     ends = np.cumsum(sizes)
     return np.arange(ends[-1] if len(ends) else 0) + np.repeat(offsets[items] - (ends - sizes), sizes)
 
 
-def joined(parts: list[Found]) -> Found:
-    """Return the pairs of all parts, at least one, one part after another; no evidence."""
+def concatenate_pairs(parts: list[PairResults]) -> PairResults:
+    """Return the pairs of all parts, at least one, without evidence."""
     if len(parts) == 1:
         return parts[0]._replace(evidence=NO_EVIDENCE)
     outcomes = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[:3])
-    return Found(*outcomes, *put_together([(*part[3:7], NO_EVIDENCE) for part in parts]))
+    return PairResults(*outcomes, *concatenate_parts([(*part[3:7], NO_EVIDENCE) for part in parts]))
 
 
-def put_together(parts: Sequence[Sequence[Any]]) -> list[Any]:
-    """Return vertices, sources, ring offsets, piece offsets and evidence of some parts as those of one."""
+def concatenate_parts(parts: Sequence[Sequence[Any]]) -> list[Any]:
+    """Return vertices, sources, ring offsets, piece offsets and evidence of some parts, concatenated."""
     vertices, sources, ring_offsets, piece_offsets, evidence = zip(*parts, strict=True)
-    offsets = chained(ring_offsets), chained(piece_offsets)
+    offsets = concatenate_offsets(ring_offsets), concatenate_offsets(piece_offsets)
     return [np.concatenate(vertices), np.concatenate(sources), *offsets, np.concatenate(evidence)]
 
 
-def chained(offsets: Sequence[IntArray]) -> IntArray:
-    """Return the offsets of several arrays put one after another."""
+def concatenate_offsets(offsets: Sequence[IntArray]) -> IntArray:
+    """Return the offsets of concatenated arrays."""
     return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
 
 
-def ring_numbers(offsets: IntArray) -> IntArray:
+def ring_of_vertices(offsets: IntArray) -> IntArray:
     """Return by vertex the number of its ring."""
     return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
 
 
-def ring_sizes(rings: Found) -> FloatArray:
-    """Return by ring the sum of both sides of its box."""
+def ring_sizes(rings: PairResults) -> FloatArray:
+    """Return by ring the width plus the height of its box."""
     starts = rings.ring_offsets[:-1]
     if not len(starts):
         return np.zeros(0)
@@ -110,7 +111,7 @@ def ring_sizes(rings: Found) -> FloatArray:
 
 
 _LEAST: Final = 3
-"""Positions of a ring that has area."""
+"""Fewest positions of a ring with area."""
 
 
 class PolygonArrays(NamedTuple):
@@ -121,12 +122,12 @@ class PolygonArrays(NamedTuple):
     polygon_offsets: IntArray
 
     def polygon(self, number: int) -> Polygon:
-        """Return one of the polygons, as a view."""
+        """Return one polygon, as a view."""
         rings = self.ring_offsets[self.polygon_offsets[number] : self.polygon_offsets[number + 1] + 1]
         return Polygon.of_arrays(self.vertices[rings[0] : rings[-1]], read_only(rings - rings[0]))
 
-    def taken(self, numbers: IntArray) -> PolygonArrays:
-        """Return some of the polygons, in the order of `numbers`."""
+    def take(self, numbers: IntArray) -> PolygonArrays:
+        """Return the polygons `numbers`, in this order."""
         rings = places_of(self.polygon_offsets, numbers)
         return PolygonArrays(
             read_only(self.vertices[places_of(self.ring_offsets, rings)]),
@@ -135,21 +136,21 @@ class PolygonArrays(NamedTuple):
         )
 
     def merged(self, groups: IntArray) -> PolygonArrays:
-        """Return as one polygon the rings of those from groups[k] up to groups[k + 1]."""
+        """Return polygons, each of the rings of polygons groups[k] .. groups[k + 1] - 1."""
         return self._replace(polygon_offsets=read_only(self.polygon_offsets[groups]))
 
     def sizes(self) -> IntArray:
-        """Return the number of vertices of each."""
+        """Return the number of vertices of each polygon."""
         starts = self.ring_offsets[self.polygon_offsets]
         return starts[1:] - starts[:-1]
 
     def most(self) -> tuple[int, int]:
-        """Return the most vertices, and the most rings, that one has."""
-        found: tuple[int, int] = entry_of(find_most)(self.ring_offsets, self.polygon_offsets)
-        return found
+        """Return the largest numbers of vertices and of rings of a polygon."""
+        largest: tuple[int, int] = entry_of(find_most)(self.ring_offsets, self.polygon_offsets)
+        return largest
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the low and the high corners (n, 2) of some, none of which is empty and which are in order."""
+        """Return the low and high corners (n, 2) of the polygons `numbers`, ascending and not empty."""
         starts = self.ring_offsets[self.polygon_offsets[numbers]]
         if not len(starts):
             return np.zeros((0, 2)), np.zeros((0, 2))
@@ -157,32 +158,29 @@ class PolygonArrays(NamedTuple):
 
 
 def arrays_of(coordinates: object, ring_offsets: object, polygon_offsets: object) -> PolygonArrays:
-    """Return what `polygons` takes as arrays; a ring of two positions, which has no area, is left out.
-
-    Raises: as `polygons`.
-    """
+    """Return the input of `polygons` as arrays; rings of two positions are left out. Raises as `polygons`."""
     vertices, starts, ends, groups = parted(coordinates, ring_offsets, polygon_offsets)
     sizes = ends - starts
     if len(single := np.flatnonzero(sizes == 1)):
         place = int(single[0])
         raise RingTooShortError(f"ring {place} of ring_offsets has one position; give 3", ("ring_offsets", place))
-    is_kept = sizes >= _LEAST
-    offsets = summed(sizes[is_kept])
-    places = np.arange(offsets[-1]) + np.repeat(starts[is_kept] - offsets[:-1], sizes[is_kept])
-    return PolygonArrays(read_only(vertices[places]), offsets, read_only(summed(is_kept.astype(np.int64))[groups]))
+    is_ring = sizes >= _LEAST
+    offsets = summed(sizes[is_ring])
+    places = np.arange(offsets[-1]) + np.repeat(starts[is_ring] - offsets[:-1], sizes[is_ring])
+    return PolygonArrays(read_only(vertices[places]), offsets, read_only(summed(is_ring.astype(np.int64))[groups]))
 
 
-def joined_arrays(parts: Sequence[PolygonArrays]) -> PolygonArrays:
-    """Return the polygons of some parts, at least one, one part after another."""
+def concatenate_polygons(parts: Sequence[PolygonArrays]) -> PolygonArrays:
+    """Return the polygons of some parts, at least one, concatenated."""
     return PolygonArrays(
         read_only(np.concatenate([part.vertices for part in parts])),
-        chained([part.ring_offsets for part in parts]),
-        chained([part.polygon_offsets for part in parts]),
+        concatenate_offsets([part.ring_offsets for part in parts]),
+        concatenate_offsets([part.polygon_offsets for part in parts]),
     )
 
 
-def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
-    """Return polygons as arrays, joined as bytes: numpy takes three times as long to put small ones together."""
+def polygon_arrays_of(polygons: Sequence[Polygon]) -> PolygonArrays:
+    """Return polygons as arrays, joined as bytes: numpy takes three times as long to concatenate small ones."""
     if len(polygons) == 1:
         return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
@@ -195,8 +193,8 @@ def gathered(polygons: Sequence[Polygon]) -> PolygonArrays:
     return PolygonArrays(vertices.reshape(-1, 2), summed(sizes), summed(ends - starts))
 
 
-class Chosen(Sequence[Polygon]):
-    """Some polygons of arrays, by their numbers; an object is made for one that is asked for."""
+class PolygonSelection(Sequence[Polygon]):
+    """Some polygons of arrays, by their numbers; indexing makes an object."""
 
     def __init__(self, arrays: PolygonArrays, numbers: IntArray) -> None:
         self._arrays, self._numbers = arrays, numbers
@@ -207,15 +205,15 @@ class Chosen(Sequence[Polygon]):
     @overload
     def __getitem__(self, place: int) -> Polygon: ...
     @overload
-    def __getitem__(self, place: slice) -> Chosen: ...
-    def __getitem__(self, place: int | slice) -> Polygon | Chosen:
+    def __getitem__(self, place: slice) -> PolygonSelection: ...
+    def __getitem__(self, place: int | slice) -> Polygon | PolygonSelection:
         if isinstance(place, slice):
-            return Chosen(self._arrays, self._numbers[place])
+            return PolygonSelection(self._arrays, self._numbers[place])
         return self._arrays.polygon(int(self._numbers[place]))
 
-    def together(self) -> PolygonArrays:
+    def arrays(self) -> PolygonArrays:
         """Return them as arrays of their own."""
-        return self._arrays.taken(self._numbers)
+        return self._arrays.take(self._numbers)
 
     @property
     def n_vertices(self) -> int:

@@ -23,7 +23,7 @@ from engine.types import FloatArray, IntArray
 
 
 class OverlayOptions(Options, total=False):
-    """What overlays take by keyword beside."""
+    """Further keyword options of overlays."""
 
     grid: float | None
 
@@ -73,9 +73,9 @@ _Place = tuple[Fraction, Fraction]
 
 
 class Lost(NamedTuple):
-    """Parts of an exact result that rounding lost: shells of pieces, and holes, by their numbers among all rings.
+    """Parts of an exact result that rounding lost: shells of pieces, and holes, by their ring numbers.
 
-    piece_offsets: of the exact result. unit: what coordinates are multiples of.
+    piece_offsets: of the exact result. unit: the unit of the coordinates.
     """
 
     exact: Exact
@@ -85,7 +85,7 @@ class Lost(NamedTuple):
     unit: Fraction = Fraction(1)
 
     def shells(self) -> list[list[tuple[float, float]]]:
-        """Return the shells of pieces, each vertex the nearest doubles."""
+        """Return the shells of pieces, rounded."""
         places = self.exact.some(self.pieces).places()
         return [[(nearest(x), nearest(y)) for x, y in ring] for ring in places]
 
@@ -119,7 +119,7 @@ class Lost(NamedTuple):
 
 
 def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
-    """Return a ring from its first vertex on, and the doubles nearest to that vertex."""
+    """Return a ring from its smallest vertex on, and that vertex rounded."""
     (places,) = ring.places()
     k = places.index(min(places))
     x, y = places[k]
@@ -195,7 +195,7 @@ class Overlay:
     snapped: bool = False
 
     def __getattr__(self, name: str) -> Any:
-        """Return a field that is made when it, or another such, is asked for first; only what is missing comes here."""
+        """Return a field that is computed on first access; only missing attributes come here."""
         later = vars(self).get("_later")
         made = {} if later is None or name.startswith("__") else later()
         if name not in made:
@@ -280,20 +280,23 @@ class Overlay:
 
     @property
     def piece_areas(self) -> FloatArray:
-        """Areas of the pieces of the exact result, holes taken off: (n_pieces_exact,), the nearest doubles.
+        """Areas of the pieces of the exact result, holes take_pairs off: (n_pieces_exact,), the nearest doubles.
 
         Where rounding lost, joined or parted none these are those of `pieces`, in their order.
         """
         return self.exact.nearest_areas(np.append(np.flatnonzero(self.exact.are_shells()), self.exact.n_rings))
 
 
-def made_overlay(
-    vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, exact: Exact, **told: Any
+def build_overlay(
+    vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, exact: Exact, **fields: Any
 ) -> Overlay:
-    """Return an `Overlay` of read-only arrays, with the counts of its exact result unless told otherwise."""
-    told.update(vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets, exact=exact)
-    if "n_pieces_exact" not in told:
-        told["n_pieces_exact"], told["n_holes_exact"] = len(piece_offsets) - 1, len(ring_offsets) - len(piece_offsets)
+    """Return an `Overlay` of read-only arrays; the counts of its exact result default to its own."""
+    fields.update(vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets, exact=exact)
+    if "n_pieces_exact" not in fields:
+        fields["n_pieces_exact"], fields["n_holes_exact"] = (
+            len(piece_offsets) - 1,
+            len(ring_offsets) - len(piece_offsets),
+        )
     result = object.__new__(Overlay)
-    object.__setattr__(result, "__dict__", told)  # all at once: Overlay(...) sets one by one, which takes 2 us
+    object.__setattr__(result, "__dict__", fields)  # Overlay(...) sets fields one by one, which takes 2 us
     return result

@@ -1,8 +1,8 @@
-"""Runs the compiled overlay on pairs of polygons, and gathers what it leaves as flat arrays.
+"""Calls the compiled overlay for pairs of polygons, and collects its output as flat arrays.
 
-Small overlays are called so often that what stands around the kernel counts, of which an array made, or a tuple with
-names, takes a tenth of the whole call: `overlay_few` calls the kernel directly for two small polygons, and what it
-leaves stays bytes until it is asked for.
+Small overlays are called so often that the Python around the kernel counts; one array or named tuple made takes a tenth
+of the whole call. So `overlay_few` calls the kernel directly for two small polygons, and its output stays bytes until a
+field is read.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from engine.polygon_overlay.compiled.workspace import (
     FEW_VERTICES,
     Outcomes,
     first_contacts,
-    keep,
     more_contacts,
+    return_scratch,
     scratch_for,
     scratch_for_few,
-    spare,
+    small_pool,
 )
-from engine.polygon_overlay.grid import Grid, as_it_stays, from_units, snap_vertices, snapped_to_units
+from engine.polygon_overlay.grid import Grid, from_units, snap_vertices, snapped_overlay, snapped_to_units
 from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings, one_polygon
-from engine.polygon_overlay.pair_arrays import Found, PolygonArrays, put_together, ring_sizes
-from engine.polygon_overlay.result import Overlay, made_overlay
-from engine.polygon_overlay.rounds import settle_rings
+from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays, concatenate_parts, ring_sizes
+from engine.polygon_overlay.result import Overlay, build_overlay
+from engine.polygon_overlay.rounds import make_valid_after_rounding
 from engine.predicates.rational import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.polygon import Polygon
@@ -41,61 +41,60 @@ from engine.types import OPEN, FlagArray, FloatArray, IntArray, read_only
 
 Operation = Literal["intersection", "union", "difference", "symmetric_difference"]
 
-KEPT: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
+SELECTED: Final = {  # by the label of a face: in neither, in the subject, in the clip, in both
     "intersection": (False, False, False, True),
     "union": (False, True, True, True),
     "difference": (False, True, False, False),
     "symmetric_difference": (False, True, True, False),
 }
-KEPT_ARRAYS: Final = {name: np.array(kept, np.uint8) for name, kept in KEPT.items()}
+SELECTED_ARRAYS: Final = {name: np.array(selected, np.uint8) for name, selected in SELECTED.items()}
 EACH_PART: Final = np.arange(4, dtype=np.uint8)
-"""Keeps what lies in the subject alone, in the clip alone and in both, as parts 1, 2 and 3 of one result."""
+"""Selects what lies in the subject alone, in the clip alone and in both, as parts 1, 2 and 3 of one result."""
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
-"""What stands in the place of the result of reduce_pair."""
+"""Placeholder of the result of reduce_pair."""
 UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), int(Rule.PAIR))
-"""That of two polygons."""
+"""The nesting of two polygons."""
 _MANY: Final = 500
-"""Vertices of a pair from which on blocks of edges are looked at first."""
+"""Vertices of a pair from which on blocks of edges are tested first."""
 _MANY_IN_RING: Final = 64
-"""The same by ring: blocks of small rings are no better than their edges."""
+"""Vertices by ring from which on: blocks of small rings are no better than their edges."""
 _BLOCK: Final = 16
 _BLOCKS_GROW: Final = 10_000
-"""Edges of a block, and vertices from which on it has twice as many: less to look at, and more around a crossing."""
+"""Edges of a block; vertices from which on blocks are twice as large."""
 _MOST: Final = 0.5
-"""Part of all edges that may be looked at one by one so that leaving out the others pays."""
+"""Largest fraction of edges that may be active so that a reduction pays."""
 _BY_CONTACT: Final = 300
 _BY_VERTEX: Final = 200
-"""Bytes of scratch and answer for each of them, at most."""
+"""Upper bounds in bytes of scratch and output."""
 _FEW_CONTACTS: Final = 1024
 
 
 def run_kernel(
-    subjects: PolygonArrays, clips: PolygonArrays, kept: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
-) -> Found:
-    """Overlay polygons pair by pair. Raises as `Budget.check` when the call must end.
+    subjects: PolygonArrays, clips: PolygonArrays, selected: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
+) -> PairResults:
+    """Overlay polygons pair by pair; raises as `Budget.check`.
 
-    kept: as `overlay_pairs` takes it, one of `KEPT_ARRAYS`, or `EACH_PART`.
-    nesting: of the rings of subjects, to be arranged each as a source of its own, as `overlay_pairs` takes it.
+    selected: as of `overlay_pairs`, one of `SELECTED_ARRAYS`, or `EACH_PART`. nesting: of the rings of subjects, each a
+    source of its own, as of `overlay_pairs`.
     """
     n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
-    is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and kept[3] < 2
+    is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and selected[3] < 2
     if is_plain and n_vertices >= max(_MANY, _MANY_IN_RING * n_rings):
         size = _BLOCK if n_vertices < _BLOCKS_GROW else 2 * _BLOCK
-        found = run_blocks(subjects, clips, (n_vertices, n_rings), kept, budget, UNNAMED, size)
-        if found is not None:
-            return found
-    return cast("Found", run_blocks(subjects, clips, (n_vertices, n_rings), kept, budget, nesting))
+        pairs = run_blocks(subjects, clips, (n_vertices, n_rings), selected, budget, UNNAMED, size)
+        if pairs is not None:
+            return pairs
+    return cast("PairResults", run_blocks(subjects, clips, (n_vertices, n_rings), selected, budget, nesting))
 
 
 def run_blocks(
-    subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], kept: FlagArray, budget: Budget,
+    subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], selected: FlagArray, budget: Budget,
     nesting: Nesting = UNNAMED, size: int = 0, most: float = _MOST,
-) -> Found | None:  # fmt: skip
-    """Overlay polygons pair by pair; with a size one pair in blocks of so many edges, of which fewer than a part `most`
-    may be looked at one by one. largest: the most vertices, and rings, of a pair.
+) -> PairResults | None:  # fmt: skip
+    """Overlay polygons pair by pair; with a ``size``, one pair reduced by blocks of so many edges.
 
-    Then None where more edges are near others, or where the pair is not DONE: rounded rings that nothing vouches for
-    are to be arranged again, with all their vertices.
+    Then None where the fraction ``most`` of edges or more is active, or the pair is not DONE: doubtful rounded rings
+    are arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair.
     """
     n, (n_vertices, n_rings) = len(subjects.polygon_offsets) - 1, largest
     first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
@@ -106,25 +105,25 @@ def run_blocks(
     if not size:
         n_contacts = first_contacts(n_vertices)
         n_out, n_out_rings = 8 * n + len(subjects.vertices) + len(clips.vertices), 2 * n
-    while reached < n:  # bound: each turn goes on, or makes room for one pair, geometrically
+    while reached < n:  # bound: each turn advances, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
             n_most = int(most * n_vertices)
-            reduced = entry_of(reduce_pair)(first, second, size, n_most, budget.flag, scratch.words)
+            reduced = entry_of(reduce_pair)(first, second, size, n_most, budget.flag, scratch.addresses)
             if reduced.n == 0:
                 budget.check()
-                keep(scratch)
+                return_scratch(scratch)
                 return None
         n_known = sum(len(part[2]) - 1 for part in parts)
         reached, needs, filled, n_filled, n_pieces, n_evidence, n_left_out = entry_of(overlay_pairs)(
-            first, subjects.polygon_offsets, second, clips.polygon_offsets, reached, reduced, kept, nesting,
-            budget.flag, scratch.words, outcomes,
+            first, subjects.polygon_offsets, second, clips.polygon_offsets, reached, reduced, selected, nesting,
+            budget.flag, scratch.addresses, outcomes,
         )  # fmt: skip
         budget.check()
         sizes = filled, filled, n_filled + 1, n_pieces + 1, n_evidence
         parts.append([array[:size].copy() for array, size in zip(scratch.output, sizes, strict=True)])
         parts[-1][4][:, 0] += n_known
-        keep(scratch)
+        return_scratch(scratch)
         if needs == NEEDS_CONTACTS:
             n_contacts = more_contacts(scratch.n_contacts)
             budget.take(_BY_CONTACT * n_contacts)
@@ -134,37 +133,39 @@ def run_blocks(
             return None
         elif n_left_out:
             outcomes.counts[0, 2] += n_left_out
-            parts[-1][:3] = _expanded(parts[-1], n_left_out, first, second, budget)
-    return Found(*outcomes, *(parts[0] if len(parts) == 1 else put_together(parts)))
+            parts[-1][:3] = _expand(parts[-1], n_left_out, first, second, budget)
+    return PairResults(*outcomes, *(parts[0] if len(parts) == 1 else concatenate_parts(parts)))
 
 
-def _expanded(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> list[Any]:
-    """Return vertices, sources and offsets of rings with what was left out of them."""
+def _expand(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> list[Any]:
+    """Return vertices, sources and ring offsets with the left-out vertices reinserted."""
     n = len(part[0]) + n_left_out
-    made = [np.empty((n, 2)), np.empty((n, 2), np.int32), np.empty_like(part[2])]
-    entry_of(expand_rings)(*part[:3], subject.vertices, clip.vertices, budget.flag, *made)
+    expanded = [np.empty((n, 2)), np.empty((n, 2), np.int32), np.empty_like(part[2])]
+    entry_of(expand_rings)(*part[:3], subject.vertices, clip.vertices, budget.flag, *expanded)
     budget.check()
-    return made
+    return expanded
 
 
-def _run_pair(subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting) -> Found:
+def _run_pair(
+    subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting
+) -> PairResults:
     if (n_vertices := len(subject.vertices) + len(clip.vertices)) >= _MANY:
         budget.take(_BY_VERTEX * n_vertices)
     first, second = (PolygonArrays(*side, one_polygon(len(side.offsets) - 1)) for side in (subject, clip))
-    return run_kernel(first, second, KEPT_ARRAYS[operation], budget, nesting)
+    return run_kernel(first, second, SELECTED_ARRAYS[operation], budget, nesting)
 
 
 def overlay_compiled(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
-    """Return the overlay of one pair and the number of pairs of edges beyond the filter; None where it is left open.
+    """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN.
 
-    grid: whose units coordinates are in; those of the overlay are not. A scene outside of the kernel's range is brought
-    into it by a power of two where that is exact.
+    grid: the grid whose units the coordinates are in; those of the overlay are not. A scene outside the kernel's range
+    is scaled into it by a power of two where that is exact.
     """
-    found, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
-    if found.status[0] == OPEN:
+    pair, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
+    if pair.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
         if exponent == 0 or grid is not None:
             return None
@@ -172,27 +173,27 @@ def overlay_compiled(
         if first is None or second is None:
             return None
         near = RingArrays(first, subject.offsets), RingArrays(second, clip.offsets)
-        found = _run_pair(*near, operation, budget, nesting)
-        if found.status[0] == OPEN:
+        pair = _run_pair(*near, operation, budget, nesting)
+        if pair.status[0] == OPEN:
             return None
     result: Overlay | None = None
-    arrays: Any = found[3:7]
+    arrays: Any = pair[3:7]
     for array in arrays:
         array.setflags(False)  # write: by its name it takes twice as long
-    exact = ImplicitRings(subject, clip, found.sources, found.ring_offsets)
+    exact = ImplicitRings(subject, clip, pair.sources, pair.ring_offsets)
     known = None
-    if found.status[0] == PairStatus.DONE and grid is None:
-        result = as_overlay(found.vertices, found.piece_offsets, found.displacement.item(), exact)
-    elif found.status[0] == PairStatus.DONE and grid is not None:
-        known = snap_vertices(found.vertices, found.ring_offsets, found.piece_offsets, budget)
-        result = as_it_stays(found, known, grid, len(subject.vertices))
+    if pair.status[0] == PairStatus.DONE and grid is None:
+        result = as_overlay(pair.vertices, pair.piece_offsets, pair.displacement.item(), exact)
+    elif pair.status[0] == PairStatus.DONE and grid is not None:
+        known = snap_vertices(pair.vertices, pair.ring_offsets, pair.piece_offsets, budget)
+        result = snapped_overlay(pair, known, grid, len(subject.vertices))
     if result is None:
         snap = grid and functools.partial(snapped_to_units, known=known)
-        result = settle_rings(found, exact, arranged_again, exponent == 0, budget, snap)
+        result = make_valid_after_rounding(pair, exact, rebuild_from_rounded_rings, exponent == 0, budget, snap)
         if result is None:
             return None
         if grid is not None:
-            result = from_units(result, grid, len(subject.vertices), arranged_again, budget)
+            result = from_units(result, grid, len(subject.vertices), rebuild_from_rounded_rings, budget)
     if exponent:
         vertices, doubtful = scaled_back(result.vertices, exponent)
         if doubtful.any() or not np.isfinite(vertices).all():
@@ -200,35 +201,45 @@ def overlay_compiled(
         moved = result.largest_displacement
         displacement = float(np.nextafter(np.ldexp(moved, exponent), np.inf)) if moved else 0.0
         result = replace(result, vertices=read_only(vertices), largest_displacement=displacement)
-    return result, int(found.counts[0, 3])
+    return result, int(pair.counts[0, 3])
 
 
-def arranged_again(rings: Found, budget: Budget) -> Found:
-    """Arrange the rings of each pair, each a source of its own."""
+def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
+    """Arrange the rounded rings of each pair again, each a source of its own."""
     n_rings = rings.counts[:, 1]
     items = summed(n_rings)
     shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))
     subjects = PolygonArrays(read_only(rings.vertices), read_only(rings.ring_offsets), items)
     none = PolygonArrays(*NOTHING, read_only(np.zeros_like(items)))
     nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], int(Rule.AGAIN))
-    return run_kernel(subjects, none, KEPT_ARRAYS["union"], budget, nesting)
+    return run_kernel(subjects, none, SELECTED_ARRAYS["union"], budget, nesting)
 
 
 def as_overlay(vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings) -> Overlay:
-    """Return an `Overlay` whose rounded rings have the structure of the exact ones; all arrays are read-only."""
-    told = {"largest_displacement": displacement, "rounds": int(displacement > 0.0)}
-    return made_overlay(vertices, exact.offsets, piece_offsets, exact, **told)
+    """Return an `Overlay` whose rounded rings have the topology of the exact ones; all arrays are read-only."""
+    fields = {"largest_displacement": displacement, "rounds": int(displacement > 0.0)}
+    return build_overlay(vertices, exact.offsets, piece_offsets, exact, **fields)
 
 
-def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray) -> Overlay | None:
-    """Return the overlay of two polygons, without a limit; None of more vertices, or where the kernel leaves doubt."""
+def overlay_few(subject: Polygon, clip: Polygon, selected: FlagArray) -> Overlay | None:
+    """Return the overlay of two polygons, without a deadline; None if they are large, or not DONE."""
     first, second = RingArrays(subject.vertices, subject.ring_offsets), RingArrays(clip.vertices, clip.ring_offsets)
     if len(first.vertices) + len(second.vertices) > FEW_VERTICES:
         return None
     scratch = scratch_for_few()
     items = one_polygon(len(first.offsets) - 1), one_polygon(len(second.offsets) - 1)
     _, needs, n, n_rings, n_pieces, _, _ = entry_of(overlay_pairs)(
-        first, items[0], second, items[1], 0, NOT_REDUCED, kept, UNNAMED, UNLIMITED.flag, scratch.words, scratch.outcome
+        first,
+        items[0],
+        second,
+        items[1],
+        0,
+        NOT_REDUCED,
+        selected,
+        UNNAMED,
+        UNLIMITED.flag,
+        scratch.addresses,
+        scratch.outcome,
     )
     status, _, displacement = scratch.outcome
     is_done, moved_by, left = (
@@ -239,21 +250,21 @@ def overlay_few(subject: Polygon, clip: Polygon, kept: FlagArray) -> Overlay | N
     vertices, sources, rings = left.vertices[:n].tobytes(), left.sources[:n].tobytes(), None
     if n_rings != 1:
         rings = left.rings[: n_rings + 1].tobytes(), left.pieces[: n_pieces + 1].tobytes()
-    spare.append(scratch)
+    small_pool.append(scratch)
     if not is_done:
         return None
-    told: dict[str, Any] = {"_later": functools.partial(_fields, first, second, vertices, sources, rings)}
+    fields: dict[str, Any] = {"_later": functools.partial(_fields, first, second, vertices, sources, rings)}
     if moved_by > 0.0:
-        told |= {"rounds": 1, "largest_displacement": moved_by}
+        fields |= {"rounds": 1, "largest_displacement": moved_by}
     result = object.__new__(Overlay)
-    object.__setattr__(result, "__dict__", told)
+    object.__setattr__(result, "__dict__", fields)
     return result
 
 
 def _fields(
     subject: RingArrays, clip: RingArrays, vertices: bytes, sources: bytes, rings: tuple[bytes, bytes] | None
 ) -> dict[str, Any]:
-    """Return the fields of an `Overlay` that are made when one of them is asked for."""
+    """Return the fields of an `Overlay` that are made when one of them is read."""
     places = np.frombuffer(vertices).reshape(-1, 2)
     ring_offsets, piece_offsets = one_polygon(len(places)), one_polygon(1)
     if rings is not None:

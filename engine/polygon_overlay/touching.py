@@ -1,11 +1,10 @@
-"""Where two polygons meet without common area: the stretches of border that they share, and single points; and the
-lines and points to which rounding collapses an area that they share.
+"""Where two polygons meet without common area (shared border lines, single points); and the lines and points to which
+rounding collapses a common area.
 
-A point of both belongs to their common area, or lies on a line that has one polygon on one side and the other on the
-other, or stands alone. All is read from one exact arrangement, whose parts are what lies in the first polygon alone, in
-the second alone, and in both:
+A common point belongs to the common area, or lies on a line between both polygons, or is isolated. All is derived from
+one exact arrangement, whose parts are what lies in the first polygon alone, in the second alone, and in both:
 
-    .-------a-------.       From a to b runs an edge of both parts, in either direction: a line.
+    .-------a-------.       From a to b runs an edge of both parts, in opposite directions: a line.
     |       |   2   |       c is a vertex of both, on no line, and not of the third part: a point.
     |   1   b---.   |
     |      /  .-'   |
@@ -25,7 +24,14 @@ import numpy as np
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import parts_exactly
-from engine.polygon_overlay.pair_arrays import Chosen, Found, chained, places_of, ring_numbers, taken
+from engine.polygon_overlay.pair_arrays import (
+    PairResults,
+    PolygonSelection,
+    concatenate_offsets,
+    places_of,
+    ring_of_vertices,
+    take_pairs,
+)
 from engine.polygon_overlay.run import EACH_PART, run_kernel
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
@@ -36,14 +42,17 @@ _FIRST: Final = 1
 _SECOND: Final = 2
 _BOTH: Final = 3
 _OF_A_CROSSING: Final = 3
-"""Parts that meet where two edges cross."""
+"""Number of parts that meet where two edges cross."""
 _BLOCK: Final = 1024
-"""Pairs that are read together: numpy's calls take as long as some hundred of them."""
+"""Pairs that are evaluated together: the overhead of numpy's calls is that of some hundred pairs."""
 
 
 class Touching(NamedTuple):
-    """Lines and points of some pairs. lines, points: the pair of each. vertices (n, 2) float64 of all lines,
-    one after another; offsets of each into them; places (n_points, 2) float64."""
+    """Lines and points of some pairs.
+
+    lines, points: the pair of each. vertices (n, 2) float64 of all lines, offsets of each into them; places (n_points,
+    2) float64.
+    """
 
     lines: IntArray
     vertices: FloatArray
@@ -57,7 +66,9 @@ _NOWHERE: Final = Touching(
 )
 
 
-def touching(firsts: Chosen, seconds: Chosen, budget: Budget, workers: int | None = None) -> Touching:
+def touching(
+    firsts: PolygonSelection, seconds: PolygonSelection, budget: Budget, workers: int | None = None
+) -> Touching:
     """Return where pairs of polygons, firsts[k] and seconds[k], each even-odd, meet without common area.
 
     Boundary, degenerate input: polygons are closed sets, the closure of their interior: spikes and rings without area
@@ -66,53 +77,51 @@ def touching(firsts: Chosen, seconds: Chosen, budget: Budget, workers: int | Non
     nearest doubles.
     Cost: as `overlay_batch`; of pairs whose rounded rings need another look, some 10 us per edge more.
     """
-    found: dict[int, Touching] = {}
+    by_block: dict[int, Touching] = {}
 
     def task(first_block: int, last_block: int) -> None:
         start, stop = first_block * _BLOCK, min(last_block * _BLOCK, len(firsts))
         some, others = firsts[start:stop], seconds[start:stop]
-        arranged = run_kernel(some.together(), others.together(), EACH_PART, budget)
+        arranged = run_kernel(some.arrays(), others.arrays(), EACH_PART, budget)
         may_touch, is_done = _may_touch(arranged), arranged.status == PairStatus.DONE
         done = np.flatnonzero(may_touch & is_done)
         parts = arranged.evidence[places_of(summed(arranged.counts[:, 1]), done), 1]
         pairs = np.repeat(start + done, arranged.counts[done, 1])
-        arranged = taken(arranged, done)
-        read = [_read(arranged, parts, pairs, _numbered(arranged, pairs))]
+        arranged = take_pairs(arranged, done)
+        read = [_extract(arranged, parts, pairs, _number_places(arranged, pairs))]
         for pair in np.flatnonzero(may_touch & ~is_done).tolist():
-            first, second = (each[pair : pair + 1].together() for each in (some, others))
+            first, second = (each[pair : pair + 1].arrays() for each in (some, others))
             alone, places = parts_exactly(RingArrays(*first[:2]), RingArrays(*second[:2]), budget)
             parts = alone.evidence[:, 1]
-            read.append(_read(alone, parts, np.full(len(parts), start + pair), places))
-        found[start] = joined_touching(read)
+            read.append(_extract(alone, parts, np.full(len(parts), start + pair), places))
+        by_block[start] = concatenate_touching(read)
 
     run_chunks(task, -(-len(firsts) // _BLOCK), budget=budget, first_chunk=1, workers=workers)
-    return joined_touching([_NOWHERE, *(found[start] for start in sorted(found))])
+    return concatenate_touching([_NOWHERE, *(by_block[start] for start in sorted(by_block))])
 
 
-def _may_touch(found: Found) -> BoolArray:
-    """Tell of pairs whether they may meet without common area: surely not where floats tell every sign, and no edges
-    cross but two at a time, one of each polygon.
+def _may_touch(arranged: PairResults) -> BoolArray:
+    """Return by pair whether it may touch: not where floats prove every sign and edges cross only in pairs of one each.
 
-    Of four wedges round such a crossing three are in parts: two edges are named there three times. Else either a third
-    edge is named, twice at most; or, where as many edges pass that wedges opposite each other are in one part, any two
-    are named an even number of times.
+    At such a crossing two edges are named by three of the four wedges. Else either a third edge is named, at most
+    twice; or, where so many edges pass that opposite wedges are in one part, any two are named an even number of times.
     """
-    pairs = np.repeat(np.arange(len(found.status)), found.counts[:, 2])
-    is_crossing = found.sources[:, 1] >= 0
-    pairs, edges = pairs[is_crossing], np.sort(found.sources[is_crossing], axis=1).astype(np.int64)
+    pairs = np.repeat(np.arange(len(arranged.status)), arranged.counts[:, 2])
+    is_crossing = arranged.sources[:, 1] >= 0
+    pairs, edges = pairs[is_crossing], np.sort(arranged.sources[is_crossing], axis=1).astype(np.int64)
     n = int(edges.max(initial=0)) + 1
     _, places, times = np.unique((n * pairs + edges[:, 0]) * n + edges[:, 1], return_inverse=True, return_counts=True)
-    may_touch = (found.status == OPEN) | (found.counts[:, 3] > 0)
+    may_touch = (arranged.status == OPEN) | (arranged.counts[:, 3] > 0)
     may_touch[pairs[times[places] != _OF_A_CROSSING]] = True
     return may_touch
 
 
-def _numbered(found: Found, pairs: IntArray) -> IntArray:
-    """Return of each vertex the number of its place in its pair; pairs: by ring.
+def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
+    """Return by vertex the number of its place within its pair; pairs: by ring.
 
-    Rings that are valid once rounded have no two places in one.
+    Valid rounded rings have no two exact places with the same doubles.
     """
-    keys = *found.vertices.T, np.repeat(pairs, np.diff(found.ring_offsets))
+    keys = *arranged.vertices.T, np.repeat(pairs, np.diff(arranged.ring_offsets))
     order = np.lexsort(keys)
     is_new = np.zeros(len(order), np.bool_)
     for key in keys:
@@ -123,9 +132,9 @@ def _numbered(found: Found, pairs: IntArray) -> IntArray:
     return numbers
 
 
-def _read(found: Found, parts: IntArray, pairs: IntArray, places: IntArray) -> Touching:
+def _extract(arranged: PairResults, parts: IntArray, pairs: IntArray, places: IntArray) -> Touching:
     """Return the lines and points of rings; parts, pairs: by ring; places: by vertex the number of its place."""
-    rings, after = ring_numbers(found.ring_offsets), next_in_rings(found.ring_offsets)
+    rings, after = ring_of_vertices(arranged.ring_offsets), next_in_rings(arranged.ring_offsets)
     n_places = int(places.max(initial=0)) + 1
     part = parts[rings]
     is_in = [np.bincount(places[part == k], minlength=n_places)[places] > 0 for k in (_SECOND, _BOTH)]
@@ -134,19 +143,21 @@ def _read(found: Found, parts: IntArray, pairs: IntArray, places: IntArray) -> T
     n_lines = np.bincount(np.append(places[is_line], places[after[is_line]]), minlength=n_places)[places]
     alone = np.flatnonzero((part == _FIRST) & is_in[0] & ~is_in[1] & (n_lines == 0))
     alone = alone[np.unique(places[alone], return_index=True)[1]]
-    edges, starts = _in_line(found.ring_offsets, rings, is_line, n_lines == 2)
+    edges, starts = _order_lines(arranged.ring_offsets, rings, is_line, n_lines == 2)
     ends = np.append(starts, len(edges))[1:]
     along = np.insert(edges, ends, after[edges[ends - 1]])
     offsets = summed(ends - starts + 1)
     return Touching(
-        pairs[rings[edges[starts]]], found.vertices[along], offsets, pairs[rings[alone]], found.vertices[alone]
+        pairs[rings[edges[starts]]], arranged.vertices[along], offsets, pairs[rings[alone]], arranged.vertices[alone]
     )
 
 
-def _in_line(offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the edges of lines, by their first vertices, one line after another, and where each line begins.
+def _order_lines(
+    offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: BoolArray
+) -> tuple[IntArray, IntArray]:
+    """Return the edges of lines, by their first vertices, line after line, and where each line begins.
 
-    goes_on: by vertex whether no more than two edges of lines meet there.
+    goes_on: by vertex, whether at most two edges of lines meet there.
     """
     sizes = np.diff(offsets)
     is_head = is_line & ~(is_line[np.arange(len(rings)) - 1] & goes_on)
@@ -162,11 +173,11 @@ def _in_line(offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: Bo
     return edges, np.flatnonzero(is_head[edges])
 
 
-def joined_touching(parts: list[Touching]) -> Touching:
-    """Return the lines and points of some pairs, those of one part after another's."""
+def concatenate_touching(parts: list[Touching]) -> Touching:
+    """Return the lines and points of all parts, concatenated."""
     lines, vertices, offsets, points, places = zip(*parts)
     return Touching(
-        np.concatenate(lines), np.concatenate(vertices), chained(offsets), np.concatenate(points),
+        np.concatenate(lines), np.concatenate(vertices), concatenate_offsets(offsets), np.concatenate(points),
         np.concatenate(places),
     )  # fmt: skip
 
@@ -175,16 +186,15 @@ Place = tuple[float, float]
 
 
 def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touching:
-    """Return the lines and points that are left of closed rings, each with its pair, that rounding left no area.
+    """Return the lines and points to which rounding collapsed closed rings, given with their pairs.
 
-    A ring that is one place is a point; else its edges, split where another vertex lies on them, each once, joined to
-    lines that bend where edges do and end where lines meet.
+    A ring at one place is a point; else its edges, split at other vertices on them, each once, joined to lines.
     """
     lines: list[tuple[int, list[Place]]] = []
     points: list[tuple[int, Place]] = []
     for pair, ring in rings:
-        edges = _noded(ring, budget)
-        lines += [(pair, line) for line in _joined_edges(edges)]
+        edges = _node_ring(ring, budget)
+        lines += [(pair, line) for line in _join_edges(edges)]
         points += [] if edges else [(pair, ring[0])]
     return Touching(
         np.array([pair for pair, _ in lines], np.int64),
@@ -195,8 +205,8 @@ def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touch
     )
 
 
-def _noded(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
-    """Return the edges of a ring between neighbouring vertices, decided exactly, each once and in order."""
+def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
+    """Return the edges of a ring split at its vertices, decided exactly, each once and sorted."""
     places = np.array(sorted(set(ring)))
     edges: set[tuple[Place, Place]] = set()
     for start, end in zip(ring, ring[1:] + ring[:1]):
@@ -213,20 +223,20 @@ def _noded(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
     return sorted(edges)
 
 
-def _joined_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
-    """Return edges joined wherever two of them meet and no other."""
-    beside: dict[Place, list[Place]] = {}
+def _join_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
+    """Return chains of edges, joined wherever exactly two meet."""
+    neighbours: dict[Place, list[Place]] = {}
     for start, end in edges:
-        beside.setdefault(start, []).append(end)
-        beside.setdefault(end, []).append(start)
-    ends = dict.fromkeys(place for place, others in beside.items() if len(others) != 2)
+        neighbours.setdefault(start, []).append(end)
+        neighbours.setdefault(end, []).append(start)
+    ends = dict.fromkeys(place for place, others in neighbours.items() if len(others) != 2)
     chains = []
-    for start in [*ends, *beside]:  # those from an end first: what is left are closed lines
-        while beside[start]:
+    for start in [*ends, *neighbours]:  # those from an end first: what is left are closed lines
+        while neighbours[start]:
             line = [start]
-            while beside[line[-1]] and (len(line) == 1 or line[-1] not in ends):  # bound: takes an edge each time
-                after = beside[line[-1]].pop()
-                beside[after].remove(line[-1])
+            while neighbours[line[-1]] and (len(line) == 1 or line[-1] not in ends):  # bound: takes an edge each time
+                after = neighbours[line[-1]].pop()
+                neighbours[after].remove(line[-1])
                 line.append(after)
             chains.append(line)
     return chains

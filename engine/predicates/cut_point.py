@@ -4,21 +4,21 @@ With weights w_p = |s_p| and w_q = |s_q| (distances of the ends from the plane, 
 
     t = w_p / (w_p + w_q),        x = p + t (q - p) = (p w_q + q w_p) / (w_p + w_q).
 
-Only original end points enter, never a point cut before. Three tries, each dearer and surer than the one before:
+Only original end points enter, never a point cut before. Three stages, each slower and stronger than the one before:
 
 1. `point_at`: x = p + t (q - p) with t as a double-double;
-2. `nearest`: first the weighted form as a double-double, which finds an exact zero;
+2. `nearest`: first the weighted form as a double-double, which detects an exact zero;
 3. then the double whose midpoints with its neighbours enclose x, by exact signs; ties go to even. Mostly the
-   double-double leaves one midpoint open, so that one sign does.
+   double-double leaves one midpoint open, so that one sign decides.
 
-The first two say whether the double is surely the nearest; where the third has no range, rational arithmetic settles
-the item (profiles.py).
+The first two return whether the double is certainly the nearest; where the third is out of range, rational arithmetic
+is the exact fallback (profiles.py).
 
-Bound of the weighted form. Weights are exact expansions, compressed: two components hold them within 8 u^2. Products
-add 2 u^2, their sum 4 u^2, the sum of the weights 12 u^2, the quotient 16 u^2, the test `surely_rounded` 2 u^2: with
-M = max(|p|, |q|) every coordinate is within 44 u^2 M of its value. Where the weights are doubles, their products are
-exact, and the sum of two double-doubles is within 4 u^2 of itself, however much cancels: then, and where p or q is
-zero, M is |x|.
+Bound of the weighted form. Weights are exact expansions, compressed: two components are within 8 u^2 of them. Products
+add 2 u^2, their sum 4 u^2, the sum of the weights 12 u^2, the quotient 16 u^2, `is_correctly_rounded` 2 u^2: with
+M = max(|p|, |q|) ``error <= 44 u^2 M`` for every coordinate. Where the weights are doubles, their products are exact,
+and the sum of two double-doubles is within 4 u^2 of itself, however much cancels: then, and where p or q is zero, M is
+|x|.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from engine.predicates.error_free import (
     dd_div,
     dd_scale,
     even_of,
-    surely_rounded,
+    is_correctly_rounded,
     two_diff,
     two_prod,
     two_sum,
@@ -44,15 +44,16 @@ from engine.types import FloatArray
 
 CUT_BOUND: Final = 64.0 * U2
 POINT_BOUND: Final = 48.0 * U2
-"""Of `point_at`, times |p| + |t (q - p)|: t carries 18 u^2; the low parts, none above u (|p| + 3.1 |t (q - p)|), lose
-17 u^2 in five sums and two products, their product that is left out 3.1 u^2, the test 6 u^2: below 45 u^2."""
+"""Of `point_at`, times |p| + |t (q - p)|: t has 18 u^2; the low parts, none above u (|p| + 3.1 |t (q - p)|), lose 17
+u^2 in five sums and two products, their product that is left out 3.1 u^2, the test 6 u^2: below 45 u^2.
+"""
 T_BOUND: Final = 24.0 * U2
 """Of t in double-double, relative: 18 u^2 where it is a quotient of double-doubles, and the test of its rounding."""
 TINY: Final = 2.0**-1070
 """Added to bounds for products that underflow: at most four of 2^-1074."""
 _SCALE: Final = 2.0**600
 _NEXT: Final = 4
-"""Neighbours that `nearest` goes on to: a guess is off by one or two units."""
+"""Neighbours that `nearest` tries: a guess is off by one or two units."""
 
 
 @merged
@@ -66,9 +67,10 @@ def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float,
 
 @inline
 def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[float, bool]:
-    """Return p + t (q - p) and whether it is surely the nearest double; t is known within 18 u^2 + `slack` of itself.
+    """Return p + t (q - p) and whether it is certainly the nearest double; t is known within 18 u^2 + `slack` of
+    itself.
 
-    Coordinates below 2^1000. A zero is never sure unless p = q.
+    Coordinates below 2^1000. A zero is never certified unless p = q.
     """
     sh, low, mh, _ = point_along(p, q, th, tl)
     bound = POINT_BOUND * (abs(p) + abs(mh)) + slack * abs(mh) + TINY
@@ -98,11 +100,11 @@ def side_of(
 def nearest(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, sum_h: float, sum_l: float, e: Components
 ) -> tuple[float, bool]:
-    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and False where numbers have no range for that.
+    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and False where numbers are out of range.
 
     wp, wq: positive compressed expansions (or zero, not both) of components within 2^-240 .. 2^240; sum: of both, to
     4 u^2. `e`: see `side_of`. p and q must not be so far apart in size that products underflow. Subnormal results are
-    rounded right too: all is done on numbers times 2^600 there.
+    rounded correctly too, on numbers times 2^600.
     """
     if p == q or n_wp == 0:
         return p + 0.0, True
@@ -121,7 +123,7 @@ def nearest(
     h, low = dd_div(h, low, sum_h, sum_l)
     is_whole = (n_wp == 1 and n_wq == 1) or p == 0.0 or q == 0.0  # the products are exact, or nothing cancels
     bound = CUT_BOUND * (abs(h) if is_whole else max(abs(p), abs(q)))
-    if scale == 1.0 and surely_rounded(h, low, bound):
+    if scale == 1.0 and is_correctly_rounded(h, low, bound):
         return h, True
     is_close = scale == 1.0 and bound <= 2.0**-56 * abs(h)
     if not is_close and side_of(p, q, wp, n_wp, wq, n_wq, 0.0, 0.0, e) == 0:
@@ -129,8 +131,8 @@ def nearest(
     x = h / scale
     if scale == 1.0 and abs(x) < 2.0**-500:
         return x, False
-    # invariant: the nearest double is x or beyond on the side looked at, on both sides until it is settled
-    is_up, is_settled = low > 0.0, is_close
+    # invariant: the nearest double is x or beyond on the side tested, on both sides until it is bracketed
+    is_up, is_bracketed = low > 0.0, is_close
     for _ in range(_NEXT):
         other = np.nextafter(x, np.inf if is_up else -np.inf)
         side = side_of(p, q, wp, n_wp, wq, n_wq, x * scale, 0.5 * ((other - x) * scale), e)
@@ -139,11 +141,11 @@ def nearest(
         is_beyond = (side > 0) == is_up
         if is_beyond:
             x = other
-        elif not is_settled:
+        elif not is_bracketed:
             is_up = not is_up
-        if is_close or (is_settled and not is_beyond):
+        if is_close or (is_bracketed and not is_beyond):
             return x + 0.0, True
-        is_settled = True
+        is_bracketed = True
     return x, False
 
 
@@ -152,7 +154,7 @@ def parameter_and_point(
     segment: FloatArray, wp: Components, n_wp: int, wq: Components, n_wq: int, axis: int, at: float, point: FloatArray,
     e: Components,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Set `point` to the nearest doubles of the point with these weights; return t and whether all is sure.
+    """Set `point` to the nearest doubles of the point with these weights; return t and whether all are certified.
 
     axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`.
     """
@@ -162,15 +164,15 @@ def parameter_and_point(
         wq[n_wq - 1] if n_wq > 0 else 0.0,
         wq[n_wq - 2] if n_wq > 1 else 0.0,
     )
-    t, all_sure = 0.0, True
+    t, are_all_nearest = 0.0, True
     for k in range(-1, point.size):  # -1: t itself, from 0 to 1
-        x, sure = at, True
+        x, is_nearest = at, True
         if k != axis or k < 0:
             p, q = (0.0, 1.0) if k < 0 else (segment[0, k], segment[1, k])
-            x, sure = nearest(p, q, wp, n_wp, wq, n_wq, sum_h, sum_l, e)
-        all_sure = all_sure and sure
+            x, is_nearest = nearest(p, q, wp, n_wp, wq, n_wq, sum_h, sum_l, e)
+        are_all_nearest = are_all_nearest and is_nearest
         if k < 0:
             t = x
         else:
             point[k] = x
-    return t, all_sure
+    return t, are_all_nearest

@@ -1,14 +1,14 @@
-"""Exact whole numbers of many digits in compiled code, for what doubles and double-doubles leave open.
+"""Exact multi-digit integers in compiled code, for what doubles and double-doubles do not decide.
 
 A number is a place in one int64 array, the heap:
 
-    heap[a]        n, how many digits; 0 for zero
+    heap[a]        n, the number of digits; 0 for zero
     heap[a + 1]    e, the exponent
-    heap[a + 2 ..] digits, the lowest first: 0 .. 2^28 - 1, but the last, which is not zero and carries the sign
+    heap[a + 2 ..] digits, the lowest first: 0 .. 2^28 - 1, but the last, which is not zero and has the sign
 
-and stands for the sum of ``digit[i] * 2^(28 (e + i))``. Every double is such a number of at most three digits. The
-product of two digits is below 2^56, so 127 of them add up before a carry is due: sums of products are formed without
-one, as long as the shorter factors have no more than `MOST_SUMMED` digits together.
+with the value ``sum(digit[i] * 2^(28 (e + i)))``. Every double is such a number of at most three digits. The product
+of two digits is below 2^56, so 127 of them add up before a carry is due: sums of products are formed without one, as
+long as the shorter factors have at most `MOST_SUMMED` digits together.
 
 Source: D. E. Knuth, The Art of Computer Programming 2, section 4.3.1, with a signed leading digit.
 """
@@ -21,16 +21,16 @@ from typing import Final
 import numpy as np
 
 from engine.compiling.jit import inline
-from engine.predicates.error_free import U2, dd_add, dd_div, even_of, surely_rounded
+from engine.predicates.error_free import U2, dd_add, dd_div, even_of, is_correctly_rounded
 from engine.types import IntArray
 
 BITS: Final = 28
 MOST: Final = 60
-"""Digits of a number that is kept: a value of it at a plane of at most `MOST_OF_ROW` digits fits a `SLOT`."""
+"""Digits of a stored number: its value at a plane of at most `MOST_OF_ROW` digits fits a `SLOT`."""
 MOST_OF_ROW: Final = 30
 MOST_SUMMED: Final = 120
 SLOT: Final = 128
-"""Room for a number that is being made: two places, and digits of a sum of products."""
+"""Room for an intermediate number: two places, and digits of a sum of products."""
 MOST_DIGITS: Final = SLOT - 4
 QUOTIENT_BOUND: Final = 128.0 * U2
 """Of a quotient of two numbers known by their five leading digits (2^-6 u^2), each read with five dd_add (20 u^2)."""
@@ -42,7 +42,7 @@ _BASE: Final = 2.0**BITS
 
 @inline
 def normalise(heap: IntArray, a: int) -> None:
-    """Carry, and leave out zeros at both ends; caller guarantees room above for all but the sign."""
+    """Carry, and drop zeros at both ends; caller guarantees room above for all but the sign."""
     n, first, carry = heap[a], a + 2, 0
     for i in range(first, first + n):
         total = heap[i] + carry
@@ -69,7 +69,7 @@ def normalise(heap: IntArray, a: int) -> None:
 
 @inline
 def put_double(heap: IntArray, a: int, x: float) -> None:
-    """Put a finite double at place a."""
+    """Store a finite double at place a."""
     fraction, exponent = math.frexp(x)
     whole, exponent = int(fraction * 2.0**53), exponent - 53
     place = exponent // BITS
@@ -81,6 +81,7 @@ def put_double(heap: IntArray, a: int, x: float) -> None:
 
 @inline
 def sign_of(heap: IntArray, a: int) -> int:
+    """Return the sign of the number at place a."""
     n = heap[a]
     if n == 0:
         return 0
@@ -89,7 +90,7 @@ def sign_of(heap: IntArray, a: int) -> int:
 
 @inline
 def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
-    """Put the sum of the products ``terms[i] = (a, b, factor)``, factor 1 or -1, at place c; False where too long."""
+    """Store the sum of the products ``terms[i] = (a, b, factor)``, factor 1 or -1, at place c; False where too long."""
     bottom, top, n_summed = 0, 0, 0
     for i in range(n_terms):
         a, b = terms[i, 0], terms[i, 1]
@@ -122,6 +123,7 @@ def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
 
 @inline
 def negate(heap: IntArray, a: int) -> None:
+    """Negate the number at place a."""
     for i in range(a + 2, a + 2 + heap[a]):
         heap[i] = -heap[i]
     normalise(heap, a)
@@ -141,7 +143,7 @@ def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
 def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, free: int) -> tuple[float, bool]:
     """Return the double nearest to x / w, ties to even, for w > 0; False where it is out of range or too long.
 
-    one: the place of the number 1. free: a place with three slots to work in.
+    one: the place of the number 1. free: a place with three working slots.
     """
     if heap[x] == 0:
         return 0.0, True
@@ -152,7 +154,7 @@ def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, 
     if abs(exponent + math.frexp(h)[1]) > FARTHEST:
         return h, False
     double = math.ldexp(h, int(exponent))
-    if surely_rounded(h, low, QUOTIENT_BOUND * abs(h)):
+    if is_correctly_rounded(h, low, QUOTIENT_BOUND * abs(h)):
         return double, True
     side = 1.0 if low > 0.0 else -1.0
     other = np.nextafter(double, side * np.inf)

@@ -1,8 +1,8 @@
-"""Sums and products of two doubles without loss: each returns the rounded result and its exact rounding error.
+"""Error-free sums and products of two doubles, and double-double arithmetic with proven error bounds.
 
-The only file of the engine with tricks that need the compiler: `fma` (one instruction where the CPU has it, the C
-library's correct function elsewhere) and `workspace` (a few doubles on the stack, so that exact stages allocate
-nothing). Each has a plain twin with the same results, used when the compiler is disabled.
+The only file of the engine that needs compiler intrinsics: `fma` (one instruction where the CPU has it, else the C
+library's) and `workspace` (a few doubles on the stack, so that exact stages allocate nothing). Each has a plain twin
+with the same results, used when the compiler is disabled.
 
 Preconditions. Sums are exact whenever the result does not overflow: an addition never underflows. A product a b is
 exact when it does not overflow and ulp(a) ulp(b) >= 2^-1074; |a b| >= 2^-967 is enough, and so is a = 0 or b = 0.
@@ -11,17 +11,15 @@ Source: T. J. Dekker, A floating-point technique for extending the available pre
 Computer Programming 2, section 4.2.2; J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust
 geometric predicates, 1997, section 2.
 
-Numbers held as an unevaluated sum of two doubles (106 bits), each operation with its proven relative error.
+A double-double is a pair (h, l) with h = fl(h + l), 106 bits, passed as two arguments and returned as a tuple. With
+u = 2^-53, and provided nothing overflows or underflows (callers scale their input), relative errors are
 
-A number is a pair (h, l) with h = fl(h + l), passed as two arguments and returned as a tuple. With u = 2^-53, and
-provided nothing overflows or underflows (callers bring their input into a safe range):
-
-    dd_add    3 u^2 of |a + b|  (4 u^2 kept below, for the terms of third order)
+    dd_add    3 u^2 of |a + b|  (4 u^2 is used, for the terms of third order)
     dd_mul    5 u^2 of |a b|
     dd_div   16 u^2 of |a / b|
 
-These bounds are the input to the running bounds of the callers, who end with `surely_rounded`: it says whether the
-double nearest to the true value is certain. A double-double never decides anything by itself.
+Callers add these up to a running bound, and end with `is_correctly_rounded`: whether the double nearest to the true
+value is certain. A double-double never decides anything by itself.
 
 Source: M. Joldes, J.-M. Muller, V. Popescu, Tight and rigorous error bounds for basic building blocks of double-word
 arithmetic, 2017 (algorithms AccurateDWPlusDW, DWTimesDW2, DWDivDW2).
@@ -171,18 +169,18 @@ def dd_div(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
 
 
 @inline
-def surely_rounded(h: float, low: float, bound: float) -> bool:
-    """Tell whether every number within `bound` of h + low rounds to fl(h + low).
+def is_correctly_rounded(h: float, low: float, bound: float) -> bool:
+    """Return whether every number within `bound` of h + low rounds to fl(h + low).
 
-    The caller's bound has room for 2 u^2 |h|, the rounding of ``low - bound`` and ``low + bound``; rounding to
-    nearest is monotonic, so ends that round alike enclose nothing else. Ties and zeros are never accepted unless the
-    bound is zero. False where a NaN came in.
+    Rounding to nearest is monotonic, so it is enough that both ends round alike. The bound includes 2 u^2 |h| for the
+    rounding of ``low - bound`` and ``low + bound``. Ties and zeros are only accepted if the bound is zero; False for
+    NaN.
     """
     return h + (low - bound) == h + (low + bound)
 
 
 @inline
 def even_of(x: float, other: float) -> float:
-    """Return which of two neighbouring doubles has the even significand."""
+    """Return which of two adjacent doubles has the even significand."""
     half = 0.5 * (x / abs(other - x))
     return x if math.floor(half) == half else other

@@ -1,16 +1,16 @@
-"""Exact arithmetic on expansions: numbers held as unevaluated sums of doubles that do not overlap.
+"""Exact arithmetic on expansions: unevaluated sums of non-overlapping doubles.
 
-An expansion lives in a caller-given workspace `e` and has `n` components ``e[0] .. e[n - 1]``, all nonzero, of
+An expansion is stored in a workspace `e` of the caller, with `n` components ``e[0] .. e[n - 1]``, all nonzero, of
 increasing magnitude, no two sharing a bit position. Its value is their exact sum, its sign that of the last component,
-and n = 0 is zero. Every function returns the new length. Zero components are dropped at once, so that numbers of few
-bits (lattices, CAD data) stay short.
+and n = 0 is zero. Every function returns the new length. Zero components are dropped, so that numbers of few bits
+(lattices, CAD data) stay short.
 
 Preconditions: nothing overflows, and for products the lowest bits of the operands multiply to at least 2^-1074; then
-every operation is exact. The caller sees to both by scaling, and the workspace has room: one place for each `grow`.
+every operation is exact. The caller guarantees both by scaling, and a workspace with one place for each `grow`.
 
 Source: J. R. Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates, 1997:
 grow-expansion (theorem 10), expansion-sum (12), scale-expansion (19). The linear-time sum (13) is left out, because it
-asks for strongly non-overlapping operands and gains nothing at the lengths that occur.
+needs strongly non-overlapping operands and gains nothing at the lengths that occur.
 """
 
 from __future__ import annotations
@@ -23,29 +23,30 @@ from engine.predicates.error_free import fast_two_sum, two_prod, two_sum
 Components = Any  # a float64 array, or a list of floats when the compiler is disabled
 LARGEST: Final = 2.0**120
 SMALLEST: Final = 2.0**-120
-"""Coordinates of kernels that use double-double or expansions are zero or within these: products of degree four
-keep all their bits (multiples of 2^-172 after a difference, of 2^-688 after a product of four)."""
+"""Coordinates of kernels that use double-double or expansions are zero or within these: products of degree four are
+exact (multiples of 2^-172 after a difference, of 2^-688 after a product of four).
+"""
 
 
 @inline
 def is_safe(x: float) -> bool:
-    """Tell whether x is zero or of a size for which products of degree four are exact as expansions."""
+    """Return whether x is zero or of a size for which products of degree four are exact as expansions."""
     return x == 0.0 or SMALLEST <= abs(x) <= LARGEST
 
 
 @called
 def grow(e: Components, n: int, b: float) -> int:
     """Add the double b to e in place."""
-    q, kept = b, 0
+    q, n_out = b, 0
     for i in range(n):
         q, h = two_sum(q, e[i])
         if h != 0.0:
-            e[kept] = h  # kept <= i: never ahead of the reading
-            kept += 1
+            e[n_out] = h  # n_out <= i: never ahead of the reading
+            n_out += 1
     if q != 0.0:
-        e[kept] = q
-        kept += 1
-    return kept
+        e[n_out] = q
+        n_out += 1
+    return n_out
 
 
 @inline
@@ -84,27 +85,29 @@ def add_product(e: Components, n: int, f: Components, m: int, g: Components, k: 
 @inline
 def scale(f: Components, m: int, b: float, e: Components) -> int:
     """Set e to b times the expansion f of m components; 2 m places, e is not f."""
-    kept = 0
+    n_out = 0
     q = 0.0
     for i in range(m):
         p, tail = two_prod(f[i], b)
         q, h = two_sum(q, tail)
         if h != 0.0:
-            e[kept] = h
-            kept += 1
+            e[n_out] = h
+            n_out += 1
         q, h = fast_two_sum(p, q)
         if h != 0.0:
-            e[kept] = h
-            kept += 1
+            e[n_out] = h
+            n_out += 1
     if q != 0.0:
-        e[kept] = q
-        kept += 1
-    return kept
+        e[n_out] = q
+        n_out += 1
+    return n_out
 
 
 @called
 def compress(e: Components, n: int) -> int:
-    """Rewrite e in place with as few components as its bits need; its last component is then within an ulp."""
+    """Rewrite e in place with as few components as its bits need; its last component is then within an ulp of its
+    value.
+    """
     if n < 2:
         return n
     q = e[n - 1]
@@ -116,14 +119,14 @@ def compress(e: Components, n: int) -> int:
             bottom -= 1
             q = low
     e[bottom] = q
-    kept = 0
+    n_out = 0
     for i in range(bottom + 1, n):
         q, low = fast_two_sum(e[i], q)
         if low != 0.0:
-            e[kept] = low
-            kept += 1
-    e[kept] = q
-    return kept + 1
+            e[n_out] = low
+            n_out += 1
+    e[n_out] = q
+    return n_out + 1
 
 
 @inline
@@ -136,7 +139,7 @@ def sign(e: Components, n: int) -> int:
 
 @inline
 def magnitude(e: Components, n: int) -> int:
-    """Rewrite e in place as its magnitude, compressed."""
+    """Replace e by its magnitude, compressed."""
     n = compress(e, n)
     if sign(e, n) < 0:
         for i in range(n):

@@ -143,7 +143,7 @@ def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
 
 @inline
 def lower(smallest: float, value: float) -> float:
-    """Return the smaller of `smallest` and |value|, zero left out."""
+    """Return the smaller of `smallest` and |value|, ignoring zero."""
     return min(smallest, abs(value)) if value != 0.0 else smallest
 
 
@@ -229,12 +229,13 @@ def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def _are_equal(p: Point3, q: Point3) -> bool:
+    """Return whether two points are equal."""
     return p.x == q.x and p.y == q.y and p.z == q.z
 
 
 @inline
 def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return the sign of orient3d from pairs of doubles where it is sure, else UNDECIDED."""
+    """Return the sign of orient3d from pairs of doubles where their bound proves it, else UNDECIDED."""
     total, total_tail, permanent, heights, lows, smallest = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
     p, q, r = a, b, c
     for _ in range(3):  # z of p, times the minor of r and q; a loop, because three copies compile three times as long

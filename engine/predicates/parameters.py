@@ -1,15 +1,15 @@
-"""Comparison of two segment parameters: at which of two planes does a segment p q arrive first?
+"""Comparison of two segment parameters: which of two planes does a segment p q reach first?
 
 With plane values s_p and s_q of opposite sign (one may be zero), the segment meets the plane at
 t = s_p / (s_p - s_q), which grows with |s_p| / |s_q|. So two planes i and j compare as the products
 
     |s_p(i)| |s_q(j)|   against   |s_p(j)| |s_q(i)|
 
-The core is the sign of a b - c d for four numbers that are known roughly with a bound each (the filter), or exactly as
+The core is the sign of a b - c d for four numbers that are known within a bound each (the filter), exactly as
 expansions, or as differences of doubles.
 
 Precondition of the exact form: components are zero or so large that products of four components' lowest bits stay
-above 2^-1074, and nothing overflows; callers look at the range of their input.
+above 2^-1074, and nothing overflows; callers check the range of their input.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from engine.types import UNDECIDED
 
 EXACT_DIFFERENCES: Final = 24.0 * 2.0**-106
 """Bound of the second stage, whose leading products are exact: four products of a tail, below u of a product each, are
-rounded once, and six sums of such terms."""
+rounded once, and six sums of such terms.
+"""
 
 TINY: Final = 2.0**-1000
 """Added to the bound: covers products that underflow, so that the filter is safe for every finite input."""
@@ -33,10 +34,10 @@ TINY: Final = 2.0**-1000
 def compare_ratios_filter(
     a: float, a_bound: float, b: float, b_bound: float, c: float, c_bound: float, d: float, d_bound: float
 ) -> int:
-    """Return the sign of |a b| - |c d| for numbers known within a bound each; UNDECIDED when unsure.
+    """Return the sign of |a b| - |c d| for numbers known within a bound each, else UNDECIDED.
 
-    The true |a b| lies within |a| b_bound + |b| a_bound + a_bound b_bound of |a b|; 2^-50 of each product covers
-    every rounding here.
+    ``||a b| - |exact|| <= |a| b_bound + |b| a_bound + a_bound b_bound``; 2^-50 of each product covers every rounding
+    here.
     """
     a, b, c, d = abs(a), abs(b), abs(c), abs(d)
     left, right = a * b, c * d

@@ -1,16 +1,15 @@
 """The exact sign of a polynomial with float64 coefficients at a float64 point, in the plane or in space.
 
-**The filter.** u = 2^-53. A term takes at most `degree` rounded products and t terms take t - 1 sums, so the value is
-off by at most (degree + t + small) u times the sum of magnitudes. Underflow: powers of |x| < 1 are each off by at
-most 16 times 2^-1075, later products by 2^-1075 times the factors that follow. Both are covered by adding the floor
-2^-1010 to every magnitude on the way, because even u 2^-1010 = 2^-1063 is more than 16 times 2^-1075. A blur
-(filters.py) changes a term by at most degree times blur times the same term with one factor left out, all factors
-grown by the blur; each factor is at most the largest grown coordinate or 1, m: by less than degree |c| m^degree blur.
+**The filter.** u = 2^-53. A term takes at most `degree` rounded products and t terms take t - 1 sums, so
+``error <= (degree + t + small) u * (sum of magnitudes)``. Underflow: powers of |x| < 1 are each off by at most
+16 * 2^-1075, later products by 2^-1075 times the factors that follow. Both are covered by adding the floor 2^-1010 to
+every magnitude, because even ``u 2^-1010 = 2^-1063 > 16 * 2^-1075``. A blur (filters.py) changes a term c by less than
+``degree |c| m^degree blur``, m the largest of 1 and the coordinates enlarged by the blur.
 
 **The exact stage** multiplies significands (in [1/2, 1)) as expansions, so that every term of degree D is a multiple of
 2^(-53 (D + 1)), and shifts it by its exponent relative to the largest term. A term that would lose bits (more than
 2^1173 below the largest for degree 16, 2^1915 for degree 2) is left out; if the rest then is not clearly larger than
-such terms can be, the answer is UNDECIDED; `rational.py` settles it.
+such terms can be, the answer is UNDECIDED (exact fallback: `rational.py`).
 """
 
 from __future__ import annotations

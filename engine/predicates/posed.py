@@ -86,6 +86,7 @@ def posed_point(poses: FloatArray, p: PosedPoint3) -> Point3:
 
 @inline
 def _rounded(poses: FloatArray, p: PosedPoint3, axis: int) -> float:
+    """Return one posed coordinate in floating point."""
     r, i = p.pose, 3 * axis
     x, y, z = float(poses[r, i]) * p.x, float(poses[r, i + 1]) * p.y, float(poses[r, i + 2]) * p.z
     return x + y + z + float(poses[r, 9 + axis])
@@ -148,8 +149,8 @@ def orient3d_posed_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: P
 
 
 @called
-def surely_same(poses: FloatArray, a: PosedPoint3, b: PosedPoint3) -> bool:
-    """Tell whether two posed points are one, exactly; False where exponents leave the range."""
+def are_equal_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3) -> bool:
+    """Return whether two posed points are equal, exactly; False where exponents are out of range."""
     shift, w = _common_shift(poses, a, a, b, b), workspace(N_DIFFERENCE)
     if shift == OUT_OF_RANGE:
         return False

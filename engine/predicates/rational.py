@@ -1,16 +1,14 @@
-"""The predicates in Python's unlimited integers: right for any finite floats, integers and Fractions, and slow; and
-vectors of exact numbers, integers or Fractions, in the plane and in space, as tuples.
+"""The predicates in Python's unlimited integers, the exact fallback of the kernels; vectors of exact numbers as tuples.
 
-Kernels answer UNDECIDED where an exponent leaves their range; public functions settle such an item here. The sign of a
-determinant does not change when the numbers of one axis are multiplied by a common positive factor, so each axis is
-first brought to integers: no greatest common divisors are taken in the arithmetic.
+Kernels return UNDECIDED where an exponent leaves their range; public functions decide such an item here, for any finite
+floats, integers and Fractions. The sign of a determinant does not change when the numbers of one axis are multiplied by
+a common positive factor, so each axis is first brought to integers: no greatest common divisors are needed.
 
-Brings a whole scene by one exact power of two into the range in which kernels are exact.
-
-Points are multiplied by 2^-e, offsets of planes too, and each plane row by a power of two of its own: signs, orders and
-parameters do not change, coordinates of the result are multiplied by 2^e. A scaling that would round any number is not
-done; the kernels then leave items outside of their range open. Results that scaling back rounds to a subnormal number,
-or up to the smallest normal one, would be rounded twice, so they are settled again by rational arithmetic.
+Also scales a whole scene by one power of two into the range in which kernels are exact. Points are multiplied by 2^-e,
+offsets of planes too, and each plane row by a power of two of its own: signs, orders and parameters do not change,
+coordinates of the result are multiplied by 2^e. A scaling that would round any number is not done; the kernels then
+leave items outside their range open. Results that scaling back rounds to a subnormal number, or up to the smallest
+normal one, would be rounded twice, so rational arithmetic computes them again.
 """
 
 from __future__ import annotations
@@ -159,7 +157,7 @@ def nearest(numerator: int, denominator: int) -> float:
 
 
 def nearest_pair(numerator: int, denominator: int) -> tuple[float, float]:
-    """Return a quotient as a double-double: the double nearest to it, and the double nearest to what is left."""
+    """Return a quotient as a double-double: the double nearest to it, and the double nearest to the remainder."""
     head = nearest(numerator, denominator)
     n, d = head.as_integer_ratio()
     return head, nearest(numerator * d - n * denominator, denominator * d)
@@ -177,9 +175,9 @@ def nearest_with_root(u: int, v: int, w: int, z: int) -> float:
     while True:
         square, low = w << 2 * bits, u << bits
         root, size = math.isqrt(square), z << bits
-        found = nearest(low + v * root, size)
-        if root * root == square or nearest(low + v * (root + 1), size) == found:
-            return found
+        rounded = nearest(low + v * root, size)
+        if root * root == square or nearest(low + v * (root + 1), size) == rounded:
+            return rounded
         bits *= 2
 
 
@@ -189,12 +187,12 @@ SMALLEST_NORMAL: Final = 2.0**-1022
 
 
 def largest_of(*arrays: FloatArray) -> float:
-    """Return the largest magnitude of any coordinate, no finite number where one is none."""
+    """Return the largest magnitude of any coordinate; not finite if one is not."""
     return max((max(array.max().item(), -array.min().item()) for array in arrays if array.size), default=0.0)
 
 
 def are_all_safe(numbers: FloatArray) -> bool:
-    """Tell whether every number is what `is_safe` wants."""
+    """Return whether every number satisfies `is_safe`."""
     sizes = np.abs(numbers)
     return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
 
@@ -211,7 +209,7 @@ def exponent_above(largest: float) -> int:
 
 
 def shifted(array: FloatArray, exponent: int | IntArray) -> FloatArray | None:
-    """Return array 2^exponent, read-only as the arrays of callers are, if that is exact for every number, else None."""
+    """Return array 2^exponent, read-only, if that is exact for every number, else None."""
     if isinstance(exponent, int) and exponent == 0:
         return read_only(array)
     with np.errstate(all="ignore"):
@@ -239,10 +237,10 @@ def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
 
 
 def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, BoolArray]:
-    """Return points 2^exponent and which of them may have been rounded twice.
+    """Return points 2^exponent, and which of them may have been rounded twice.
 
-    Those are what this rounds: up to the smallest normal number, that one included. Where nothing is rounded here, the
-    nearest double of all exponents is the nearest of those that there are.
+    Those are the ones that this rounds: up to and including the smallest normal number. Where nothing is rounded here,
+    the nearest double of unlimited exponent is the nearest double.
     """
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(points, exponent)

@@ -1,16 +1,16 @@
 """side_of_plane: the sign of dot(row, (p, 1)), exact for every float64 input; in the plane c and z are 0.
 
-**The filter.** With u = 2^-53 and h = 2^-1075, a rounded product carries u |a x| + h and each sum u of its result, so
-the rounded sum of 3 products and an offset is off by at most 4 (u + 2u^2) S + 3 h, S the sum of magnitudes. The
-threshold 8u S + 8h also pays for its own rounding, and for that of coefficients that are correctly rounded (a posed
-plane, a wall of a prism: another u each). An infinity or NaN on the way makes both comparisons false.
+**The filter.** With u = 2^-53, h = 2^-1075 and S the sum of magnitudes: a rounded product is off by u |a x| + h, a sum
+by u of its result, so ``error <= 4 (u + 2 u^2) S + 3 h`` for 3 products and an offset. The threshold ``8 u S + 8 h``
+also covers its own rounding, and that of correctly rounded coefficients (a posed plane, a wall of a prism: another u
+each). An intermediate infinity or NaN makes both comparisons false.
 
-**The second stage** takes the value in double-double.
+**The second stage** computes the value in double-double.
 
 **The exact stage** adds the products to an expansion. Where a product is too large or too small for that, each factor
 is split into significand and exponent and the terms are brought to a common exponent. Terms more than 2^1968 below the
-largest are left out; if the rest then is not clearly larger than they are, the answer is UNDECIDED (`rational.py`
-settles it).
+largest are left out; if the rest then is not clearly larger than they are, the answer is UNDECIDED (exact fallback:
+`rational.py`).
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ def side_of_plane(h: HalfSpace3, p: Point3) -> int:
 
 @inline
 def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return the value of a row at a point as an unevaluated sum of two doubles and a bound of its error.
+    """Return the value of a row at a point as a double-double, and its error bound.
 
-    Products are exact, or lose 2^-1074 where they underflow; the tails of them and of sums, together below 4 u of the
-    sum of absolute terms, are added up with six roundings. An infinity on the way gives no number.
+    Products are exact, or lose 2^-1074 by underflow; their tails and those of sums, together below 4 u S, are added
+    with six roundings. An intermediate infinity gives NaN.
     """
     x, y, z = point
     ah, al = two_prod(a, x)
@@ -74,7 +74,7 @@ def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, 
 
 @called
 def _side_exact(h: HalfSpace3, p: Point3) -> int:
-    """Return what `side_of_plane` does, by an expansion; a zero product leaves no component."""
+    """Return the result of `side_of_plane` by an expansion; a zero product leaves no component."""
     e = workspace(8)
     if (
         is_exact_product(h.a, p.x)
@@ -97,7 +97,7 @@ def _side_exact(h: HalfSpace3, p: Point3) -> int:
 
 @inline
 def is_exact_product(a: float, b: float) -> bool:
-    """Tell whether `two_prod` of a and b is exact and a few such products cannot overflow in a sum."""
+    """Return whether `two_prod` of a and b is exact and a sum of few such products cannot overflow."""
     magnitude = abs(a * b)
     return SMALLEST_PRODUCT <= magnitude <= LARGEST_PRODUCT or a == 0.0 or b == 0.0
 
@@ -112,13 +112,13 @@ def product_exponent(a: float, b: float) -> int:
 
 @inline
 def is_left_out(exponent: int, shift: int) -> bool:
-    """Tell whether a term of this exponent, shifted so, would lose bits below the smallest subnormal."""
+    """Return whether a term of this exponent, shifted so, would lose bits below the smallest subnormal."""
     return exponent != NO_TERM and exponent + shift < LOWEST_SHIFT
 
 
 @inline
 def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
-    """Return the sign of e, or UNDECIDED if terms were left out that could change it."""
+    """Return the sign of e, or UNDECIDED if left-out terms could change it."""
     if is_incomplete and (n == 0 or abs(e[n - 1]) < CLEAR):
         return UNDECIDED
     return sign(e, n)
@@ -126,7 +126,7 @@ def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
 
 @inline
 def grow_shifted_product(e: Components, n: int, a: float, b: float, exponent: int) -> int:
-    """Add the significands of a and b, multiplied, times 2^exponent to e, unless zero or left out (two places)."""
+    """Add the product of the significands of a and b, times 2^exponent, to e, unless zero or left out (two places)."""
     if a == 0.0 or b == 0.0 or exponent < LOWEST_SHIFT:
         return n
     p, tail = two_prod(frexp(a)[0], frexp(b)[0])

@@ -32,7 +32,7 @@ from engine.collision.meshes.triangle_triangle import (
 )
 from engine.collision.result import Kind
 from engine.compiling.jit import called, inline, merged
-from engine.predicates.posed import UNPOSED, PosedPoint3, surely_same
+from engine.predicates.posed import UNPOSED, PosedPoint3, are_equal_exact
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import UNDECIDED, FloatArray, Int8Array, Point3
 
@@ -247,7 +247,7 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
                 by_v, by_w = _sides(x, y, v, w, error)
                 if by_v * by_w == 0 or (by_v * by_w < 0 and (by_x * by_y == 0 or by_v != by_x)):
                     return -1
-            return 3 * k + m if error == 0.0 or surely_same(poses, corner(own, k), corner(their, m)) else -1
+            return 3 * k + m if error == 0.0 or are_equal_exact(poses, corner(own, k), corner(their, m)) else -1
     return -1
 
 

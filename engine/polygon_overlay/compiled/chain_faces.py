@@ -1,20 +1,16 @@
-"""Faces of chains.
+"""Faces of chains: cycles of half-chains, joined where several bound one face.
 
-The face of a half-chain lies to its left. A cycle of half-chains is one part of the boundary of a face; two parts of
-one face are joined by a stab from the last vertex (rightmost, then topmost) of each component of rings: straight up, an
-infinitesimal step to its right, to the next edge above. That vertex belongs to the input, so the stab decides about
-doubles.
+The face of a half-chain lies to its left. Two cycles of one face are joined by a vertical ray (stab) from the last
+vertex (x, then y) of each component of rings: straight up, an infinitesimal step to the right, to the next edge above.
+That vertex belongs to the input, so the ray decides about doubles.
 
-Components of rings, each joined to the face it lies in: by boxes first, by the edge above it where these hold it.
-
-A component lies in a face of another only if its box lies in the other's. Where no box holds its own it is in the
-unbounded face. Else the edge above its last vertex is looked for, among those of the components whose boxes do: what is
-left out encloses nothing here. It is apart from these, and disjoint connected sets of which none keeps two points apart
-do not keep them apart together (S. Janiszewski, Sur les coupures du plan, 1913). Were the edge found enclosed by one
-of them, its box would hold that edge's component's, and so this one's.
+A component lies in a face of another only if its box lies in the other's box. Where no box contains its own it is in
+the unbounded face. Else the ray looks among the edges of components whose boxes do; what is left out encloses nothing
+here: disjoint connected sets of which none separates two points do not separate them together (S. Janiszewski, Sur les
+coupures du plan, 1913). Were the edge hit enclosed by one of those, its box would contain this component's.
 
     .-----------------------.
-    |  []   []   []   []    |     windows in a wall: each looks at the wall's edges, none at other windows
+    |  []   []   []   []    |     windows in a wall: each ray meets edges of the wall, not of other windows
     |  []   []   []   []    |
     '-----------------------'
 """
@@ -32,9 +28,9 @@ from engine.polygon_overlay.compiled.chains import (
     Chains,
     Stars,
     across_end,
-    is_live,
+    is_representative,
     place_before,
-    standing,
+    representative_of,
     to_the_left,
 )
 from engine.polygon_overlay.compiled.crossing_signs import Edges, crossing_against, exact_weight, orient, turn_of_edges
@@ -46,7 +42,7 @@ from engine.polygon_overlay.compiled.edge_tree import (
     POLL,
     RUN,
     BoxTree,
-    box_holds,
+    box_contains,
     build_tree,
     leaves_of,
     push_children,
@@ -58,15 +54,21 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 NOTHING: Final = -1
 
 Faces = namedtuple("Faces", "cycle joined regions inside state fan")
-"""By half-chain: cycle, or -1 where another half-chain stands for it; state: bits of chain_rings.py. By cycle, of
-which entry n_cycles is the unbounded face: joined, a forest of those of one face; regions, of those of one region of
-the result; inside: the part of the result that it is in, or 0. fan: by node that is not simple, how many chains bound
-a region."""
+"""Faces and regions, as forests of cycles; entry n_cycles is the unbounded face.
+
+| field | by | meaning |
+| --- | --- | --- |
+| cycle | half-chain | its cycle, -1 if another half-chain represents it |
+| state | half-chain | bits of chain_rings.py |
+| joined, regions | cycle | forests of the cycles of one face, of one region of the result |
+| inside | cycle | the part of the result that it belongs to, or 0 |
+| fan | node that is not simple | how many of its chains bound a region |
+"""
 
 
 @merged
 def _following(chains: Chains, stars: Stars, half: int) -> int:
-    """Return the half-chain that goes on around the face of ``half``."""
+    """Return the next half-chain around the face of ``half``."""
     across = across_end(chains, half)
     if across >= 0:
         return to_the_left(across, half)
@@ -76,11 +78,11 @@ def _following(chains: Chains, stars: Stars, half: int) -> int:
 
 @inline
 def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int, stop: FlagArray) -> int:
-    """Fill ``cycle``, by half-chain; return how many cycles."""
+    """Fill ``cycle``, by half-chain; return the number of cycles."""
     cycle[: 2 * n_chains] = -1
     n_cycles = 0
     for first in range(2 * n_chains):
-        if cycle[first] < 0 and is_live(chains, first >> 1):
+        if cycle[first] < 0 and is_representative(chains, first >> 1):
             if stop[0]:
                 return n_cycles
             half = first
@@ -97,7 +99,7 @@ def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int
 
 @inline
 def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
-    """Tell whether edge e is nearer to v than f, straight up and a step to the right; both are above v there."""
+    """Return whether edge e is nearer to v than f, straight up and a step to the right; both are above v there."""
     x = edges.x
     a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
     c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
@@ -110,7 +112,7 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
 
 @inline
 def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
-    """Return the sign of the height of ab above v less that of cd; that of ab is -orient(a, b, v) / (x_b - x_a)."""
+    """Return the sign of the height of ab above v minus that of cd; ``height(ab) = -orient(a, b, v) / (x_b - x_a)``."""
     x = edges.x
     first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
     n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)
@@ -127,7 +129,7 @@ def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> in
 
 @merged
 def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
-    """Return e if it is above v and nearer than ``nearest``, else ``nearest``."""
+    """Return e if it is above v and below ``nearest``, else ``nearest``."""
     x = edges.x
     b = edges.after[e]
     if (x[e] <= x[v]) == (x[b] <= x[v]):  # it does not pass from there to the right of there
@@ -140,10 +142,9 @@ def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 @inline
 def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -> int:
-    """Return the edge next above vertex v, a step to its right, or NOTHING; no edge of its component is there.
+    """Return the edge next above vertex v, a step to its right, or NOTHING.
 
-    tree: of n edges, ``names`` their numbers. Edges that begin or pass through v are not above it: caller guarantees
-    that none does to the right.
+    tree: of n edges numbered ``names``. Caller guarantees that no edge begins at v or passes it to the right.
     """
     nearest = NOTHING
     n_leaves = leaves_of(n)
@@ -167,7 +168,7 @@ def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -
 
 @inline
 def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, chains: Chains, e: int, v: int) -> int:
-    """Return the half-chain whose face is below edge e, right of vertex v. points: forest of those that are one."""
+    """Return the half-chain whose face is below edge e, right of vertex v. points: forest of united points."""
     x = edges.x
     runs_right = x[e] < x[edges.after[e]]
     chain, before = chains.at[e], NOTHING
@@ -184,22 +185,22 @@ def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, c
             chain += 1
             before = root
     half = 2 * chain + 1 if runs_right else 2 * chain
-    return standing(chains, half)
+    return representative_of(chains, half)
 
 
-_HOLDS: Final = 1
-_IS_OPEN: Final = 2
-"""States of a component: its box holds another's; the edge above it is not known yet."""
+_ENCLOSES: Final = 1
+_IS_UNKNOWN: Final = 2
+"""States of a component: its box contains another's; the edge above it is not known yet."""
 
 Components = namedtuple("Components", "highest number state")
-"""By component: highest, its last vertex (rightmost, then highest); state. number: by ring its component."""
+"""By component: highest, its last vertex (x, then y); state. number: by ring its component."""
 
 
 @inline
 def _find_components(
     edges: Edges, tops: IntArray, rings: IntArray, n: int, components: Components, boxes: FloatArray
 ) -> int:
-    """Fill ``components``, and the box of each, of the vertices that are there; return how many."""
+    """Fill ``components`` and the box of each; return their number."""
     x, y, highest, number = edges.x, edges.y, components.highest, components.number
     n_components, at = 0, 0
     while at < n:  # bound: each turn passes one ring
@@ -224,14 +225,14 @@ def _find_components(
 
 
 @inline
-def _look_in_boxes(components: Components, k: int, n: int, tree: BoxTree) -> None:
-    """Mark the components whose boxes hold that of component k, and k if there are any."""
+def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree) -> None:
+    """Mark the components whose boxes contain that of component k, and k if there are any."""
     stack, n_leaves, boxes, state = tree.stack, leaves_of(n), tree.boxes, components.state
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
         node = stack[depth, 0]
-        if not box_holds(tree.nodes, node, boxes, k):
+        if not box_contains(tree.nodes, node, boxes, k):
             continue
         if node < n_leaves:
             stack[depth, 0], stack[depth + 1, 0] = 2 * node + 1, 2 * node
@@ -240,18 +241,18 @@ def _look_in_boxes(components: Components, k: int, n: int, tree: BoxTree) -> Non
         first = LEAF * (node - n_leaves)
         for place in range(first, min(first + LEAF, n)):
             other = tree.places[place]
-            if other != k and box_holds(boxes, other, boxes, k):
-                state[other] |= _HOLDS
-                state[k] |= _IS_OPEN
+            if other != k and box_contains(boxes, other, boxes, k):
+                state[other] |= _ENCLOSES
+                state[k] |= _IS_UNKNOWN
 
 
 @inline
 def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Int32Array) -> int:
-    """Fill ``names`` and ``boxes`` with the edges of all components that hold another; return how many."""
+    """Fill ``names`` and ``boxes`` with the edges of all components that enclose another; return their number."""
     x, y, boxes = edges.x, edges.y, tree.boxes
     m = 0
     for e in range(n):
-        if not components.state[components.number[edges.ring[e]]] & _HOLDS or tree.marks[e] & RUN:
+        if not components.state[components.number[edges.ring[e]]] & _ENCLOSES or tree.marks[e] & RUN:
             continue
         b = edges.after[e]
         names[m] = e
@@ -265,9 +266,8 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int], stop: FlagArray) -> None:
     """Join the outer cycle of each component of rings to the face it lies in.
 
-    w: the `Workspace`, whose tree is scratch, but for its marks: RUN of the edges that stand for many; caller
-    guarantees that none of these is next above another component. names: scratch by point. sizes: the numbers of
-    vertices, cycles and runs.
+    w: the `Workspace`, whose tree is scratch but for its marks (RUN: edges that stand for many, never next above
+    another component). names: scratch by point. sizes: the numbers of vertices, cycles and runs.
     """
     n, n_cycles, n_runs = sizes
     given, tree, faces, components, stars = w.given, w.tree, w.faces, w.components, w.stars
@@ -282,10 +282,10 @@ def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int], stop: Fla
             boxes[k, 0] = boxes[k, 2] = -np.inf
             boxes[k, 1] = boxes[k, 3] = np.inf
         build_tree(tree, n_components, stop)
-        for place in range(n_components):  # order: neighbours in the plane look at the same nodes
+        for place in range(n_components):  # order: neighbours in the plane visit the same nodes
             if stop[0]:
                 return
-            _look_in_boxes(components, tree.places[place], n_components, tree)
+            _mark_enclosing_boxes(components, tree.places[place], n_components, tree)
         m = _gather_edges(edges, components, n, tree, names)
     if m > 0:
         build_tree(tree, m, stop)
@@ -293,7 +293,7 @@ def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int], stop: Fla
         if k & OFTEN == 0 and stop[0]:
             return
         top, beyond, above = components.highest[k], n_cycles, NOTHING
-        if components.state[k] & _IS_OPEN:
+        if components.state[k] & _IS_UNKNOWN:
             above = edge_above(edges, tree, names, top, m)
         if above != NOTHING:
             beyond = faces.cycle[half_below(edges, w.events, w.along, points, w.chains, above, top)]

@@ -1,19 +1,15 @@
-"""Boundary rings of the regions that a choice of labels keeps, walked over chains.
+"""Boundary rings of the selected regions, traced over chains; a fast path for two simple rings that only cross.
 
 Source of both walks: K. Weiler, P. Atherton, Hidden surface removal using polygon area sorting, 1977; G. Greiner,
 K. Hormann, Efficient clipping of arbitrary polygons, 1998.
 
-The same rules as in arrangement/rings.py: a walk keeps to its own region, is cut into simple rings where it passes a
-node twice, and lists the points where the boundary turns or rings meet.
+`walk_rings` follows the rules of arrangement/rings.py: a walk stays around its own region, is cut into simple rings
+where it passes a node twice, and lists the points where the boundary turns or rings meet.
 
-Boundary rings of two simple rings that only cross each other: walked from crossing to crossing, without chains.
-
-At every crossing two of the four stretches bound the result, one of each ring, if the operation keeps an odd number of
-the three kinds of faces. So there is nothing to choose: the boundary goes along the first ring until that crosses the
-second, along the second until that crosses the first. The rings are those of chain_rings.py, in another order.
-
-What two discs whose rims cross have in common, and what one has alone, falls into parts without holes: on the sphere
-the rest of it hangs together. Their union is one part, whose boundary all rings are.
+`walk_crossings` alternates between two simple rings with only proper crossings (Greiner-Hormann). At every crossing two
+of the four stretches bound the result, one of each ring, if an odd number of the three kinds of faces is selected: so
+the boundary switches rings at every crossing. Intersections and differences of two discs are parts without holes; their
+union is one part, bounded by all rings.
 """
 
 from __future__ import annotations
@@ -28,7 +24,7 @@ from engine.polygon_overlay.compiled.chains import (
     Chains,
     Stars,
     across_end,
-    is_live,
+    is_representative,
     leaving_edge,
     origin,
     place_before,
@@ -39,34 +35,47 @@ from engine.polygon_overlay.compiled.edge_contacts import Contacts, Events, Turn
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import BENT, POLL, RUN
 from engine.polygon_overlay.compiled.loading import Given
-from engine.polygon_overlay.compiled.ring_nesting import Holders, enter_beyond
+from engine.polygon_overlay.compiled.ring_nesting import FloodFill, record_adjacent_regions
 from engine.types import FlagArray, Int32Array
 
 BOUNDS: Final = 1
 INSIDE: Final = 2
 SEEN: Final = 4
 FORKED: Final = 8
-"""Bits of the state of a half-chain: its chain bounds a region, its own face is in the result, it was walked, rings
-meet where it begins."""
+"""Bits of the state of a half-chain:
+
+| bit | meaning |
+| --- | --- |
+| BOUNDS | its chain bounds a region |
+| INSIDE | its own face is in the result |
+| SEEN | it was walked |
+| FORKED | rings meet where it begins |
+"""
 MEETS: Final = 1
 Rings = namedtuple("Rings", "point edge meets offset region")
-"""point: united points, ring after ring; edge: along which the ring goes on from there; meets: MEETS where rings meet,
-RUN where those up to the next point are left out; offset: where each
-ring begins; region: a number of the region it bounds."""
+"""Boundary rings.
+
+| field | by | meaning |
+| --- | --- | --- |
+| point | point | its united point, ring after ring |
+| edge | point | the edge along which the ring continues |
+| meets | point | MEETS: rings meet here; RUN: points up to the next are left out |
+| offset, region | ring | where it begins; a number of the region that it bounds |
+"""
 
 Walk = namedtuple("Walk", "path place")
-"""Scratch. path: the half-chains of a walk; place: by node where rings meet its place on the path."""
+"""Scratch. path: the half-chains of a walk; place: by node where rings meet, its place on the path."""
 
 
 @inline
 def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) -> None:
-    """Fill ``state`` where ``inside`` is filled."""
+    """Fill ``state`` from ``inside``."""
     cycle, inside, state = faces.cycle, faces.inside, faces.state
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return
         state[2 * chain] = state[2 * chain + 1] = 0
-        if is_live(chains, chain):
+        if is_representative(chains, chain):
             left, right = inside[cycle[2 * chain]], inside[cycle[2 * chain + 1]]
             state[2 * chain] = BOUNDS * (left != right) | INSIDE * (left != 0)
             state[2 * chain + 1] = BOUNDS * (left != right) | INSIDE * (right != 0)
@@ -76,16 +85,18 @@ def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) 
 def join_regions(
     chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: FlagArray
 ) -> None:
-    """Join the regions of faces, and fill ``fan``; ``state`` is filled.
+    """Join faces of one region, and fill ``fan``; ``state`` is filled.
 
-    is_named: join what is not in the result as well. sizes: the numbers of chains, simple nodes and nodes.
+    is_named: join faces outside the result too. sizes: the numbers of chains, simple nodes and nodes.
     """
     n_chains, n_simple, n_nodes = sizes
     cycle, state = faces.cycle, faces.state
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
             return
-        if state[2 * chain] & BOUNDS == 0 and (is_live(chains, chain) if is_named else state[2 * chain] & INSIDE):
+        if state[2 * chain] & BOUNDS == 0 and (
+            is_representative(chains, chain) if is_named else state[2 * chain] & INSIDE
+        ):
             unite(faces.regions, cycle[2 * chain], cycle[2 * chain + 1])
     for node in range(n_simple, n_nodes):
         if node & POLL == 0 and stop[0]:
@@ -98,7 +109,7 @@ def join_regions(
 
 @merged
 def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
-    """Tell whether more than two boundary chains end where one of them, ``half``, begins."""
+    """Return whether more than two boundary chains end where the boundary half-chain ``half`` begins."""
     across = across_end(chains, half ^ 1)
     if across < 0:
         return faces.fan[origin(chains, half)] > 2
@@ -107,9 +118,8 @@ def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
 
 
 @merged
-def _go_on(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
-    """Return the boundary half-chain that goes on around the region to the left of ``half``, and whether it
-    `_is_forked`."""
+def _next_boundary_edge(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
+    """Return the boundary half-chain after ``half`` around the region to its left, and whether it `_is_forked`."""
     state, across = faces.state, across_end(chains, half)
     if across >= 0:
         left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
@@ -125,8 +135,8 @@ def _go_on(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, 
 
 
 @merged
-def pass_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets: int) -> int:
-    """Write a point where the boundary turns; return how many points there are then."""
+def emit_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets: int) -> int:
+    """Write a point where the boundary turns; return the number of points then."""
     if not turns:
         return at
     rings.point[at], rings.edge[at], rings.meets[at] = point, edge, meets
@@ -134,18 +144,18 @@ def pass_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets:
 
 
 @merged
-def pass_vertex(edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, at: int) -> int:
-    """Pass an input vertex, from which the boundary goes on along ``edge``; returns as `pass_point`."""
+def emit_vertex(edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, at: int) -> int:
+    """Write an input vertex from which the boundary continues along ``edge``; returns as `emit_point`."""
     turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
-    return pass_point(rings, at, v, edge, turns, marks[edge] & RUN)
+    return emit_point(rings, at, v, edge, turns, marks[edge] & RUN)
 
 
 @inline
-def _emit(
+def _emit_ring(
     edges: Edges, chains: Chains, points: Int32Array, state: FlagArray, marks: FlagArray, path: Int32Array, first: int,
     last: int, rings: Rings, n_points: int, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Write the points of the ring of the half-chains ``path[first:last]``, straight ones left out; return how many."""
+    """Write the points of the ring ``path[first:last]`` (half-chains), without straight ones; return their number."""
     _, _, n, n_simple = sizes
     edge = leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
@@ -156,25 +166,25 @@ def _emit(
         is_simple, meets = node < n_simple, MEETS * (state[half] & FORKED != 0)
         turns = meets != 0 or (edge != before and (is_simple or turn_of_edges(edges, before, edge) != 0))
         point = n + node if is_simple else points[node]
-        n_points = pass_point(rings, n_points, point, edge, turns, meets)
+        n_points = emit_point(rings, n_points, point, edge, turns, meets)
         is_back, end = half & 1, leaving_edge(chains, half ^ 1)
         while edge != end:  # bound: the vertices of the chain
             if edge & POLL == 0 and stop[0]:
                 return n_points
             v = edge if is_back else edges.after[edge]
             edge = edges.before[v] if is_back else v
-            n_points = pass_vertex(edges, marks, v, edge, rings, n_points)
+            n_points = emit_vertex(edges, marks, v, edge, rings, n_points)
     return n_points
 
 
 @inline
 def walk_rings(
     edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: FlagArray, walk: Walk, rings: Rings,
-    holders: Holders, is_named: bool, sizes: tuple[int, int, int, int], stop: FlagArray,
+    flood: FloodFill, is_named: bool, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write all boundary rings, and what is beyond them if rings are named; return how many rings and points.
+    """Write all boundary rings, and the regions beyond them if rings are named; return the numbers of rings and points.
 
-    marks: of the edges, BENT where the boundary surely turns at the first vertex, RUN where one stands for many.
+    marks: by edge, BENT where the boundary certainly turns at its first vertex, RUN where it stands for many.
     sizes: the numbers of chains, nodes, vertices and simple nodes.
     """
     n_chains, n_nodes, _, _ = sizes
@@ -195,11 +205,11 @@ def walk_rings(
             is_closed = state[half] & SEEN != 0
             first = 0 if is_closed else place[origin(chains, half)] if is_forked else -1
             if first >= 0:  # a ring, cut off where the walk passes a node twice
-                n_points = _emit(
+                n_points = _emit_ring(
                     edges, chains, stars.point, state, marks, path, first, depth, rings, n_points, sizes, stop
                 )
                 if is_named:
-                    enter_beyond(faces, holders, path, first, depth, n_rings)
+                    record_adjacent_regions(faces, flood, path, first, depth, n_rings)
                 rings.region[n_rings] = root_of(faces.regions, faces.cycle[path[first]])
                 n_rings += 1
                 rings.offset[n_rings] = n_points
@@ -213,14 +223,21 @@ def walk_rings(
                     place[origin(chains, half)] = depth
                 path[depth] = half
                 depth += 1
-                half, is_forked = _go_on(chains, stars, faces, half)
+                half, is_forked = _next_boundary_edge(chains, stars, faces, half)
     return n_rings, n_points
 
 
 @inline
-def do_nothing_but_cross(given: Given, events: Events, contacts: Contacts, n_rings: int, kept: FlagArray) -> bool:
-    """Tell whether two rings, one of each polygon, are simple and cross in simple nodes, and the rule above holds."""
-    if n_rings != 2 or contacts.n_exact > 0 or contacts.n_crossings == 0 or kept[1] ^ kept[2] ^ kept[3] != 1:
+def has_only_proper_crossings(
+    given: Given, events: Events, contacts: Contacts, n_rings: int, selected: FlagArray
+) -> bool:
+    """Return whether the pair is two simple rings that cross in simple nodes, and `walk_crossings` applies."""
+    if (
+        n_rings != 2
+        or contacts.n_exact > 0
+        or contacts.n_crossings == 0
+        or selected[1] ^ selected[2] ^ selected[3] != 1
+    ):
         return False
     ring, is_simple = given.edges.ring, given.masks[0] != given.masks[1]
     for c in range(contacts.n_crossings):
@@ -235,14 +252,16 @@ def _turns_left(given: Given, ring: int) -> bool:
 
 
 @inline
-def _follow(
+def _follow_to_crossing(
     edges: Edges, events: Events, along: Along, place: Int32Array, marks: FlagArray, event: int, is_forward: bool,
     rings: Rings, n: int, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write the crossing of an event, and the vertices from there to the next of its ring; return that, and how many
-    points there are then."""
+    """Write the crossing of an event and the vertices up to the next crossing of its ring.
+
+    Returns the event of that crossing, and the number of points then.
+    """
     edge, at = events.edge[event], place[event]
-    n = pass_point(rings, n, events.point[event], edge, True, 0)
+    n = emit_point(rings, n, events.point[event], edge, True, 0)
     step = 1 if is_forward else -1
     at += step
     while at == along.starts[edge + 1] if is_forward else at < along.starts[edge]:  # bound: the vertices of the ring
@@ -250,27 +269,30 @@ def _follow(
             break
         v = edges.after[edge] if is_forward else edge
         edge = v if is_forward else edges.before[v]
-        n = pass_vertex(edges, marks, v, edge, rings, n)
+        n = emit_vertex(edges, marks, v, edge, rings, n)
         at = along.starts[edge] if is_forward else along.starts[edge + 1] - 1
     return along.order[at], n
 
 
 @inline
 def walk_crossings(
-    given: Given, events: Events, along: Along, place: Int32Array, marks: FlagArray, kept: FlagArray, n_crossings: int,
-    rings: Rings, stop: FlagArray,
+    given: Given, events: Events, along: Along, place: Int32Array, marks: FlagArray, selected: FlagArray,
+    n_crossings: int, rings: Rings, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write the boundary rings of two rings that `do_nothing_but_cross`; return how many, and how many points.
+    """Write the boundary rings where `has_only_proper_crossings`; return the numbers of rings and points.
 
     Crossing c has the events 2 c, of its first edge, and 2 c + 1. place: scratch by event. events.turn is used up.
     """
     edges, ring = given.edges, given.edges.ring
     for k in range(2 * n_crossings):
         place[along.order[k]] = k
-    is_within, is_other_within = kept[2] != kept[3], kept[1] != kept[3]  # which stretches bound: those in the other
+    is_within, is_other_within = (
+        selected[2] != selected[3],
+        selected[1] != selected[3],
+    )  # which stretches bound: those in the other
     is_left, is_other_left = _turns_left(given, 0), _turns_left(given, 1)
-    is_forward = is_left == (kept[3 if is_within else 1] != 0)
-    is_other_forward = is_other_left == (kept[3 if is_other_within else 2] != 0)
+    is_forward = is_left == (selected[3 if is_within else 1] != 0)
+    is_other_forward = is_other_left == (selected[3 if is_other_within else 2] != 0)
     n_rings = n_points = 0
     rings.offset[0] = 0
     for c in range(n_crossings):
@@ -284,12 +306,14 @@ def walk_crossings(
             if stop[0]:
                 return n_rings, n_points
             events.turn[event >> 1] = Turn.NOT_SIMPLE
-            event, n_points = _follow(edges, events, along, place, marks, event, is_forward, rings, n_points, stop)
-            event, n_points = _follow(
+            event, n_points = _follow_to_crossing(
+                edges, events, along, place, marks, event, is_forward, rings, n_points, stop
+            )
+            event, n_points = _follow_to_crossing(
                 edges, events, along, place, marks, event ^ 1, is_other_forward, rings, n_points, stop
             )
             event ^= 1
-        rings.region[n_rings] = 0 if kept[1] & kept[2] else n_rings
+        rings.region[n_rings] = 0 if selected[1] & selected[2] else n_rings
         n_rings += 1
         rings.offset[n_rings] = n_points
     return n_rings, n_points

@@ -6,7 +6,7 @@ work after this is by chains, however many vertices these have. Half-chain 2 c r
 up. A simple node, the crossing of two edges and nothing else, needs none: chain e of the other ring leaves there to the
 left of chain c, or to its right, and those are all four.
 
-           e                2 c goes on from 2 c - 2 straight ahead; to the left of it 2 e leaves, to the right 2 e - 1,
+           e                2 c continues 2 c - 2 straight ahead; to the left of it 2 e leaves, to the right 2 e - 1,
      c-1   |   c            which is chain e - 1 back.
     ------>o------>
            | e-1            Simple nodes have the numbers of their crossings, other nodes those that follow.
@@ -31,34 +31,47 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import FlagArray, Int32Array, IntArray
 
 NOT_YET: Final = -1
-"""In the place of a chain that is not known yet."""
+"""Placeholder of a chain that is not known yet."""
 
-Chains = namedtuple("Chains", "tail head first last mask stands twin at across")
-"""By chain: node at its tail and head, its first and last edge, the mask of its sources, and the half-chain that stands
-for its half-chain 2 c (itself, unless chains coincide). twin: the next of the chains that one stands for, or -1. at:
-for each edge the chain at its beginning; the chains after the nodes inside it follow one by one. across: twice the
-chain that leaves the tail in the other ring, and 1 if to the left, where that is a simple node; else less than 0."""
+Chains = namedtuple("Chains", "tail head first last mask representative twin at across")
+"""The stretches of rings between nodes.
+
+| field | by | meaning |
+| --- | --- | --- |
+| tail, head, first, last | chain | its end nodes, its first and last edge |
+| mask | chain | the exclusive or of its sources |
+| representative | chain | the half-chain that stands for half-chain 2 c: itself, unless chains coincide |
+| twin | chain | the next of the coinciding chains, or -1 |
+| at | edge | the chain at its beginning; the chains after its inner nodes follow one by one |
+| across | chain | twice the chain of the other ring that leaves a simple tail, + 1 if to the left; else < 0 |
+"""
 
 Stars = namedtuple("Stars", "node_of point starts ends half place")
-"""Half-chains around nodes that are not simple. node_of: by point its node, or -1; of simple ones the chain that left
-there first. By node its point, and where its half-chains begin and end in ``half``; place: by half-chain its index
-there."""
+"""Half-chains around nodes that are not simple.
+
+| field | by | meaning |
+| --- | --- | --- |
+| node_of | point | its node, or -1; of a simple node the chain that left it first |
+| point, starts, ends | node | its point; its half-chains are ``half[starts:ends]`` |
+| place | half-chain | its index in ``half`` |
+"""
 
 Loose = namedtuple("Loose", "half masks dx dy")
-"""Half-chains that leave nodes that are not simple, ascending, to be sorted into stars. Scratch: masks, by chain those
-from before chains are united; dx, dy: directions of a star's half-chains, float64."""
+"""Half-chains that leave nodes that are not simple, ascending, before they are sorted into stars. Scratch: masks, by
+chain before chains are united; dx, dy: directions of a star's half-chains, float64.
+"""
 
 
 @merged
-def is_live(chains: Chains, chain: int) -> bool:
-    """Tell whether a chain stands for itself."""
-    return chains.stands[chain] == 2 * chain
+def is_representative(chains: Chains, chain: int) -> bool:
+    """Return whether a chain represents itself."""
+    return chains.representative[chain] == 2 * chain
 
 
 @merged
-def standing(chains: Chains, half: int) -> int:
-    """Return the half-chain that stands for `half`."""
-    return chains.stands[half >> 1] ^ (half & 1)
+def representative_of(chains: Chains, half: int) -> int:
+    """Return the half-chain that represents `half`."""
+    return chains.representative[half >> 1] ^ (half & 1)
 
 
 @merged
@@ -69,7 +82,7 @@ def origin(chains: Chains, half: int) -> int:
 
 @merged
 def across_end(chains: Chains, half: int) -> int:
-    """Return what ``across`` says of the node where a half-chain ends."""
+    """Return ``across`` of the node where a half-chain ends."""
     return chains.across[((half ^ 1) + 1) >> 1]
 
 
@@ -81,7 +94,7 @@ def to_the_left(across: int, half: int) -> int:
 
 @merged
 def place_before(chains: Chains, stars: Stars, at: int, half: int) -> int:
-    """Return the place before ``at`` in the star of the node where half-chain ``half`` begins, around its end."""
+    """Return the place before ``at`` in the star of the node where half-chain ``half`` begins, cyclically."""
     node = origin(chains, half)
     return (at if at > stars.starts[node] else stars.ends[node]) - 1
 
@@ -94,7 +107,7 @@ def leaving_edge(chains: Chains, half: int) -> int:
 
 @merged
 def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
-    """Return the number of the node at a united point, and how many nodes there are then."""
+    """Return the number of the node at a united point, and the number of nodes then."""
     if stars.node_of[point] < 0:
         stars.node_of[point] = n_nodes
         stars.point[n_nodes], stars.starts[n_nodes], stars.ends[n_nodes] = point, NOT_YET, 0
@@ -103,8 +116,8 @@ def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
 
 
 @merged
-def _pass_crossing(events: Events, chains: Chains, stars: Stars, point: int, crossing: int, chain: int, e: int) -> None:
-    """Enter that a chain leaves a simple node along edge e."""
+def _link_crossing(events: Events, chains: Chains, stars: Stars, point: int, crossing: int, chain: int, e: int) -> None:
+    """Record that a chain leaves a simple node along edge e."""
     other = stars.node_of[point]
     if other < 0:  # here for the first time
         stars.node_of[point] = chain
@@ -123,11 +136,10 @@ def build_chains(
     given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Int32Array,
     sizes: tuple[int, int, int], stop: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Walk every ring from its top vertex and cut it at its nodes.
+    """Cut every ring at its nodes, from its top vertex on; return the numbers of nodes, chains and loose half-chains.
 
-    unions.is_node: the tops among them. stars.node_of: -1 on entry. ``loose`` gets the half-chains that leave nodes
-    that are not simple, whose stars begin NOT_YET. sizes: the numbers of vertices, rings and crossings. Returns the
-    numbers of nodes, chains and loose half-chains.
+    unions.is_node: tops included. stars.node_of: -1 on entry. ``loose`` receives the half-chains that leave nodes that
+    are not simple, whose stars begin NOT_YET. sizes: the numbers of vertices, rings and crossings.
     """
     edges, (n, n_rings, n_crossings) = given.edges, sizes
     n_nodes, n_chains, n_loose = n_crossings, 0, 0
@@ -159,7 +171,7 @@ def build_chains(
                 n_chains += 1
                 _begin_chain(chains, n_chains, node, e, mask)
                 if is_simple:
-                    _pass_crossing(events, chains, stars, point, node, n_chains, e)
+                    _link_crossing(events, chains, stars, point, node, n_chains, e)
             e = edges.after[e]
             if unions.is_node[e]:
                 node, n_nodes = _node(stars, n_nodes, root_of(unions.points, e))
@@ -173,14 +185,14 @@ def build_chains(
                 n_loose += 1
                 _begin_chain(chains, n_chains, node, e, mask)
     for chain in range(n_chains):
-        chains.stands[chain], chains.twin[chain] = 2 * chain, -1
+        chains.representative[chain], chains.twin[chain] = 2 * chain, -1
     chains.across[n_chains] = NOT_YET
     return n_nodes, n_chains, n_loose
 
 
 @inline
 def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
-    """Return 0 for directions from straight up over left to just before straight down, 1 for the others."""
+    """Return 0 for directions from straight up, counter-clockwise, to before straight down; 1 for the others."""
     x, y = edges.x, edges.y
     a, b = edge, edges.after[edge]
     if is_back:
@@ -192,7 +204,7 @@ def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
 
 @called
 def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
-    """Return -1, 0 or 1 as half-chain g leaves before, with or after h, counter-clockwise from straight up."""
+    """Return -1, 0 or 1: half-chain g leaves before, with or after h, counter-clockwise from straight up."""
     e, f = leaving_edge(chains, g), leaving_edge(chains, h)
     half_g, half_h = _half_turn(edges, e, g & 1), _half_turn(edges, f, h & 1)
     if half_g != half_h:
@@ -203,11 +215,11 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 
 @called
 def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, last: int, masks: IntArray) -> int:
-    """Let the lowest chain of each direction stand for all, and close the gaps; return where the star then ends.
+    """Let the lowest chain of each direction represent all, and close the gaps; return where the star then ends.
 
-    The other end of coinciding chains finds the same chains together, so it chooses the same one.
+    The other end of coinciding chains has the same chains in one direction, so it chooses the same representative.
     """
-    kept = at = first
+    n_unique = at = first
     while at < last:  # bound: each turn passes one group
         stop = at + 1
         while stop < last and _compare_directions(edges, chains, star[at], star[stop]) == 0:
@@ -221,21 +233,21 @@ def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, las
         before = chosen >> 1
         for k in range(at, stop):
             chain = star[k] >> 1
-            chains.stands[chain] = chosen ^ (star[k] & 1)
+            chains.representative[chain] = chosen ^ (star[k] & 1)
             if chain != chosen >> 1:
                 chains.twin[before] = before = chain
         chains.twin[before] = -1
-        star[kept] = chosen
-        kept += 1
+        star[n_unique] = chosen
+        n_unique += 1
         at = stop
-    return kept
+    return n_unique
 
 
 @inline
 def _group_loose(
     chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
-    """Put the loose half-chains of each node together, in any order."""
+    """Bucket the loose half-chains by node, in any order."""
     starts, ends = stars.starts, stars.ends
     for k in range(n_loose):
         if k & POLL == 0 and stop[0]:
@@ -259,7 +271,7 @@ def _group_loose(
 
 @inline
 def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, first: int, last: int) -> bool:
-    """Sort the half-chains ``star[first:last]`` by direction; tell whether some leave in the same."""
+    """Sort the half-chains ``star[first:last]`` by direction; return whether two have the same direction."""
     x, y, dx, dy = edges.x, edges.y, loose.dx, loose.dy
     has_twins = False
     for k in range(first, last):
@@ -294,7 +306,7 @@ def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, fir
 def build_stars(
     edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
-    """Fill the stars of the nodes from n_simple on; of chains that coincide one is left, which stands for all."""
+    """Fill the stars of the nodes from n_simple on; of coinciding chains only the representative stays."""
     _group_loose(chains, stars, loose, n_simple, n_nodes, n_loose, stop)
     star = stars.half
     for node in range(n_simple, n_nodes):

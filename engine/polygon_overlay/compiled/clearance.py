@@ -1,40 +1,34 @@
-"""Whether edges keep clear of each other: then rounding crossings to doubles cannot change what rings are.
+"""Proofs that rounding the crossings to doubles keeps the topology of rings; and the nearest double of each crossing.
 
-Every crossing moves by less than the unit u of the largest coordinate, every vertex stays. Rings of the arrangement
-stay what they are if, by a margin of some units,
+Before rounding. Every crossing moves by less than the unit u of the largest coordinate, every vertex stays. Rings of
+the arrangement keep their topology if, by a margin of some units,
 
 - two edges that have no point in common are apart;
 - on an edge that crosses another in X, every node but X is away from the other's line: the distance from that line
   grows evenly from X on, so it is enough that the nodes next to X (the ends of the edge among them) are;
 - where edges follow each other, the nodes next to their common vertex are away from the other edge.
 
-Then any two stretches between nodes are apart, or meet in a node and the far end of each is away from the other, on the
-whole way to their rounded places: no stretch touches, passes or folds onto another. This holds for all edges, so for
-those of any result.
+Then two stretches between nodes are apart, or meet in a node with the far end of each away from the other, during the
+whole motion to their rounded places: no stretch touches, passes or folds onto another. This holds for all edges, so for
+those of any result. No edge may be shorter than the margin either: edges of a run that heads for one quadrant are not
+tested pair by pair (edge_tree.py), and two of them are as far apart as each edge between them is long.
 
-No edge may be shorter than the margin either: those of a run that heads for one quadrant are not looked at pair by pair
-(edge_tree.py), and two of them are as far apart as each edge between them is long.
+After rounding, where that fails, the rounded rings of the result are tested. Every vertex moves by less than u on a
+straight line. Two edges without a common vertex cannot touch on the way if they end more than 2 u apart; two edges with
+one cannot fold if the far end of each ends more than 2 u away from the other. If that holds for every pair with a moved
+vertex, the rounded rings are the exact ones deformed without a touch: valid, with the same pieces, holes and turns.
 
-Where that leaves doubt, the rounded rings of the result are looked at themselves. Every vertex moves by less than the
-unit u of the largest coordinate, on a straight way. Two edges that have no vertex in common cannot touch on that way if
-they end more than 2 u apart; nor can two edges fold that have one in common, if the far end of each ends more than 2 u
-away from the other. If that holds for every pair with a vertex that moves, the rings after rounding
-are the exact ones deformed without a touch: valid, with the same pieces, holes and turns.
+Margins, distances being floating point:
 
-Distances are computed in floating point. Differences of rounded coordinates are off by u each, so the distance from a
-line by less than 12 u more: `MARGIN` = 16 holds both. Before rounding an orientation is off by 3 u in each length that
-it multiplies, so a distance from a line by less than 12 u; with the two vertices that move that makes 14 u. `CLEARANCE`
-is four times as much.
+    after rounding     distance from a line off by < 12 u, + 2 u      -> MARGIN = 16 units
+    before rounding    orientation off by 3 u a length: < 12 u, + 2 u -> CLEARANCE = 64 units
 
-The double nearest to each coordinate of a crossing: double-double with a bound, else exact signs around it.
-
-With the weights w_a and w_b of the ends of the first edge (crossing_signs.py), known to a relative r,
-x = (a |w_b| + b |w_a|) / (|w_a| + |w_b|). Products add 2 u^2, their sum and the sum of weights 4 u^2 each, the quotient
-16 u^2: every coordinate is within (28 u^2 + 2 r) max(|a|, |b|) of its value; 40 u^2 + 2.5 r covers what is of higher
-order for r < 0.01. Where the bound leaves two doubles, or the value may be a double itself, signs of the exact
-difference to the double and to the middles between it and its neighbours decide. Where the value may be less than
-2^55 bounds, so that the double-double may miss its neighbours, it is first computed from expansions, whose sum loses
-nothing: quotients of their two leading components are within 2^-100 of it.
+Rounding a crossing. With the weights w_a and w_b of the ends of the first edge (crossing_signs.py), known to a relative
+r: ``x = (a |w_b| + b |w_a|) / (|w_a| + |w_b|)``. Products add 2 u^2, their sum and the sum of weights 4 u^2 each, the
+quotient 16 u^2: ``error <= (28 u^2 + 2 r) max(|a|, |b|)``; 40 u^2 + 2.5 r covers higher orders for r < 0.01. Where the
+bound leaves two doubles, or the value may be a double itself, signs of the exact difference to the double and to the
+midpoints with its neighbours decide. Where the value may be less than 2^55 bounds, so that the double-double may miss
+its neighbours, it is computed from expansions: the quotient of their two leading components is within 2^-100 of it.
 """
 
 from __future__ import annotations
@@ -67,24 +61,34 @@ from engine.polygon_overlay.compiled.edge_tree import (
     build_tree,
     next_pairs,
 )
-from engine.predicates.error_free import U2, dd_add, dd_div, dd_scale, even_of, fast_two_sum, surely_rounded, workspace
+from engine.predicates.error_free import (
+    U2,
+    dd_add,
+    dd_div,
+    dd_scale,
+    even_of,
+    fast_two_sum,
+    is_correctly_rounded,
+    workspace,
+)
 from engine.predicates.expansion import add_scaled, compress, is_safe, sign
 from engine.predicates.orientation import orient2d
 from engine.types import FlagArray, FloatArray, Int32Array, Point2
 
 CUT_BOUND: Final = 40.0 * U2
 LOST: Final = -1.0
-"""An error that tells that the double was not found."""
+"""Error value: the double could not be determined."""
 _NOT_YET: Final = -2.0
-"""Error of a crossing that is not rounded yet."""
+"""Error value of a crossing that is not rounded yet."""
 
 Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
-"""Doubles of the points of rings, and whether rounding moved each, uint8; by crossing its doubles and its error."""
+"""By point of rings: its doubles, and whether rounding moved it, uint8; by crossing its doubles and error."""
 
 
 class _Cut(NamedTuple):
-    """Two edges that cross, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
-    the relative error of a coordinate."""
+    """Two crossing edges, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
+    the relative error of a coordinate.
+    """
 
     e: int
     f: int
@@ -99,6 +103,7 @@ class _Cut(NamedTuple):
 
 @merged
 def _abs2(h: float, low: float) -> tuple[float, float]:
+    """Return the magnitude of a double-double."""
     return (h, low) if h >= 0.0 else (-h, -low)
 
 
@@ -106,32 +111,32 @@ def _abs2(h: float, low: float) -> tuple[float, float]:
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
     """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
 
-    An error of 0 says that the coordinate is that double exactly; LOST that it could not be found (the caller settles
-    it in rationals).
+    Error 0: the coordinate is exactly that double. Error LOST: needs the exact fallback.
     """
     ends, others = _ends_of(edges, e), _ends_of(edges, f)
-    (x, knows_x), (y, knows_y) = common_places(ends, others)
-    if knows_x and knows_y:
+    (x, has_x), (y, has_y) = common_places(ends, others)
+    if has_x and has_y:
         return x, y, 0.0, 0.0
     ah, al, bh, bl, relative = weights_of(ends, others)
     sum_h, sum_l = dd_add(ah, al, bh, bl)
     cut = _Cut(e, f, ah, al, bh, bl, sum_h, sum_l, relative)
     x_error = y_error = 0.0
-    if not knows_x:
+    if not has_x:
         x, x_error = _coordinate(edges, cut, 0, ends[0], ends[2])
-    if not knows_y:
+    if not has_y:
         y, y_error = _coordinate(edges, cut, 1, ends[1], ends[3])
     return x, y, x_error, y_error
 
 
 @merged
 def _ends_of(edges: Edges, e: int) -> Ends:
+    """Return the coordinates of both ends of an edge."""
     return edges.x[e], edges.y[e], edges.x[edges.after[e]], edges.y[edges.after[e]]
 
 
 @merged
 def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[float, bool]]:
-    """Return of each axis the coordinate that all of one of two edges has, and whether one has one."""
+    """Return by axis the constant coordinate of one of two edges, and whether there is one."""
     ax, ay, bx, by = first
     cx, cy, dx, dy = second
     return ((ax if ax == bx else cx), (ax == bx) | (cx == dx)), ((ay if ay == by else cy), (ay == by) | (cy == dy))
@@ -139,9 +144,9 @@ def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[
 
 @merged
 def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, float]:
-    """Return the weights of the ends of an edge as positive double-doubles, and 2.5 r, where both are known to r.
+    """Return the weights of the ends of an edge as positive double-doubles, and 2.5 r, r their relative error.
 
-    They come from expansions where the bound of one is not small beside it, if exponents allow.
+    Expansions give them where the bound of one is above a thousandth of it, if exponents allow.
     """
     ax, ay, bx, by = ends
     cx, cy, dx, dy = others
@@ -150,10 +155,10 @@ def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, fl
     ah, al = _abs2(ah, al)
     bh, bl = _abs2(bh, bl)
     if ae > 0.001 * ah or be > 0.001 * bh:
-        safe = True
+        is_in_range = True
         for k in range(4):
-            safe &= is_safe(ends[k]) & is_safe(others[k])
-        if safe:
+            is_in_range &= is_safe(ends[k]) & is_safe(others[k])
+        if is_in_range:
             ah, al = _weight_from_expansion(ax, ay, others)
             bh, bl = _weight_from_expansion(bx, by, others)
             ae, be = 4.0 * U2 * ah, 4.0 * U2 * bh
@@ -162,7 +167,7 @@ def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, fl
 
 @called
 def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, float]:
-    """Return the weight of a point to twice 53 bits, as a positive double-double."""
+    """Return the weight of a point, from an expansion, as a positive double-double."""
     e = workspace(16)
     h, low = leading(e, exact_cross(others, (others[0], others[1], x, y), e))
     return _abs2(h, low)
@@ -170,6 +175,7 @@ def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, flo
 
 @inline
 def leading(e: Any, n: int) -> tuple[float, float]:
+    """Return the two leading components of an expansion."""
     n = compress(e, n)
     if n == 0:
         return 0.0, 0.0
@@ -178,20 +184,20 @@ def leading(e: Any, n: int) -> tuple[float, float]:
 
 @merged
 def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
-    """Return the double nearest to one coordinate, and a bound of its error; p and q are those of the ends of e."""
+    """Return the double nearest to one coordinate, and its error bound; p and q are those of the ends of e."""
     rh, rl = dd_scale(cut.bh, cut.bl, p)
     sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)
     h, low = dd_div(nh, nl, cut.sum_h, cut.sum_l)
     bound = (CUT_BOUND + cut.relative) * max(abs(p), abs(q))
-    if abs(low) > bound and surely_rounded(h, low, bound):
+    if abs(low) > bound and is_correctly_rounded(h, low, bound):
         return h + 0.0, abs(low) + bound
-    return _settle(edges, cut.e, cut.f, axis, h, bound)
+    return _round_exactly(edges, cut.e, cut.f, axis, h, bound)
 
 
 @called
-def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
-    """Return what `_coordinate` does, by exact signs around h."""
+def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
+    """Return the result of `_coordinate` by exact signs around h."""
     if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
         h = _from_expansions(edges, e, f, axis)
     side = crossing_against(edges, e, f, axis, h, 0.0)
@@ -217,7 +223,7 @@ def _settle(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> 
 
 @called
 def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
-    """Return a coordinate of a crossing, off by less than a unit in its own last place."""
+    """Return a coordinate of a crossing with an error below one unit in its last place."""
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb = workspace(16), workspace(16)
@@ -234,7 +240,7 @@ def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
 
 @merged
 def distance_of(error_x: float, error_y: float) -> float:
-    """Return how far a point may have moved whose coordinates did by so much, rounded up."""
+    """Return ``hypot(error_x, error_y)``, rounded up."""
     return np.sqrt(error_x * error_x + error_y * error_y) * (1.0 + 2.0**-50)  # two squares, their sum, a root
 
 
@@ -243,7 +249,7 @@ def round_points(
     edges: Edges, events: Events, points: Int32Array, n: int, n_crossings: int, n_points: int, rounded: Rounded,
     stop: FlagArray,
 ) -> float:  # fmt: skip
-    """Round the points of all rings, vertices and crossings; return how far a point moved, or LOST."""
+    """Round the points of all rings, vertices and crossings; return the largest displacement of a point, or LOST."""
     x, y, error = edges.x, edges.y, rounded.error
     error[:n_crossings] = _NOT_YET
     farthest = 0.0
@@ -273,9 +279,9 @@ MARGIN: Final = 16.0 * 2.0**-52
 
 @inline
 def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: float, margin: float) -> bool:
-    """Tell whether the nodes next to vertex v are away from the other edge there.
+    """Return whether the nodes next to vertex v are away from the other edge there.
 
-    share_before, share_after: which part of the edge before v, and of that after it, lies between v and the next node.
+    share_before, share_after: the fraction of the edge before v, and after it, up to the next node.
     """
     x, y = edges.x, edges.y
     p, q = edges.before[v], edges.after[v]
@@ -288,7 +294,7 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 @inline
 def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: FlagArray) -> bool:
-    """Tell whether the first and the last event of every edge are far enough from the edge that begins or ends there.
+    """Return whether the first and the last event of every edge are away from the adjacent edges.
 
     along: by sort_events.
     """
@@ -314,7 +320,7 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: F
 
 @merged
 def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Tell whether the edges ab and cd cannot touch, or fold, on the way to their rounded places."""
+    """Return whether the edges ab and cd cannot touch, or fold, while they move to their rounded places."""
     if points[a] == points[d]:
         c, d = d, c
     elif points[b] == points[c]:
@@ -330,7 +336,7 @@ def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, 
 
 @inline
 def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: FlagArray) -> bool:
-    """Tell whether rounding put a point, one where rings do not meet, on a straight line with its neighbours."""
+    """Return whether rounding made a point, where rings do not meet, collinear with its neighbours."""
     x, y, moved = rounded.x, rounded.y, rounded.moved
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
@@ -350,9 +356,9 @@ def certify(
     rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Int32Array, heads: Int32Array,
     stop: FlagArray,
 ) -> bool:  # fmt: skip
-    """Tell whether the rings are certainly valid after rounding, no edges near each other that do not meet.
+    """Return whether the rings are proven valid after rounding: no two edges nearer than the margin that do not meet.
 
-    n: points of ``rings``. tree, tails, heads: scratch for as many. What is left out (RUN) is away from all that moves.
+    n: points of ``rings``. tree, tails, heads: scratch of that size. Edges left out (RUN) are away from all that moves.
     """
     x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0
@@ -379,8 +385,8 @@ def certify(
     while depth > 0:  # bound: the walk through the tree
         if stop[0]:
             return False
-        found, depth = next_pairs(tree, n_edges, depth)
-        for k in range(found):
+        n_pairs, depth = next_pairs(tree, n_edges, depth)
+        for k in range(n_pairs):
             i, j = pairs[k, 0], pairs[k, 1]
             a, b, c, d = tails[i], heads[i], tails[j], heads[j]
             if (moved[a] | moved[b] | moved[c] | moved[d]) and not _is_apart(rings.point, x, y, a, b, c, d, square):

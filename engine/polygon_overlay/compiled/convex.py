@@ -1,15 +1,15 @@
-"""The intersection of two convex polygons: one walk along x for the crossings, one around the result.
+r"""The intersection of two convex polygons: one walk along x for the crossings, one around the result.
 
-    upper  ,-----.        An edge can meet another only where both have the same x: the edges of a lower and an upper
-          /       \\       chain of each polygon, walked from left to right two by two, are n + m pairs for each of four
-    lower '-------'       pairs of chains. Each edge enters the other polygon once at most, and leaves it once.
+    upper  ,-----.        Edges can intersect only at a common x: the edges of a lower and an upper chain of each
+          /       \        polygon, walked from left to right two by two, are n + m pairs for each of four pairs of
+    lower '-------'       chains. Each edge enters the other polygon at most once, and leaves it at most once.
 
-Only what floating point decides for sure is settled here: strictly convex rings, proper crossings of edges whose
-vertices have different x. Everything else goes the general way, with the same result. Rounded, the ring is valid if it
-is strictly convex still, which is looked at.
+A filter: only what floating point proves is decided here (strictly convex rings, proper crossings of edges whose
+vertices have different x). Else the pair is GENERAL, with the same result. The rounded ring is valid if it is still
+strictly convex, which is checked.
 
-A ring is kept counter-clockwise from its first vertex in the order of x, then y, with that vertex again at its end, so
-that both chains are plain ranges: the lower one up from the first vertex, the upper one down from the last.
+A ring is stored counter-clockwise from its lexicographically smallest vertex (x, then y), which is repeated at its end,
+so that both chains are ranges: the lower one up from the first vertex, the upper one down from the last.
 
 Source: M. I. Shamos and D. Hoey, Geometric intersection problems, 1976, section 3.
 """
@@ -24,7 +24,7 @@ import numpy as np
 from engine.compiling.jit import called, inline, merged
 from engine.polygon_overlay.compiled.clearance import distance_of, round_crossing
 from engine.polygon_overlay.compiled.crossing_signs import Edges
-from engine.polygon_overlay.compiled.edge_contacts import agree, smaller_of, turns
+from engine.polygon_overlay.compiled.edge_contacts import same_sign, smaller_turn, turns
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 from engine.predicates.expansion import is_safe
@@ -32,36 +32,37 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import FlagArray, FloatArray, Int32Array
 
 GENERAL: Final = -1
-"""In the place of a result: the pair goes the general way."""
+"""Result value: the pair takes the general path."""
 _NONE: Final = -1
 
 Passages = namedtuple("Passages", "enters leaves")
-"""By edge: the edge of the other polygon at which it enters that, and leaves it, or none."""
+"""By edge: the edge of the other polygon at which it enters that polygon, and leaves it, or _NONE."""
 
 Points = namedtuple("Points", "x y firsts seconds")
-"""Points of the result: doubles, and where they come from: a vertex of the input and -1, or two edges of it, the one
-along which the result goes on first."""
+"""Points of the result: doubles and sources (an input vertex and -1, or two edges, first the one along which the result
+continues).
+"""
 
 
 @merged
 def _is_left(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
-    """Tell whether floating point is sure that the turn a, b, c is to the left."""
+    """Return whether floating point proves that the turn a, b, c is to the left."""
     left, right = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)
     return bool(left - right > BOUND_2D * (abs(left) + abs(right)) + GUARD_2D)
 
 
 @merged
 def _is_after(ax: float, ay: float, bx: float, by: float) -> bool:
-    """Tell whether b comes after a in the order of x, then y."""
+    """Return whether b is lexicographically larger than a (x, then y)."""
     return bool((bx > ax) | ((bx == ax) & (by > ay)))
 
 
 @inline
-def _rise_of(x: FloatArray, y: FloatArray, size: int) -> int:
-    """Return how many edges of a ring go up in the order of x, then y; GENERAL unless it is surely strictly convex.
+def _count_rising(x: FloatArray, y: FloatArray, size: int) -> int:
+    """Return how many edges of a ring rise (x, then y), or GENERAL unless the ring is proven strictly convex.
 
-    It is if all its turns are to the left, and it turns once: its edges go up once, and down once. x, y: its vertices,
-    counter-clockwise, and the first one again. No branches: the compiler makes vectors of this loop.
+    It is if all turns are to the left and it winds once: its edges rise once and fall once. x, y: its vertices,
+    counter-clockwise, and the first one again. Branch-free, so that the compiler vectorises the loop.
     """
     n_left = n_rising = n_changes = 0
     for i in range(size - 1):
@@ -79,8 +80,8 @@ def _rise_of(x: FloatArray, y: FloatArray, size: int) -> int:
 
 
 @inline
-def _first_of(vertices: FloatArray) -> int:
-    """Return which of some vertices is the first in the order of x, then y."""
+def _lowest_vertex(vertices: FloatArray) -> int:
+    """Return the lexicographically smallest vertex (x, then y)."""
     low = 0
     px, py = vertices[0, 0], vertices[0, 1]
     for k in range(1, vertices.shape[0]):
@@ -94,13 +95,13 @@ def _first_of(vertices: FloatArray) -> int:
 def load_convex(
     vertices: FloatArray, base: int, edges: Edges, origins: Int32Array, start: int, stop: FlagArray
 ) -> tuple[int, int]:  # fmt: skip
-    """Load a ring to where ``start`` is, counter-clockwise from its first vertex, with that again at its end.
+    """Load a ring to ``start``, counter-clockwise from its smallest vertex, which is repeated at its end.
 
-    Returns its last vertex in the order of x, then y, or GENERAL if it is not strictly convex, and 1 or -1, along or
-    against the ring as given.
+    Returns its largest vertex (x, then y), or GENERAL if it is not strictly convex; and 1 or -1, along or against the
+    ring as given.
     """
     size = vertices.shape[0]
-    low = _first_of(vertices)
+    low = _lowest_vertex(vertices)
     after, before = (low + 1 if low + 1 < size else 0), (low if low > 0 else size) - 1
     ux, uy = vertices[after, 0] - vertices[low, 0], vertices[after, 1] - vertices[low, 1]
     wx, wy = vertices[before, 0] - vertices[low, 0], vertices[before, 1] - vertices[low, 1]
@@ -116,21 +117,21 @@ def load_convex(
         k = 0 if k == size else size - 1 if k < 0 else k
     if not is_range_safe or stop[0]:
         return GENERAL, step
-    n_rising = _rise_of(edges.x[start:end], edges.y[start:end], size)
+    n_rising = _count_rising(edges.x[start:end], edges.y[start:end], size)
     return start + n_rising if n_rising > 0 else GENERAL, step
 
 
 @inline
-def _enter_passage(edges: Edges, e: int, f: int, passages: Passages) -> int:
-    """Enter the crossing of two edges, if they cross; return how many, or GENERAL."""
+def _record_crossing(edges: Edges, e: int, f: int, passages: Passages) -> int:
+    """Record the crossing of two edges, if they cross; return the number of crossings, or GENERAL."""
     x, y = edges.x, edges.y
     to_f = turns(x, y, e, e + 1, f, f + 1)
-    nearest_f = smaller_of(to_f)
-    if nearest_f > to_f.bound and agree(to_f):
+    nearest_f = smaller_turn(to_f)
+    if nearest_f > to_f.bound and same_sign(to_f):
         return 0
     to_e = turns(x, y, f, f + 1, e, e + 1)
-    nearest_e = smaller_of(to_e)
-    if nearest_e > to_e.bound and agree(to_e):
+    nearest_e = smaller_turn(to_e)
+    if nearest_e > to_e.bound and same_sign(to_e):
         return 0
     if nearest_f <= to_f.bound or nearest_e <= to_e.bound:
         return GENERAL
@@ -146,9 +147,9 @@ def _enter_passage(edges: Edges, e: int, f: int, passages: Passages) -> int:
 def _find_passages(
     edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: FlagArray
 ) -> int:  # fmt: skip
-    """Enter the crossings of two chains, walked from left to right; return how many, or GENERAL.
+    """Record the crossings of two chains, walked from left to right; return their number, or GENERAL.
 
-    i, j: the leftmost vertex of each; a lower chain goes up by steps of 1, an upper one down by -1.
+    i, j: the leftmost vertex of each; a lower chain has step 1, an upper one -1.
     """
     x, y = edges.x, edges.y
     while i != i_end and x[i + i_step] < x[j]:
@@ -157,17 +158,17 @@ def _find_passages(
         j += j_step
     if i == i_end or j == j_end:
         return 0
-    n_found = 0
+    n_crossings = 0
     for k in range((i_end - i) * i_step + (j_end - j) * j_step):  # each turn ends an edge of one chain
         if k & POLL == POLL and stop[0]:
             return GENERAL
-        p, q = np.uint64(i), np.uint64(j)  # no look at whether they count from the end
+        p, q = np.uint64(i), np.uint64(j)  # unsigned: no check for negative indices
         b, d = np.uint64(i + i_step), np.uint64(j + j_step)
         if (min(y[p], y[b]) <= max(y[q], y[d])) & (min(y[q], y[d]) <= max(y[p], y[b])):
-            n_entered = _enter_passage(edges, min(i, i + i_step), min(j, j + j_step), passages)
-            if n_entered == GENERAL:
+            n_new = _record_crossing(edges, min(i, i + i_step), min(j, j + j_step), passages)
+            if n_new == GENERAL:
                 return GENERAL
-            n_found += n_entered
+            n_crossings += n_new
         if x[b] == x[d]:
             return GENERAL  # case: what touches there might be passed over
         is_first = x[b] < x[d]  # no branch: which of both ends first nobody can foresee
@@ -175,12 +176,12 @@ def _find_passages(
         j += j_step * (not is_first)
         if i == i_end or j == j_end:
             break
-    return n_found
+    return n_crossings
 
 
 @inline
-def _holds(edges: Edges, first: int, last: int, v: int) -> int:
-    """Return 1 if vertex v is inside the convex ring of the edges first .. last - 1, -1 if outside, 0 if unsure."""
+def _locate_vertex(edges: Edges, first: int, last: int, v: int) -> int:
+    """Return 1, -1 or 0: vertex v is inside, outside, or undecided, in the convex ring of edges first .. last - 1."""
     x, y = edges.x, edges.y
     side = 1
     for i in range(first, last):
@@ -193,7 +194,7 @@ def _holds(edges: Edges, first: int, last: int, v: int) -> int:
 
 @inline
 def _add_vertices(edges: Edges, origins: Int32Array, first: int, last: int, points: Points, n: int) -> int:
-    """Append the vertices first .. last - 1 to a result of n points; return how many these are then."""
+    """Append the vertices first .. last - 1 to a result of n points; return the number of points then."""
     size = max(last - first, 0)
     x, y, names = edges.x[first : first + size], edges.y[first : first + size], origins[first : first + size]
     u, v, firsts, seconds = points.x[n:], points.y[n:], points.firsts[n:], points.seconds[n:]
@@ -206,7 +207,9 @@ def _add_vertices(edges: Edges, origins: Int32Array, first: int, last: int, poin
 def _add_stretch(
     edges: Edges, origins: Int32Array, e: int, f: int, first: int, last: int, points: Points, n: int
 ) -> int:  # fmt: skip
-    """Append the vertices between two points on edges e and f of the ring first .. last - 1."""
+    """Append the vertices between two points on edges e and f of the ring first .. last - 1; return the number of
+    points.
+    """
     if f >= e:
         return _add_vertices(edges, origins, e + 1, f + 1, points, n)
     n = _add_vertices(edges, origins, e + 1, last, points, n)
@@ -215,7 +218,9 @@ def _add_stretch(
 
 @inline
 def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: Points, n: int) -> float:
-    """Write the crossing of two edges to place n; return how far rounding moved it, infinity if it is not found."""
+    """Write the crossing of two edges to place n; return its displacement by rounding, infinity if it is not
+    determined.
+    """
     x, y, ex, ey = round_crossing(edges, e, f)
     points.x[n], points.y[n], points.firsts[n], points.seconds[n] = x, y, e_name, f_name
     if ex < 0.0 or ey < 0.0:
@@ -225,14 +230,14 @@ def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points
 
 @inline
 def _walk(
-    edges: Edges, origins: Int32Array, n: int, second: int, end: int, turned: int, turned_second: int,
+    edges: Edges, origins: Int32Array, n: int, second: int, end: int, is_reversed: int, is_second_reversed: int,
     passages: Passages, points: Points, stop: FlagArray,
 ) -> tuple[int, float]:  # fmt: skip
-    """Write the points of the result; return how many, or GENERAL, and how far one moved.
+    """Trace the result; return the number of points, or GENERAL, and their largest displacement.
 
-    The first polygon is followed where it is inside the other, and the other from where the first leaves to where it
-    enters again. Edges 0 .. n - 1 and second .. end - 1; at least one crossing. turned, turned_second: 1 if the ring
-    was given clockwise: its edges began with their ends.
+    The first polygon is followed while it is inside the second; the second from where the first leaves it to where it
+    enters again. Edges 0 .. n - 1 and second .. end - 1; at least one crossing. is_reversed, is_second_reversed: 1 if
+    the ring was given clockwise, so that its edges began with their ends.
     """
     enters, leaves = passages.enters, passages.leaves
     start = 0
@@ -240,7 +245,7 @@ def _walk(
         start += 1
     if start == n:
         return GENERAL, 0.0
-    n_found, farthest = 0, 0.0
+    n_points, farthest = 0, 0.0
     e, entered, left_at = start, _NONE, _NONE
     for k in range(n + 1):  # the last turn closes the ring
         f = enters[e]
@@ -248,21 +253,25 @@ def _walk(
             if k > 0:
                 if left_at == _NONE:
                     return GENERAL, 0.0
-                n_found = _add_stretch(edges, origins, left_at, f, second, end, points, n_found)
+                n_points = _add_stretch(edges, origins, left_at, f, second, end, points, n_points)
             if k == n:
-                return n_found, farthest
-            moved = _add_crossing(edges, e, f, origins[e + turned], origins[f + turned_second], points, n_found)
-            n_found, farthest = n_found + 1, max(farthest, moved)
+                return n_points, farthest
+            moved = _add_crossing(
+                edges, e, f, origins[e + is_reversed], origins[f + is_second_reversed], points, n_points
+            )
+            n_points, farthest = n_points + 1, max(farthest, moved)
             entered, left_at = e, _NONE
         f = leaves[e]
         if f != _NONE:
             if left_at != _NONE:
                 return GENERAL, 0.0
-            n_found = _add_stretch(edges, origins, entered, e, 0, n, points, n_found)
-            moved = _add_crossing(edges, e, f, origins[f + turned_second], origins[e + turned], points, n_found)
-            n_found, farthest = n_found + 1, max(farthest, moved)
+            n_points = _add_stretch(edges, origins, entered, e, 0, n, points, n_points)
+            moved = _add_crossing(
+                edges, e, f, origins[f + is_second_reversed], origins[e + is_reversed], points, n_points
+            )
+            n_points, farthest = n_points + 1, max(farthest, moved)
             left_at = f
-        if n_found > 2 * end or (k & POLL == POLL and stop[0]):
+        if n_points > 2 * end or (k & POLL == POLL and stop[0]):
             return GENERAL, 0.0
         e = e + 1 if e + 1 < n else 0
     return GENERAL, 0.0
@@ -272,10 +281,10 @@ def _walk(
 def intersect_convex(
     subject: FloatArray, clip: FloatArray, given: Given, passages: Passages, points: Points, stop: FlagArray
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Intersect two rings: return the number of points, which of them is first, and how far one moved; or GENERAL.
+    """Intersect two convex rings: return the number of points, the first one, and the largest displacement; or GENERAL.
 
-    points: filled, counter-clockwise; vertices by their numbers, those of clip after those of subject.
-    The arrays of given and passages need room for two more than all vertices, those of points for four times as many.
+    points: filled, counter-clockwise; vertices by their numbers, those of clip after those of subject. given and
+    passages have room for two more than all vertices, points for four times as many.
     """
     edges, origins, x, y = given.edges, given.origins, points.x, points.y
     n = subject.shape[0]
@@ -294,12 +303,12 @@ def intersect_convex(
         for is_other_upper in range(2):
             i, i_step = (n, -1) if is_upper else (0, 1)
             j, j_step = (end, -1) if is_other_upper else (other, 1)
-            found = _find_passages(edges, i, top, i_step, j, top_second, j_step, passages, stop)
-            if found == GENERAL:
+            n_added = _find_passages(edges, i, top, i_step, j, top_second, j_step, passages, stop)
+            if n_added == GENERAL:
                 return GENERAL, 0, 0.0
-            n_crossings += found
+            n_crossings += n_added
     if n_crossings == 0:
-        in_second, in_first = _holds(edges, other, end, 0), _holds(edges, 0, n, other)
+        in_second, in_first = _locate_vertex(edges, other, end, 0), _locate_vertex(edges, 0, n, other)
         if in_second > 0:
             return _add_vertices(edges, origins, 0, n, points, 0), 0, 0.0
         if in_first > 0 and in_second < 0:
@@ -309,7 +318,7 @@ def intersect_convex(
     if m < 3 or farthest == np.inf:
         return GENERAL, 0, 0.0
     x[m], y[m] = x[0], y[0]
-    if _rise_of(x[: m + 1], y[: m + 1], m) == GENERAL:
+    if _count_rising(x[: m + 1], y[: m + 1], m) == GENERAL:
         return GENERAL, 0, 0.0
     low = 0
     for k in range(1, m):

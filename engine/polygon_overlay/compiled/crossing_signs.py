@@ -37,12 +37,12 @@ x, y: float64; after, before, ring: int64; one entry a vertex.
 """
 
 Ends = tuple[float, float, float, float]
-"""x and y of the first end of an edge, and of the other."""
+"""x and y of the first end of an edge, then of the second."""
 
 
 @merged
 def orient(edges: Edges, a: int, b: int, c: int) -> int:
-    """Return the sign of the turn a, b, c of three vertices, exactly."""
+    """Return the exact sign of orient(a, b, c) of three vertices."""
     x, y = edges.x, edges.y
     left = (x[a] - x[c]) * (y[b] - y[c])
     right = (y[a] - y[c]) * (x[b] - x[c])
@@ -57,6 +57,7 @@ def orient(edges: Edges, a: int, b: int, c: int) -> int:
 
 @called
 def _exact_orient(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int:
+    """Return the sign of orient2d by an expansion."""
     if ((ax == cx) & (ay == cy)) | ((bx == cx) & (by == cy)):  # case: borders that polygons share
         return 0
     return orient2d_exact(Point2(ax, ay), Point2(bx, by), Point2(cx, cy))
@@ -64,7 +65,7 @@ def _exact_orient(ax: float, ay: float, bx: float, by: float, cx: float, cy: flo
 
 @merged
 def turn_of_edges(edges: Edges, e: int, f: int) -> int:
-    """Return the sign of the cross product of the directions of the edges e and f, exactly."""
+    """Return the exact sign of the cross product of the directions of the edges e and f."""
     x, y = edges.x, edges.y
     b, d = edges.after[e], edges.after[f]
     left = (x[b] - x[e]) * (y[d] - y[f])
@@ -82,6 +83,7 @@ def turn_of_edges(edges: Edges, e: int, f: int) -> int:
 
 @called
 def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
+    """Return the sign of ``(b - a) x (d - c)`` by an expansion."""
     x, y = edges.x, edges.y
     if (x[a] == x[d]) & (y[a] == y[d]) & (x[b] == x[c]) & (y[b] == y[c]):  # case: as above
         return 0
@@ -101,6 +103,7 @@ def exact_cross(first: Ends, second: Ends, e: Components) -> int:
 
 @inline
 def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
+    """Return orient(c, d, p) as a double-double, and its error bound."""
     ux, ux_tail = two_diff(dx, cx)
     uy, uy_tail = two_diff(dy, cy)
     wx, wx_tail = two_diff(px, cx)
@@ -120,7 +123,7 @@ def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
 
 @called
 def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
-    """Return -1, 0 or 1 as the crossing of edge e with f comes before, with or after that with g, along e.
+    """Return -1, 0 or 1: the crossing of edge e with f comes before, with or after that with g, along e.
 
     Caller guarantees that f and g each cross e in a point inside both.
     """
@@ -140,16 +143,16 @@ def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
 
 @called
 def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail: float) -> int:
-    """Return the sign of a coordinate of the crossing of the edges e and f less ``value + tail``, exactly.
+    """Return the exact sign of a coordinate of the crossing of e and f minus ``value + tail``.
 
-    Caller guarantees that they cross in a point inside both; value and tail as two_sum gives them.
+    Caller guarantees that they cross in a point inside both; value and tail as of two_sum.
     """
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb, p, q = workspace(16), workspace(16), workspace(4), workspace(4)
     na, nb = exact_weight(edges, f, fb, a, wa), exact_weight(edges, f, fb, b, wb)
     # x - v = ((a - v) |w_b| + (b - v) |w_a|) / (|w_a| + |w_b|)
-    np_, nq = _less(z[a], value, tail, p), _less(z[b], value, tail, q)
+    np_, nq = _set_difference(z[a], value, tail, p), _set_difference(z[b], value, tail, q)
     total = workspace(256)  # 2 * 16 * 3 components for each of two products
     if sign(wa, na) < 0:
         for k in range(na):
@@ -163,7 +166,7 @@ def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail
 
 
 @inline
-def _less(z: float, value: float, tail: float, e: Components) -> int:
+def _set_difference(z: float, value: float, tail: float, e: Components) -> int:
     """Set e to z - value - tail; return its length, at most 3."""
     n = 0
     high, low = two_diff(z, value)

@@ -1,18 +1,18 @@
-"""Noding: where the edges of rings meet. Every contact decided exactly and entered as an event on the edges concerned.
+"""Noding: all intersections of edges, decided exactly, as events on the edges concerned.
 
-Pairs whose boxes meet are looked at in floating point; exact signs decide what that leaves open.
+Pairs of edges whose boxes intersect pass a float filter; exact signs decide the rest.
 
-    proper crossing        a point of its own, an event on both edges
-    vertex in an edge      an event on that edge; the vertex becomes a node
-    vertex on vertex       the two are united; both become nodes
-    overlap                the ends of one inside the other, as above
-    fold                   two consecutive edges in one direction: an overlap, and their common vertex a node
+| contact | result |
+| --- | --- |
+| proper crossing | a point of its own, an event on both edges |
+| vertex on an edge | an event on that edge; the vertex becomes a node |
+| vertex on vertex | the two are united; both become nodes |
+| overlap | the ends of one inside the other, as above |
+| fold | two consecutive edges in one direction: an overlap, and their common vertex a node |
 
-Whether edges that do not meet are further apart than a margin is told in floating point: the margins of clearance.py
-hold its errors.
-
-Points are numbered: vertices first, crossings after them. Equal points are united (the smallest number stands for
-all, so a vertex where there is one), crossings through one point later, when the events of an edge are sorted.
+Whether disjoint edges are further apart than a margin is decided in floating point: the margins of clearance.py cover
+its errors. Points are numbered, vertices first, then crossings; equal points are united under the smallest number,
+crossings through one point when the events of an edge are sorted.
 
 Source: the dual traversal of C. Ericson, Real-Time Collision Detection, 2005; signs after J. R. Shewchuk, 1997.
 """
@@ -35,7 +35,7 @@ from engine.types import FlagArray, FloatArray
 
 @merged
 def is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, square: float) -> bool:
-    """Tell whether p is further from the segment ab than the root of ``square``."""
+    """Return whether the distance of p from the segment ab is above ``sqrt(square)``."""
     dx, dy, ex, ey = bx - ax, by - ay, px - ax, py - ay
     along, length = ex * dx + ey * dy, dx * dx + dy * dy
     if along <= 0.0:
@@ -48,8 +48,8 @@ def is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, squ
 
 
 @merged
-def _is_beside(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Tell whether c and d are on one side of the line ab, further from it than the root of ``square``."""
+def _are_on_one_side(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
+    """Return whether c and d are on one side of the line ab, further from it than ``sqrt(square)``."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
     nearest = min(abs(side_c), abs(side_d))
@@ -58,7 +58,7 @@ def _is_beside(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, squ
 
 @merged
 def _crosses(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> bool:
-    """Tell whether c and d are on two sides of ab, and a and b on two sides of cd, in floating point."""
+    """Return whether ab and cd cross properly, in floating point."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
     if (side_c > 0.0) == (side_d > 0.0):
@@ -70,8 +70,8 @@ def _crosses(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> bo
 
 @called
 def segments_are_far(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Tell whether the segments ab and cd are further apart than the root of ``square``."""
-    if _is_beside(x, y, a, b, c, d, square) or _is_beside(x, y, c, d, a, b, square):
+    """Return whether the distance of the segments ab and cd is above ``sqrt(square)``."""
+    if _are_on_one_side(x, y, a, b, c, d, square) or _are_on_one_side(x, y, c, d, a, b, square):
         return True
     return (
         is_far(x[b], y[b], x[c], y[c], x[d], y[d], square)
@@ -83,27 +83,34 @@ def segments_are_far(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: in
 
 
 _ANY_SLACK: Final = 4.0
-"""Slack of a parameter known by its sign only: any comparison with it is made exactly."""
+"""Slack of a parameter of which only the sign is known: any comparison with it is exact."""
 
 
 class Turn(IntEnum):
-    """How the second edge of a crossing leaves, seen along the first."""
+    """To which side the second edge of a crossing leaves, seen along the first."""
 
     NOT_SIMPLE = 0
-    """Floating point is not sure of that, or the crossing is not alone."""
+    """Not proven by floating point, or not the only crossing there."""
     LEFT = 1
     RIGHT = 2
 
 
 Events = namedtuple("Events", "edge point other t slack reach first second turn")
-"""Points inside edges. edge: the edge; point: its number; other: the edge that crosses there, -1 for a vertex; t,
-slack: parameter along the edge and bound of its error; reach: how far along the edge the other one is nearer than the
-margin of clearance.py, where that is sure, and the slack. By crossing: first and second, its edges;
-turn: see `Turn`."""
+"""Points inside edges.
+
+| field | by | meaning |
+| --- | --- | --- |
+| edge, point | event | the edge; the number of the point |
+| other | event | the edge that crosses there, -1 for a vertex |
+| t, slack | event | parameter along the edge, and its error bound |
+| reach | event | slack + the length along the edge within which the other edge is nearer than the margin |
+| first, second, turn | crossing | its edges; a `Turn` |
+"""
 
 Unions = namedtuple("Unions", "points is_node rings")
-"""points: forest of points that are one; is_node: by vertex, uint8, whether something meets it or a ring begins there;
-rings: forest of rings that hang together."""
+"""points: forest of equal points; is_node: by vertex, uint8, whether something meets it or a ring begins there;
+rings: forest of connected rings.
+"""
 
 
 @merged
@@ -113,8 +120,8 @@ def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: fl
 
 
 @inline
-def _put_vertex(edges: Edges, events: Events, unions: Unions, at: int, e: int, v: int) -> int:
-    """Enter vertex v, which lies on the line of edge e, if it is in the closed edge; return the number of events."""
+def _add_vertex_on_edge_event(edges: Edges, events: Events, unions: Unions, at: int, e: int, v: int) -> int:
+    """Add an event for vertex v on the line of edge e, if it lies on the closed edge; return the number of events."""
     x, y = edges.x, edges.y
     a, b = e, edges.after[e]
     for end in (a, b):
@@ -137,12 +144,12 @@ def _put_vertex(edges: Edges, events: Events, unions: Unions, at: int, e: int, v
 
 
 @called
-def _enter_contact(
+def _add_contact(
     edges: Edges, events: Events, unions: Unions, n: int, n_events: int, n_crossings: int, e: int, f: int
 ) -> tuple[int, int]:
-    """Enter what the edges e and f have in common, decided exactly; return the numbers of events and crossings.
+    """Add the contacts of the edges e and f, decided exactly; return the numbers of events and crossings.
 
-    n: number of vertices. There is room for four events more.
+    n: number of vertices. There is room for four more events.
     """
     parent, rings = unions.points, unions.rings
     a, b, c, d = e, edges.after[e], f, edges.after[f]
@@ -152,19 +159,19 @@ def _enter_contact(
         folds = (x[p] > x[tip]) == (x[q] > x[tip]) if x[p] != x[tip] else (y[p] > y[tip]) == (y[q] > y[tip])
         if folds and orient(edges, p, tip, q) == 0:
             unions.is_node[tip] = 1
-            n_events = _put_vertex(edges, events, unions, n_events, e, q)
-            n_events = _put_vertex(edges, events, unions, n_events, f, p)
+            n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, e, q)
+            n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, f, p)
         return n_events, n_crossings
     side_c, side_d = orient(edges, a, b, c), orient(edges, a, b, d)
     if side_c == side_d and side_c != 0:
         return n_events, n_crossings
     if side_c == 0 and side_d == 0:  # case: collinear; they may overlap, touch in an end, or lie apart
-        known = n_events
+        n_before = n_events
         for v in (c, d):
-            n_events = _put_vertex(edges, events, unions, n_events, e, v)
+            n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, e, v)
         for v in (a, b):
-            n_events = _put_vertex(edges, events, unions, n_events, f, v)
-        if n_events > known or root_of(parent, a) == root_of(parent, c) or root_of(parent, a) == root_of(parent, d) \
+            n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, f, v)
+        if n_events > n_before or root_of(parent, a) == root_of(parent, c) or root_of(parent, a) == root_of(parent, d) \
                 or root_of(parent, b) == root_of(parent, c) or root_of(parent, b) == root_of(parent, d):  # fmt: skip
             unite(rings, edges.ring[e], edges.ring[f])
         return n_events, n_crossings
@@ -174,13 +181,13 @@ def _enter_contact(
     unite(rings, edges.ring[e], edges.ring[f])
     # The lines meet in one point, which lies in both closed edges; an end of one on the other's line is that point.
     if side_c == 0:
-        n_events = _put_vertex(edges, events, unions, n_events, e, c)
+        n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, e, c)
     elif side_d == 0:
-        n_events = _put_vertex(edges, events, unions, n_events, e, d)
+        n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, e, d)
     if side_a == 0:
-        n_events = _put_vertex(edges, events, unions, n_events, f, a)
+        n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, f, a)
     elif side_b == 0:
-        n_events = _put_vertex(edges, events, unions, n_events, f, b)
+        n_events = _add_vertex_on_edge_event(edges, events, unions, n_events, f, b)
     if side_a != 0 and side_b != 0 and side_c != 0 and side_d != 0:
         crossing = n + n_crossings
         parent[crossing] = crossing
@@ -192,8 +199,9 @@ def _enter_contact(
 
 
 class Contacts(NamedTuple):
-    """How many events (-1: no room), crossings, and pairs that floating point left to exact signs; are_far: all edges
-    that do not meet are further apart than the margin, and all contacts are crossings."""
+    """Numbers of events (-1: no room), of crossings, and of pairs decided exactly; are_far: all disjoint edges are
+    further apart than the margin, and all contacts are crossings.
+    """
 
     n_events: int
     n_crossings: int
@@ -202,8 +210,7 @@ class Contacts(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """Of a segment ab and the points c and d: orient(a, b, c) and orient(a, b, d) in floating point, a bound for the
-    errors of both, and ab's length, which is the sum of both coordinates'."""
+    """orient(a, b, c) and orient(a, b, d) in floating point, an error bound of both, and |dx| + |dy| of ab."""
 
     first: float
     second: float
@@ -213,8 +220,8 @@ class Turns(NamedTuple):
 
 @merged
 def turns(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> Turns:
-    """Return the turns from the segment ab to the points c and d."""
-    i, j, k, m = np.uint64(a), np.uint64(b), np.uint64(c), np.uint64(d)  # no look at whether they count from the end
+    """Return the orientations of c and d relative to the segment ab."""
+    i, j, k, m = np.uint64(a), np.uint64(b), np.uint64(c), np.uint64(d)  # unsigned: no check for negative indices
     ux, uy = x[j] - x[i], y[j] - y[i]
     left, right = ux * (y[k] - y[i]), uy * (x[k] - x[i])
     far_left, far_right = ux * (y[m] - y[i]), uy * (x[m] - x[i])
@@ -223,22 +230,22 @@ def turns(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> Turns
 
 
 @merged
-def smaller_of(found: Turns) -> float:
-    """Return the size of the smaller turn."""
-    return min(abs(found.first), abs(found.second))
+def smaller_turn(pair: Turns) -> float:
+    """Return the smaller magnitude of two turns."""
+    return min(abs(pair.first), abs(pair.second))
 
 
 @merged
-def agree(found: Turns) -> bool:
-    """Tell whether both turns have one sign: the points lie on one side, where the bound does not say otherwise."""
-    return (found.first > 0.0) == (found.second > 0.0)
+def same_sign(pair: Turns) -> bool:
+    """Return whether both turns have the same sign; proven if their magnitudes exceed the bound."""
+    return (pair.first > 0.0) == (pair.second > 0.0)
 
 
 @inline
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: FlagArray
 ) -> Contacts:
-    """Enter all contacts.
+    """Node the edges: add all contacts as events.
 
     tree: over the boxes of the edges, with the margin around them. unions: filled.
     """
@@ -253,15 +260,15 @@ def find_contacts(
     are_far = True
     depth = begin_pairs(tree)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
-        found, depth = next_pairs(tree, n, depth)
-        for k in range(found):
+        n_pairs, depth = next_pairs(tree, n, depth)
+        for k in range(n_pairs):
             i, j = pairs[k, 0], pairs[k, 1]
             b, d = after[i], after[j]
             if b == j and tree.marks[j] & BENT:
                 continue
             to_j = turns(x, y, i, b, j, d)
-            nearest = smaller_of(to_j)
-            if agree(to_j) and nearest > margin * to_j.length and nearest > to_j.bound:
+            nearest = smaller_turn(to_j)
+            if same_sign(to_j) and nearest > margin * to_j.length and nearest > to_j.bound:
                 continue
             if n_events > room:
                 return Contacts(-1, 0, 0, False)
@@ -269,10 +276,10 @@ def find_contacts(
                 continue  # consecutive edges that are not in line
             if b != j and d != i:
                 to_i = turns(x, y, j, d, i, b)
-                nearest_i = smaller_of(to_i)
-                is_beside = agree(to_i) and nearest_i > to_i.bound
-                if is_beside or (agree(to_j) and nearest > to_j.bound):  # no contact
-                    is_far = is_beside and nearest_i > margin * to_i.length
+                nearest_i = smaller_turn(to_i)
+                is_apart = same_sign(to_i) and nearest_i > to_i.bound
+                if is_apart or (same_sign(to_j) and nearest > to_j.bound):  # no contact
+                    is_far = is_apart and nearest_i > margin * to_i.length
                     are_far = are_far and (is_far or segments_are_far(x, y, i, b, j, d, margin * margin))
                     continue
                 if nearest > to_j.bound and nearest_i > to_i.bound:
@@ -286,7 +293,7 @@ def find_contacts(
                     _add_crossing(events, n_events + 1, n + n_crossings, j, i, to_j, margin)
                     n_events, n_crossings = n_events + 2, n_crossings + 1
                     continue
-            n_events, n_crossings = _enter_contact(edges, events, unions, n, n_events, n_crossings, i, j)
+            n_events, n_crossings = _add_contact(edges, events, unions, n, n_events, n_crossings, i, j)
             n_exact += 1
             are_far = are_far and (b == j or d == i) and not unions.is_node[b if b == j else i]  # else they fold
     return Contacts(n_events, n_crossings, n_exact, are_far)
@@ -294,9 +301,9 @@ def find_contacts(
 
 @merged
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
-    """Enter the event at ``at`` of a proper crossing whose signs are sure; ends: the turns from ``other`` to both ends.
+    """Add the event of a proper crossing with certified signs; ends: the turns from ``other`` to both ends of the edge.
 
-    t = A / (A + B), with A and B off by r at most, is off by r / (A + B), and by three roundings.
+    ``t = A / (A + B)``; with A and B off by at most r, ``error <= r / (A + B) + 3 roundings``.
     """
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)

@@ -1,6 +1,6 @@
-"""The events of each edge in their order along it: floating point where intervals are apart, else exactly.
+"""Order of the events along each edge: by float parameters where their error intervals are disjoint, else exactly.
 
-Events that turn out to be one point are united, so that lines through one point meet in one node.
+Events at one point are united, so that edges through one point meet in one node.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.types import FlagArray
 
 _RUN: Final = 16
-"""Events that are sorted by insertion; more are merged."""
+"""Length of runs sorted by insertion, before they are merged."""
 
 Along = namedtuple("Along", "starts order keys spare_keys spare")
-"""The events along each edge in their order: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64 in
-that order; spare_keys, spare: scratch as large as keys and order."""
+"""The sorted events along each edge: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64 in that order;
+spare_keys, spare: scratch as large as keys and order.
+"""
 
 
 @called
 def compare_events(edges: Edges, events: Events, e: int, i: int, j: int) -> int:
-    """Return -1, 0 or 1 as event i of edge e comes before, with or after event j."""
+    """Return -1, 0 or 1: event i of edge e comes before, with or after event j."""
     gap = events.t[i] - events.t[j]
     slack = events.slack[i] + events.slack[j]
     if gap > slack:
@@ -44,7 +45,7 @@ def compare_events(edges: Edges, events: Events, e: int, i: int, j: int) -> int:
 
 @inline
 def _vertex_before_crossing(edges: Edges, e: int, v: int, f: int) -> int:
-    """Return -1, 0 or 1 as vertex v on edge e comes before, at or after the crossing with edge f."""
+    """Return -1, 0 or 1: vertex v on edge e comes before, at or after the crossing with edge f."""
     side = orient(edges, f, edges.after[f], v)
     if side == 0:
         return 0
@@ -53,6 +54,7 @@ def _vertex_before_crossing(edges: Edges, e: int, v: int, f: int) -> int:
 
 @inline
 def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
+    """Return -1, 0 or 1: vertex v comes before, with or after vertex w along edge e, both on it."""
     x, y = edges.x, edges.y
     b = edges.after[e]
     if x[v] != x[w]:
@@ -64,7 +66,7 @@ def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
 
 @inline
 def _sort_by_key(along: Along, first: int, last: int) -> None:
-    """Sort ``keys[first:last]`` and ``order`` with them, equal ones as they are: runs by insertion, then merged."""
+    """Sort ``keys[first:last]`` and ``order`` with them (stable): insertion runs, then merges."""
     order, keys, spare_keys, spare = along.order, along.keys, along.spare_keys, along.spare
     width = _RUN
     for low in range(first, last, width):
@@ -92,7 +94,7 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
 
 @inline
 def _group_events(events: Events, along: Along, n: int, n_events: int, stop: FlagArray) -> bool:
-    """Put the events of each edge together, in any order; return False where the call is to end."""
+    """Bucket the events by edge, in any order; return False if ``stop`` is set."""
     starts = along.starts
     starts[: n + 1] = 0
     for i in range(n_events):
@@ -116,11 +118,11 @@ def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Fla
 
 @called
 def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n: int, e: int) -> None:
-    """Sort the events of an edge, each put where a search by halves finds its place, and unite those at one point."""
+    """Sort the events of an edge by binary insertion with exact comparisons, and unite those at one point."""
     order, keys, points, first = along.order, along.keys, events.point, along.starts[e]
     for k in range(first + 1, along.starts[e + 1]):
         moving, key, low, high = order[k], keys[k], first, k
-        middle, is_same = k - 1, False  # nearly sorted: the last is looked at first
+        middle, is_same = k - 1, False  # nearly sorted: the last is tested first
         while low < high:  # invariant: those before low are not after the moving one, those from high on are
             side = compare_events(edges, events, e, order[middle], moving)
             if side > 0:
@@ -145,8 +147,8 @@ def sort_events(
 ) -> bool:
     """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE.
 
-    Returns whether the events of every edge are further apart than their reaches, and each is further from the ends
-    than its own.
+    Returns whether all events are further apart than the sum of their reaches, and further from the ends than their
+    own.
     """
     if not _group_events(events, along, n, n_events, stop):
         return False

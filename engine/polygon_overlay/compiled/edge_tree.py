@@ -1,15 +1,13 @@
-"""Pairs of boxes that meet, by an implicit tree over boxes in the order of the rings they come from.
+"""Pairs of intersecting boxes, by the dual traversal of an implicit tree over boxes in the order of their rings.
 
-Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and the
-boxes of a level are found from the one below. Only where one edge lies far from the next are they first
-put in the order of a space-filling curve. The tree is walked against itself. Each box is
-``(x_min, x_max, y_min, y_max)``.
+Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and each box
+is computed from the level below. Only where one edge lies far from the next are boxes first sorted in Morton order.
+A box is ``(x_min, x_max, y_min, y_max)``.
 
-A mark is a sum of bits: among them the quadrants' sides that the edge heads for. Edges one after another that all head
-for one quadrant meet nowhere but in the vertices they share, so such a node is not walked against itself, nor two that
-follow each other and are one such run together.
+A mark is a sum of bits, among them the directions of the edge. Consecutive edges that all head for one quadrant share
+vertices only, so a node of such a run is not paired with itself, nor with the next one of the run.
 
-Pairs come in portions, so that memory does not grow with their number and the caller can look at the clock.
+Pairs come in portions, so that memory stays bounded and the caller can poll the clock.
 
 Source: the dual traversal of C. Ericson, Real-time collision detection, 2005, section 6.3; the curve is that of
 G. M. Morton, A computer oriented geodetic data base, 1966.
@@ -26,31 +24,31 @@ from engine.compiling.jit import allocating, inline, merged
 from engine.types import FlagArray, FloatArray
 
 POLL: Final = 0x3FFF
-"""Steps of some 10 to 100 ns between two looks at the flag that ends a call, as a mask of their number."""
+"""Mask of step numbers: steps of 10 to 100 ns between two polls of the stop flag."""
 OFTEN: Final = 0x3FF
 """The same for steps of some microseconds."""
 LEAF: Final = 4
 FEW: Final = 40
-"""Boxes up to which all pairs are looked at: fewer steps than a tree, and no more pairs than a portion."""
+"""Number of boxes up to which all pairs are tested: fewer steps than a tree, and at most one portion of pairs."""
 PORTION: Final = 2048
-"""Pairs at once: some 50 us of exact tests."""
-_NUMBER: Final = 31
-"""Bits of the number of a box, below those of its place on the curve."""
+"""Pairs of one call: some 50 us of exact tests."""
+_NUMBER_BITS: Final = 31
+"""Bits of the number of a box, below those of its Morton code."""
 _STEPS: Final = 1 << 16
-"""Steps of the walk at once, about a millisecond."""
+"""Steps of one call, about a millisecond."""
 ANYWHERE: Final = 2 + 4 + 8 + 16
-"""Mark of an edge that ends a run: heading right, left, up and down at once."""
+"""Mark of an edge that ends a run: heading right, left, up and down."""
 BENT: Final = 32
-"""Mark of an edge at whose first vertex the ring surely turns."""
+"""Mark of an edge at whose first vertex the ring certainly turns."""
 RUN: Final = 64
 """Mark of an edge that stands for many, which meet nothing; see reducing.py."""
 DEEPEST: Final = 256
-"""Places on the stack: a walk through 60 levels holds at most three pairs a level."""
+"""Size of the stack: 60 levels, at most three pairs a level."""
 
 BoxTree = namedtuple("BoxTree", "boxes marks nodes node_marks places stack pairs")
-"""Boxes by number (n, 4) float64, with the mark of each; the tree over them: by node its box and its mark.
+"""A tree over boxes: boxes (n, 4) float64 and marks (n,), nodes and node_marks by node.
 
-places: the boxes in the order of the leaves. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), those found last.
+places: the boxes in the order of the leaves. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), the last portion.
 """
 
 
@@ -65,8 +63,8 @@ def leaves_of(n: int) -> int:
 
 @merged
 def boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
-    """Tell whether two closed boxes have a common point."""
-    return (  # all four at once: which fails first is not foreseeable, and a branch missed costs more than all
+    """Return whether two closed boxes have a common point."""
+    return (  # branch-free: a mispredicted branch costs more than all four
         (boxes[i, 0] <= others[j, 1])
         & (others[j, 0] <= boxes[i, 1])
         & (boxes[i, 2] <= others[j, 3])
@@ -75,8 +73,8 @@ def boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
 
 
 @merged
-def box_holds(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
-    """Tell whether a box holds another, which may be equal."""
+def box_contains(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
+    """Return whether a box contains another, which may be equal."""
     return (
         (boxes[i, 0] <= others[j, 0])
         & (boxes[i, 1] >= others[j, 1])
@@ -87,19 +85,19 @@ def box_holds(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
 
 @merged
 def heading(ux: float, uy: float) -> int:
-    """Return the mark of an edge with the direction u, which is not zero."""
+    """Return the direction bits of an edge with the direction u, which is not zero."""
     return 2 * (ux > 0.0) + 4 * (ux < 0.0) + 8 * (uy > 0.0) + 16 * (uy < 0.0)
 
 
 @merged
 def _is_one_run(mark: int) -> bool:
-    """Tell whether edges that follow each other, with this mark in all, head for one quadrant."""
+    """Return whether consecutive edges with this combined mark head for one quadrant."""
     return (mark & 6) != 6 and (mark & 24) != 24
 
 
 @merged
-def _spread(bits: int) -> int:
-    """Return a number below 2^16 with a zero after each of its bits."""
+def _interleave_zeros(bits: int) -> int:
+    """Return a number below 2^16 with a zero inserted after each bit (half of a Morton code)."""
     bits = (bits | (bits << 8)) & 0x00FF00FF
     bits = (bits | (bits << 4)) & 0x0F0F0F0F
     bits = (bits | (bits << 2)) & 0x33333333
@@ -108,9 +106,10 @@ def _spread(bits: int) -> int:
 
 @allocating
 def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
-    """Fill ``places`` with the boxes in the order in which the leaves take them; tell whether it is another order.
+    """Fill ``places`` with the boxes in Morton order of their lower left corners, or as they are; return whether
+    sorted.
 
-    Only the lower left corners are looked at.
+    They stay as they are where the path through the corners is short: in Morton order it grows like ``sqrt(n)``.
     """
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
@@ -130,11 +129,11 @@ def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
     by_x, by_y = 65535.0 / wide if wide > 0.0 else 0.0, 65535.0 / high if high > 0.0 else 0.0
     for k in range(n):
         x, y = boxes[k, 0] - x_min, boxes[k, 2] - y_min
-        key = _spread(min(int(x * by_x), 65535)) | (_spread(min(int(y * by_y), 65535)) << 1)
-        keys[k] = key << _NUMBER | k
+        key = _interleave_zeros(min(int(x * by_x), 65535)) | (_interleave_zeros(min(int(y * by_y), 65535)) << 1)
+        keys[k] = key << _NUMBER_BITS | k
     keys.sort()
     for k in range(n):
-        places[k] = keys[k] & ((1 << _NUMBER) - 1)
+        places[k] = keys[k] & ((1 << _NUMBER_BITS) - 1)
     return True
 
 
@@ -146,7 +145,7 @@ def build_tree(tree: BoxTree, n: int, stop: FlagArray) -> None:
 
 @inline
 def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
-    """Fill the nodes and their marks, with the one that is added, by ``places``; empty nodes are inverted."""
+    """Fill the nodes and their marks by ``places``; empty nodes are inverted boxes. added: or-ed to every mark."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
     for leaf in range(n_leaves):
@@ -172,10 +171,7 @@ def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
 
 @merged
 def push_children(tree: BoxTree, node: int, depth: int) -> int:
-    """Put the children of a node on the stack of a search upwards; return the depth.
-
-    The lower one is last, so first off: what is found there spares the other.
-    """
+    """Push the children of a node for a search upwards, the lower one last (visited first); return the depth."""
     low, high = 2 * node, 2 * node + 1
     if tree.nodes[low, 2] > tree.nodes[high, 2]:
         low, high = high, low
@@ -185,11 +181,11 @@ def push_children(tree: BoxTree, node: int, depth: int) -> int:
 
 @inline
 def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Go on with the walk: write pairs of boxes that meet, each once; return how many, and the depth of the stack."""
+    """Continue the traversal: write intersecting pairs, each once; return their number, and the depth of the stack."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     stack, pairs = tree.stack, tree.pairs
-    n_leaves, found, steps = leaves_of(n), 0, 0
-    while depth > 0 and found <= PORTION - LEAF * LEAF and steps < _STEPS:
+    n_leaves, n_pairs, steps = leaves_of(n), 0, 0
+    while depth > 0 and n_pairs <= PORTION - LEAF * LEAF and steps < _STEPS:
         depth -= 1
         steps += 1
         i, j = stack[depth, 0], stack[depth, 1]
@@ -203,36 +199,36 @@ def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
             continue
         first, second = LEAF * (i - n_leaves), LEAF * (j - n_leaves)
         for p in range(first, min(first + LEAF, n)):
-            e = places[np.uint64(p)]  # unsigned: no look at whether it counts from the end
+            e = places[np.uint64(p)]  # unsigned: no check for negative indices
             for q in range(p + 1 if i == j else second, min(second + LEAF, n)):
                 f = places[np.uint64(q)]
-                pairs[found, 0], pairs[found, 1] = e, f
-                found += boxes_meet(boxes, np.uint64(e), boxes, np.uint64(f))
-    return found, depth
+                pairs[n_pairs, 0], pairs[n_pairs, 1] = e, f
+                n_pairs += boxes_meet(boxes, np.uint64(e), boxes, np.uint64(f))
+    return n_pairs, depth
 
 
 @inline
 def _all_pairs(tree: BoxTree, n: int) -> int:
-    """Write the pairs of boxes that meet, of so few that all fit; return how many."""
+    """Write all intersecting pairs of few boxes; return their number."""
     boxes, pairs = tree.boxes, tree.pairs
-    found = 0
+    n_pairs = 0
     for i in range(n):
         for j in range(i + 1, n):
-            pairs[found, 0], pairs[found, 1] = i, j
-            found += boxes_meet(boxes, i, boxes, j)
-    return found
+            pairs[n_pairs, 0], pairs[n_pairs, 1] = i, j
+            n_pairs += boxes_meet(boxes, i, boxes, j)
+    return n_pairs
 
 
 @inline
 def begin_pairs(tree: BoxTree) -> int:
-    """Make ready to look for pairs; return the depth for `next_pairs`."""
+    """Start the traversal; return the depth for `next_pairs`."""
     tree.stack[0, 0], tree.stack[0, 1] = 1, 1
     return 1
 
 
 @inline
 def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Write the next portion of pairs, each once, of boxes that meet; return how many, and the depth, 0 at the end.
+    """Write the next portion of intersecting pairs, each once; return their number, and the depth, 0 at the end.
 
     Caller guarantees a built tree, unless boxes are few.
     """

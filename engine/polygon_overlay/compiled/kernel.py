@@ -1,23 +1,18 @@
-"""Overlays compiled: many pairs of polygons from flat arrays to flat arrays, without the interpreter.
+"""Compiled overlays of many pairs of polygons, from flat arrays to flat arrays.
 
-    edges -> contacts -> events along edges -> chains -> stars -> faces, labels -> boundary rings -> doubles
+    edges -> noding -> events along edges -> chains -> stars -> faces, labels -> boundary rings -> rounding
 
-The steps are those of overlay.py on chains instead of single edges, so that after the contacts the work follows the
-number of crossings. Decisions are exact throughout. A pair is left OPEN, for the path in Python integers, where
+The steps are those of overlay.py on chains instead of single edges, so that after noding the work follows the number of
+crossings. Decisions are exact throughout. Outcomes of a pair (`PairStatus`, or OPEN):
 
-- a coordinate is neither zero nor within 2^-120 .. 2^120, so that expansions might lose bits;
-- a coordinate of the result cannot be rounded from double-doubles and exact signs;
-- it has rings of which rounding left no sure shell.
+| status | meaning |
+| --- | --- |
+| DONE | the rounded rings are proven valid |
+| MAY_CROSS | rounding came within the margin of clearance.py: the rings are arranged again (ring_nesting.py) |
+| OPEN | exact fallback: a coordinate outside 2^-120 .. 2^120, or not rounded, or no shell of rounded rings is proven |
 
-A pair is left MAY_CROSS where rounding came so near another edge that clearance.py does not
-vouch for the rounded rings, or put a vertex on the line of its neighbours: its rounded rings may cross. They come
-back as another pair then, each ring a source of its own (ring_nesting.py).
-
-The intersection of two convex rings is convex.py's where floating point is sure of all that it asks; two rings that
-only cross each other are walked by `walk_crossings`, from the events on.
-
-Scratch arrays come from the caller, who gives more and calls again where they do not suffice: nothing here allocates,
-so nothing counts references to arrays.
+Fast paths: two convex rings (convex.py), two simple rings with only proper crossings (`walk_crossings`). Scratch comes
+from the caller, who gives more and calls again where it does not suffice: nothing here allocates.
 """
 
 from __future__ import annotations
@@ -28,7 +23,7 @@ from typing import Final, NamedTuple
 from engine.compiling.jit import kernel, merged
 from engine.polygon_overlay.compiled.chain_faces import join_faces, number_cycles
 from engine.polygon_overlay.compiled.chain_rings import (
-    do_nothing_but_cross,
+    has_only_proper_crossings,
     join_regions,
     mark_boundary,
     walk_crossings,
@@ -61,36 +56,42 @@ from engine.polygon_overlay.compiled.loading import (
     mark_runs,
 )
 from engine.polygon_overlay.compiled.reducing import count_left_out
-from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, Nesting, Rule, gather_evidence, spread_sources
+from engine.polygon_overlay.compiled.ring_nesting import (
+    NO_ROOM,
+    Nesting,
+    Rule,
+    group_provenance_by_region,
+    propagate_labels,
+)
 from engine.polygon_overlay.compiled.ring_order import (
     Filled,
     has_room,
     rank_rings,
-    tell_evidence,
-    tell_parts,
+    write_component_ids,
     write_convex,
+    write_provenance,
     write_rings,
 )
-from engine.polygon_overlay.compiled.workspace import Outcomes, Workspace, output_at, rows_of
+from engine.polygon_overlay.compiled.workspace import Outcomes, Workspace, output_at, workspace_at
 from engine.predicates.expansion import LARGEST
 from engine.types import OPEN, FlagArray, IntArray
 
 FINISHED: Final = 0
 NEEDS_CONTACTS: Final = 1
-"""The pair reached has more contacts than there is scratch for."""
+"""The pair reached has more contacts than the scratch has room for."""
 NEEDS_OUTPUT: Final = 2
 """The pair reached has more vertices or rings than the output has room for."""
 
 
 class PairStatus(IntEnum):
-    """What became of a pair, if it is not OPEN."""
+    """The outcome of a pair that is not OPEN."""
 
     DONE = 0
     MAY_CROSS = 1
 
 
 class _Span(NamedTuple):
-    """The rings of a pair: of its subject first .. first_end - 1, of its clip second .. second_end - 1."""
+    """The rings of a pair: first .. first_end - 1 of its subject, second .. second_end - 1 of its clip."""
 
     first: int
     first_end: int
@@ -98,11 +99,13 @@ class _Span(NamedTuple):
     second_end: int
 
 
-class _Arranged(NamedTuple):
-    """What was found of a pair: boundary rings and their points, crossings, pairs of edges left to exact signs, whether
-    clearance.py vouches for all; n_contacts: those that there must be scratch for, more than there is if it failed."""
+class _Arrangement(NamedTuple):
+    """Counts of the boundary rings of a pair, their points, crossings and exactly decided edge pairs.
 
-    n_found: int
+    is_clear: clearance.py proves that rounding is harmless. n_contacts: needed scratch, more than there is on failure.
+    """
+
+    n_boundary: int
     n_points: int
     n_crossings: int
     n_exact: int
@@ -110,45 +113,45 @@ class _Arranged(NamedTuple):
     n_contacts: int
 
 
-_NONE: Final = _Arranged(0, 0, 0, 0, False, 0)
+_NONE: Final = _Arrangement(0, 0, 0, 0, False, 0)
 
 
 @merged
 def _intersect_convex(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, stop: FlagArray
 ) -> tuple[int, int, float]:
-    """Intersect the only ring of each polygon, where both are convex; returns as `intersect_convex`."""
+    """Intersect two convex polygons of one ring each; returns as `intersect_convex`."""
     first, second = span.first, span.second
     return intersect_convex(
         subjects.vertices[subjects.offsets[first] : subjects.offsets[first + 1]],
         clips.vertices[clips.offsets[second] : clips.offsets[second + 1]], w.given,
         Passages(w.unions.points, w.stars.node_of),
-        Points(w.rounded.x, w.rounded.y, w.found.point, w.tree.places), stop,
+        Points(w.rounded.x, w.rounded.y, w.rings.point, w.tree.places), stop,
     )  # fmt: skip
 
 
 @merged
 def _load_pair(
-    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, kept: FlagArray, is_named: bool,
-    stop: FlagArray,
+    w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, selected: FlagArray,
+    is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Load the rings of both polygons; return the numbers of vertices and rings, and whether none is too small."""
+    """Load both polygons; return the numbers of vertices and rings, and whether no coordinate is too small."""
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
-    n, n_rings, safe = load_rings(
-        subjects, span.first, span.first_end, 1, is_named, -first, EVERYTHING if kept[1] else common, w.given,
+    n, n_rings, is_in_range = load_rings(
+        subjects, span.first, span.first_end, 1, is_named, -first, EVERYTHING if selected[1] else common, w.given,
         0, 0, stop,
     )  # fmt: skip
-    n, n_rings, also_safe = load_rings(
-        clips, span.second, span.second_end, 2, False, n_subject - second, EVERYTHING if kept[2] else common, w.given,
-        n, n_rings, stop,
+    n, n_rings, is_clip_in_range = load_rings(
+        clips, span.second, span.second_end, 2, False, n_subject - second, EVERYTHING if selected[2] else common,
+        w.given, n, n_rings, stop,
     )  # fmt: skip
-    return n, n_rings, safe and also_safe
+    return n, n_rings, is_in_range and is_clip_in_range
 
 
 @merged
-def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, stop: FlagArray) -> _Arranged:
-    """Find the boundary rings of a pair that is loaded. Where the call is to end, nothing found is right."""
+def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, stop: FlagArray) -> _Arrangement:
+    """Arrange a loaded pair and find its boundary rings. If ``stop`` is set, the result is invalid."""
     n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     margin = CLEARANCE * loaded.largest
     is_clear = fill_boxes(edges, n, margin, w.tree, stop) > margin
@@ -158,36 +161,36 @@ def _arrange(w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, st
     contacts = find_contacts(edges, n, n_rings, margin, w.events, w.unions, w.tree, stop)
     room = w.along.order.shape[0] - 9
     if stop[0] or contacts.n_events < 0:
-        return _Arranged(0, 0, 0, 0, False, room + 1)
+        return _Arrangement(0, 0, 0, 0, False, room + 1)
     n_contacts = contacts.n_events  # chains and nodes: one for each event, and each vertex that is a node
     for ring in range(n_rings):
         w.unions.is_node[w.given.tops[ring]] = 1
     for i in range(n):
         n_contacts += int(w.unions.is_node[i] != 0)
     if n_contacts > room:
-        return _Arranged(0, 0, 0, 0, False, n_contacts)
+        return _Arrangement(0, 0, 0, 0, False, n_contacts)
     are_clear = sort_events(edges, w.events, w.along, w.unions, n, contacts.n_events, stop)
     if stop[0]:
         return _NONE
-    if nesting.rule == Rule.PAIR and do_nothing_but_cross(w.given, w.events, contacts, n_rings, kept):
-        n_found, n_points = walk_crossings(
-            w.given, w.events, w.along, w.chains.at, w.tree.marks, kept, contacts.n_crossings, w.found, stop
+    if nesting.rule == Rule.PAIR and has_only_proper_crossings(w.given, w.events, contacts, n_rings, selected):
+        n_boundary, n_points = walk_crossings(
+            w.given, w.events, w.along, w.chains.at, w.tree.marks, selected, contacts.n_crossings, w.rings, stop
         )
     else:
-        n_found, n_points = _arrange_chains(w, loaded, kept, nesting, contacts, stop)
-    if n_found == NO_ROOM:
-        return _Arranged(0, 0, 0, 0, False, room + 1)
+        n_boundary, n_points = _arrange_chains(w, loaded, selected, nesting, contacts, stop)
+    if n_boundary == NO_ROOM:
+        return _Arrangement(0, 0, 0, 0, False, room + 1)
     is_clear = is_clear and contacts.are_far and are_clear and corners_are_clear(edges, n, w.along, margin, stop)
-    return _Arranged(n_found, n_points, contacts.n_crossings, contacts.n_exact, is_clear, n_contacts)
+    return _Arrangement(n_boundary, n_points, contacts.n_crossings, contacts.n_exact, is_clear, n_contacts)
 
 
 @merged
 def _arrange_chains(
-    w: Workspace, loaded: Loaded, kept: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
+    w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
 ) -> tuple[int, int]:
-    """Find the boundary rings of whatever its contacts are; return their number, or NO_ROOM, and that of their points.
+    """Find the boundary rings by chains and faces; return their number, or NO_ROOM, and the number of their points.
 
-    Where the call is to end, nothing found is right.
+    If ``stop`` is set, the result is invalid.
     """
     n, n_rings, edges, n_crossings = loaded.n, loaded.n_rings, w.given.edges, contacts.n_crossings
     w.stars.node_of[: n + n_crossings] = -1
@@ -202,41 +205,42 @@ def _arrange_chains(
     n_cycles = number_cycles(w.chains, w.stars, w.faces.cycle, n_chains, stop)
     if stop[0]:
         return 0, 0
-    join_faces(w, w.found.point, (n, n_cycles, loaded.n_runs), stop)
+    join_faces(w, w.rings.point, (n, n_cycles, loaded.n_runs), stop)
     if stop[0]:
         return 0, 0
-    tells = nesting.rule == Rule.AGAIN
-    n_entries = spread_sources(w.given, w.chains, w.faces, nesting, w.holders, kept, (n_chains, n_cycles), stop)
+    has_provenance = nesting.rule == Rule.AGAIN
+    n_entries = propagate_labels(w.given, w.chains, w.faces, nesting, w.flood, selected, (n_chains, n_cycles), stop)
     if n_entries == NO_ROOM:
         return NO_ROOM, 0
     mark_boundary(w.chains, w.faces, n_chains, stop)
     join_regions(w.chains, w.stars, w.faces, nesting.rule != Rule.PAIR, (n_chains, n_crossings, n_nodes), stop)
-    if tells:
-        gather_evidence(w.faces, w.holders, n_entries, n_cycles, nesting.shells.shape[0], stop)
+    if has_provenance:
+        group_provenance_by_region(w.faces, w.flood, n_entries, n_cycles, nesting.shells.shape[0], stop)
     if stop[0]:
         return 0, 0
     return walk_rings(
-        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.found, w.holders, tells,
+        edges, w.chains, w.stars, w.faces, w.tree.marks, w.walk, w.rings, w.flood, has_provenance,
         (n_chains, n_nodes, n, n_crossings), stop,
     )  # fmt: skip
 
 
 @merged
-def _round(w: Workspace, n: int, arranged: _Arranged, stop: FlagArray) -> tuple[float, bool]:
-    """Round the points of the rings; return how far one moved, or LOST, and whether the rings are surely valid."""
-    found, rounded, n_found, n_points = w.found, w.rounded, arranged.n_found, arranged.n_points
-    farthest = round_points(w.given.edges, w.events, found.point, n, arranged.n_crossings, n_points, rounded, stop)
+def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tuple[float, bool]:
+    """Round the points of the rings; return the largest displacement, or LOST, and whether they are proven valid."""
+    rings, rounded, n_boundary, n_points = w.rings, w.rounded, arranged.n_boundary, arranged.n_points
+    farthest = round_points(w.given.edges, w.events, rings.point, n, arranged.n_crossings, n_points, rounded, stop)
     if farthest <= 0.0:
         return farthest, farthest == 0.0
-    is_valid = not has_straight_point(found, n_found, rounded, stop) and (
+    is_valid = not has_straight_point(rings, n_boundary, rounded, stop) and (
         arranged.is_clear
-        or certify(found, n_found, n_points, rounded, w.tree, w.chains.at, w.stars.node_of, stop)
+        or certify(rings, n_boundary, n_points, rounded, w.tree, w.chains.at, w.stars.node_of, stop)
     )  # fmt: skip
     return farthest, is_valid
 
 
 @merged
-def _ended(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
+def _progress(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
+    """Return what `overlay_pairs` returns."""
     n_vertices, n_rings, n_pieces, n_evidence = filled
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 
@@ -244,37 +248,37 @@ def _ended(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int,
 @kernel
 def overlay_pairs(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, begin: int, reduced: Loaded,
-    kept: FlagArray, nesting: Nesting, stop: FlagArray, words: IntArray, outcomes: Outcomes,
+    selected: FlagArray, nesting: Nesting, stop: FlagArray, addresses: IntArray, outcomes: Outcomes,
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
-    """Overlay the pairs from ``begin`` on; fill outcomes, by pair, and the output of words from its beginning.
+    """Overlay the pairs from ``begin`` on; fill ``outcomes`` by pair, and the output from its beginning.
 
-    subject_items, clip_items: the first ring of each polygon, and the end of the last one's.
-    kept: (4,) uint8 by label (bit 0: in the subject, bit 1: in the clip), of more than one part where some are above 1.
-    nesting: of the rule PAIR; without clips, and kept all but the first, of the rings of subjects (ring_nesting.py).
-    reduced: what reduce_pair returned for the only pair; no vertices, no such pair.
-    words: of a `Scratch`. stop: one uint8, polled.
+    Returns the pair reached, FINISHED or NEEDS_..., the numbers of vertices, rings, pieces and evidence rows,
+    and the number of vertices left out.
 
-    Returns the pair reached, FINISHED or what is needed to go on with it, the numbers of vertices, rings, pieces and
-    rows of evidence written, and how many vertices are left out.
+    | parameter | meaning |
+    | --- | --- |
+    | subject_items, clip_items | (n + 1,) int64, the first ring of each polygon, and the end |
+    | reduced | result of `reduce_pair` for the only pair; without vertices: not reduced |
+    | selected | (4,) uint8, by label (bit 0: in the subject, bit 1: in the clip) the part of the result, 0: outside |
+    | nesting | fill rule; all but PAIR take the rings of subjects, no clips, and all labels selected but the first |
+    | stop | (1,) uint8, polled |
+    | addresses | of a `Scratch` |
 
-    Output (`Output`), row by row:
+    | output | dtype, shape | meaning |
+    | --- | --- | --- |
+    | vertices, sources | float64 (n, 2), int32 (n, 2) | vertices of boundary rings, and the source of each |
+    | rings, pieces | int64 (r,), int64 (p,) | offsets of rings into vertices, of pieces into rings |
+    | evidence | int64 (e, 2) | rule AGAIN: a ring and its source ring; several parts: a ring and its part |
 
-        vertices   (n, 2) float64   vertices of boundary rings
-        sources    (n, 2) int32     where each comes from, see below
-        rings      (r,) int64       offsets of rings into vertices
-        pieces     (p,) int64       offsets of pieces into rings
-        evidence   (e, 2) int64     by the rule AGAIN, of each ring the rings it comes from, counted from the pair's
-                                    first; where kept is above 1, of each ring its number and its part
-
-    A row of sources, edges named by their first vertices, vertices counted from the pair's first, clips after subjects:
-
-        v, -1        input vertex v; the ring goes on along an edge of v
-        v, -3 - e    input vertex v; the ring goes on along edge e
-        v, LEFT_OUT  input vertex v; the vertices up to the next source are left out
-        e, f         where edges e and f cross; the ring goes on along e
+    | row of sources | meaning; vertices are numbered within the pair, subject first, edges by their first vertices |
+    | --- | --- |
+    | v, -1 | input vertex v; the ring continues along an edge of v |
+    | v, -3 - e | input vertex v; the ring continues along edge e |
+    | v, LEFT_OUT | input vertex v; the vertices up to the next source are left out |
+    | e, f | the crossing of edges e and f; the ring continues along e |
     """
-    w, output = rows_of(words), output_at(words)
-    is_intersection = not (kept[0] or kept[1] or kept[2])
+    w, output = workspace_at(addresses), output_at(addresses)
+    is_intersection = not (selected[0] or selected[1] or selected[2])
     filled = Filled(0, 0, 0, 0)
     n_left_out = 0
     status, counts, displacement = outcomes.status, outcomes.counts, outcomes.displacement
@@ -297,51 +301,53 @@ def overlay_pairs(
                 if m != GENERAL:
                     if not has_room(output, filled, m, 1):
                         counts[pair, 1], counts[pair, 2] = 1, m
-                        return _ended(pair, NEEDS_OUTPUT, filled, 0)
+                        return _progress(pair, NEEDS_OUTPUT, filled, 0)
                     if m > 0:
                         write_convex(w, m, low, output, filled)
                         filled = Filled(filled.n_vertices + m, filled.n_rings + 1, filled.n_pieces + 1, 0)
                         counts[pair, 0], counts[pair, 1], counts[pair, 2] = 1, 1, m
                     status[pair], displacement[pair] = PairStatus.DONE, moved_by
                     continue
-            n, n_rings, safe = _load_pair(w, subjects, clips, span, common, kept, nesting.rule != Rule.PAIR, stop)
+            n, n_rings, is_in_range = _load_pair(
+                w, subjects, clips, span, common, selected, nesting.rule != Rule.PAIR, stop
+            )
             loaded = Loaded(n, n_rings, 0, max(magnitude(subject_box), magnitude(clip_box)))
-            if not (safe and loaded.largest <= LARGEST):
+            if not (is_in_range and loaded.largest <= LARGEST):
                 continue
         first, end = span.first, span.first_end
         own = Nesting(nesting.shells[first:end], nesting.sizes[first:end], nesting.rule)
-        arranged = _arrange(w, loaded, kept, own, stop)
+        arranged = _arrange(w, loaded, selected, own, stop)
         if stop[0]:
             break
         if arranged.n_contacts > w.along.order.shape[0] - 9:
-            return _ended(pair, NEEDS_CONTACTS, filled, 0)
+            return _progress(pair, NEEDS_CONTACTS, filled, 0)
         moved_by, is_valid = _round(w, loaded.n, arranged, stop)
         if moved_by == LOST:
             continue
-        n_found, m = arranged.n_found, arranged.n_points
-        n_pieces = rank_rings(w.found, n_found, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree.boxes, stop)
+        n_boundary, m = arranged.n_boundary, arranged.n_points
+        n_pieces = rank_rings(w.rings, n_boundary, w.rounded, w.ranking, is_valid, w.faces.joined, w.tree.boxes, stop)
         if stop[0]:
             break
         if n_pieces < 0:
             continue
-        if not has_room(output, filled, m, n_found):
-            counts[pair, 1], counts[pair, 2] = n_found, m
-            return _ended(pair, NEEDS_OUTPUT, filled, 0)
+        if not has_room(output, filled, m, n_boundary):
+            counts[pair, 1], counts[pair, 2] = n_boundary, m
+            return _progress(pair, NEEDS_OUTPUT, filled, 0)
         n_evidence = 0
         if nesting.rule == Rule.AGAIN:
-            n_evidence = tell_evidence(w, n_found, span.first, output, filled)
-        elif kept[3] > 1:
-            n_evidence = tell_parts(w, n_found, output, filled)
+            n_evidence = write_provenance(w, n_boundary, span.first, output, filled)
+        elif selected[3] > 1:
+            n_evidence = write_component_ids(w, n_boundary, output, filled)
         if n_evidence == NO_ROOM:
             counts[pair, 2] = 2 * output.vertices.shape[0]
-            return _ended(pair, NEEDS_OUTPUT, filled, 0)
-        write_rings(w, loaded.n, n_found, output, filled, stop)
+            return _progress(pair, NEEDS_OUTPUT, filled, 0)
+        write_rings(w, loaded.n, n_boundary, output, filled, stop)
         if stop[0]:
             break
         if loaded.n_runs > 0:
-            for ring in range(n_found):
+            for ring in range(n_boundary):
                 n_left_out += count_left_out(output.sources, output.rings[ring], output.rings[ring + 1])
-        filled = Filled(filled.n_vertices + m, filled.n_rings + n_found, filled.n_pieces + n_pieces, n_evidence)
-        counts[pair, 0], counts[pair, 1], counts[pair, 2], counts[pair, 3] = n_pieces, n_found, m, arranged.n_exact
+        filled = Filled(filled.n_vertices + m, filled.n_rings + n_boundary, filled.n_pieces + n_pieces, n_evidence)
+        counts[pair, 0], counts[pair, 1], counts[pair, 2], counts[pair, 3] = n_pieces, n_boundary, m, arranged.n_exact
         status[pair], displacement[pair] = (PairStatus.DONE if is_valid else PairStatus.MAY_CROSS), moved_by
-    return _ended(status.shape[0], FINISHED, filled, n_left_out)
+    return _progress(status.shape[0], FINISHED, filled, n_left_out)

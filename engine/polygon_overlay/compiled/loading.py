@@ -1,7 +1,7 @@
-"""Rings of two polygons as one set of edges: without repeated points, and without what lies beyond the result.
+"""Rings of two polygons as one set of edges: without repeated points, and without what lies far outside the result.
 
-What lies outside of the other polygon's box and cannot be in the result is cut short at once: vertices that follow each
-other beyond one side of the common box give way to the first and the last of them, which moves the boundary there only.
+What lies outside the other polygon's box and cannot be in the result is shortened: of consecutive vertices beyond one
+side of the common box the first and the last stay, which moves the boundary there only.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
 
 LEFT_OUT: Final = -2
-"""Second source of a vertex after which those up to the next one are left out."""
+"""Second source of a vertex after which vertices up to the next source are left out."""
 
 
 class RingArrays(NamedTuple):
@@ -41,8 +41,9 @@ class RingArrays(NamedTuple):
 
 
 class Given(NamedTuple):
-    """The rings of both polygons: their edges, by vertex its number in the input, by ring its top vertex (rightmost,
-    then highest) and the mask of its source."""
+    """The rings of both polygons: edges; by vertex its number in the input; by ring its top vertex (x, then y) and the
+    mask of its source.
+    """
 
     edges: Edges
     origins: Any
@@ -51,7 +52,7 @@ class Given(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """How many vertices, rings, and edges that stand for many (runs); the largest coordinate, without its sign."""
+    """Numbers of vertices, rings, and edges that stand for many (runs); the largest magnitude of a coordinate."""
 
     n: int
     n_rings: int
@@ -61,7 +62,7 @@ class Loaded(NamedTuple):
 
 @merged
 def is_before(vertices: FloatArray, i: int, j: int) -> bool:
-    """Tell whether vertex i is further left than j, or as far and lower."""
+    """Return whether vertex i is lexicographically smaller than j (x, then y)."""
     return vertices[i, 0] < vertices[j, 0] or (vertices[i, 0] == vertices[j, 0] and vertices[i, 1] < vertices[j, 1])
 
 
@@ -92,13 +93,13 @@ def load_rings(
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
 
-    is_named: the mask of each ring is its number instead, from ``first_ring`` on. base: what is added to the number of
-    a vertex in ``origins``. box: of vertices beyond one of its sides, one after another, the first and the last count.
+    is_named: the mask of each ring is its number from ``first_ring`` on. base: offset of vertex numbers in ``origins``.
+    box: of consecutive vertices beyond one of its sides the first and the last stay.
     """
     vertices, offsets = rings.vertices, rings.offsets
     x_min, x_max, y_min, y_max = box
     x, y, origins = given.edges.x, given.edges.y, given.origins
-    safe = True
+    is_in_range = True
     for ring in range(first_ring, last_ring):
         start = n
         qx = qy = np.nan  # the last vertex
@@ -107,7 +108,7 @@ def load_rings(
             if k & POLL == 0 and stop[0]:
                 return 0, 0, False
             px, py = vertices[k, 0], vertices[k, 1]
-            safe &= ((abs(px) >= SMALLEST) | (px == 0.0)) & ((abs(py) >= SMALLEST) | (py == 0.0))
+            is_in_range &= ((abs(px) >= SMALLEST) | (px == 0.0)) & ((abs(py) >= SMALLEST) | (py == 0.0))
             if px == qx and py == qy:
                 origins[n - 1] = base + k  # the next edge begins here
                 continue
@@ -124,12 +125,12 @@ def load_rings(
             x[n], y[n], origins[n] = px, py, base + k
             n += 1
         n, n_rings = end_ring(given, start, n, n_rings, ring - first_ring if is_named else mask)
-    return n, n_rings, safe
+    return n, n_rings, is_in_range
 
 
 @inline
 def box_of(vertices: FloatArray, first: int, last: int) -> Box:
-    """Return x_min, x_max, y_min, y_max of some vertices; inverted where there is none."""
+    """Return the box of some vertices; inverted where there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
     for k in range(first, last):
@@ -141,28 +142,27 @@ def box_of(vertices: FloatArray, first: int, last: int) -> Box:
 
 @inline
 def magnitude(box: Box) -> float:
-    """Return the largest coordinate of a box, without its sign; 0 of an inverted one."""
+    """Return the largest magnitude of a coordinate of a box; 0 for an inverted one."""
     return max(-box[0], box[1], -box[2], box[3]) if box[0] <= box[1] else 0.0
 
 
 @inline
 def common_box(box: Box, other: Box) -> Box:
-    """Return what two boxes have in common."""
+    """Return the intersection of two boxes."""
     return max(box[0], other[0]), min(box[1], other[1]), max(box[2], other[2]), min(box[3], other[3])
 
 
 @inline
 def is_empty(box: Box) -> bool:
-    """Tell whether a box has no point."""
+    """Return whether a box has no point."""
     return box[0] > box[1] or box[2] > box[3]
 
 
 @inline
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArray) -> float:
-    """Fill the box of every edge, with a margin around it, and its mark; return the least length of an edge.
+    """Fill the box of every edge, enlarged by the margin, and its mark; return the least max(|dx|, |dy|) of an edge.
 
-    Its length is the larger of both coordinates'. BENT: where `find_contacts` would not be in doubt either that this
-    edge and the one before it have a vertex in common and no more; numbers are those of its `turns`.
+    BENT: `find_contacts` would prove, by the same `turns`, that this edge and the one before it share one vertex only.
     """
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
@@ -193,7 +193,7 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArr
 
 @inline
 def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> None:
-    """Give the edges that stand for many a mark, and boxes that meet none; the ring turns at the ends of each."""
+    """Mark the edges that stand for many, and give them boxes that intersect none; the ring turns at both ends."""
     for k in range(n_runs):
         e = runs[k]
         tree.marks[e] = ANYWHERE | BENT | RUN
@@ -203,7 +203,7 @@ def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> Non
 
 @kernel
 def find_most(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[int, int]:
-    """Return the most vertices, and the most rings, that a polygon has."""
+    """Return the largest numbers of vertices and of rings of a polygon."""
     n_vertices = n_rings = 0
     for k in range(polygon_offsets.shape[0] - 1):
         first, end = polygon_offsets[k], polygon_offsets[k + 1]

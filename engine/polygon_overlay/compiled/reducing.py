@@ -1,15 +1,15 @@
-"""Two large polygons as few edges: what meets nothing is left out, and put in place again in the boundary rings.
+r"""Reduction of two large polygons to few edges: runs of blocks that meet nothing are left out, and reinserted
+afterwards.
 
-    o--o--o--o--o--o--o--o--o--o--o--o      Rings are cut into blocks. Edges of those that are near another one stay
-        \\ active  /     run                 as they are; of a run of other blocks only its ends and two more vertices
-         o--o--o--o - - - - - - o--o--o      stay, and edges that stand for what is between: a RUN edge meets nothing,
-                                             and leaves no node.
+    o--o--o--o--o--o--o--o--o--o--o--o      Rings are cut into blocks. Edges of active blocks stay as they are; of a
+        \  active  /     run                 run of other blocks its ends, its extreme vertices and their neighbours
+         o--o--o--o - - - - - - o--o--o      stay, joined by edges (RUN) that meet nothing and leave no node.
 
-Everything that the overlay asks of a vertex, it asks where both of its edges are real:
+Everything that the overlay needs of a vertex, it needs where both of its edges are real:
 
 - nodes are on edges of active blocks, and the top of each ring;
 - boundary rings turn at every vertex of a run, so all of them are in the result, or none;
-- a ring begins at its leftmost vertex: that of each run, and the two beside it, stay too;
+- a ring begins at its smallest vertex: that of each run, and its two neighbours, stay too;
 - what rounding moves is at nodes, and their neighbours in a boundary ring are two edges from the inside of a run.
 """
 
@@ -34,21 +34,21 @@ from engine.polygon_overlay.compiled.loading import (
 from engine.polygon_overlay.compiled.ring_blocks import (
     EVERYWHERE,
     Blocks,
+    activate_blocks_above,
+    activate_blocks_near,
     box_of_blocks,
     count_active,
     load_blocks,
     mark_blocks,
-    wake_above,
-    wake_near,
 )
-from engine.polygon_overlay.compiled.workspace import rows_of
+from engine.polygon_overlay.compiled.workspace import workspace_at
 from engine.predicates.expansion import LARGEST, is_safe
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 
 @inline
 def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
-    """Return the rightmost vertex, the highest of such, of the blocks of a ring."""
+    """Return the lexicographically largest vertex (x, then y) of the blocks of a ring."""
     x_max = blocks.boxes[begin, 1]
     for i in range(begin + 1, end):
         x_max = max(x_max, blocks.boxes[i, 1])
@@ -64,7 +64,7 @@ def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
 
 @inline
 def _low_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
-    """Return the leftmost vertex, the lowest of such, of a run of blocks; any one if the end of the last is lower."""
+    """Return the lexicographically smallest vertex (x, then y) of a run of blocks, without the end of the last."""
     x_min = blocks.boxes[begin, 0]
     for i in range(begin + 1, end):
         x_min = min(x_min, blocks.boxes[i, 0])
@@ -82,17 +82,20 @@ def _load_run(
     vertices: FloatArray, first: int, last: int, low: int, high: int, base: int, given: Given, runs: Int32Array, n: int,
     n_runs: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append what stays of the vertices first .. last: both ends, low and high, and the two beside each of these."""
+    """Append the vertices that stay of first .. last: both ends, low and high, and the neighbours of each.
+
+    Returns the numbers of vertices and runs, and whether all coordinates are in range.
+    """
     x, y = given.edges.x, given.edges.y
-    safe = True
+    is_in_range = True
     k = first
     while True:  # bound: the vertices that stay, eleven at most
         px, py = vertices[k, 0] + 0.0, vertices[k, 1] + 0.0
-        safe &= is_safe(px) & is_safe(py)
+        is_in_range &= is_safe(px) & is_safe(py)
         x[n], y[n], given.origins[n] = px, py, base + k
         n += 1
         if k == last:
-            return n, n_runs, safe
+            return n, n_runs, is_in_range
         after = last
         for stays in (first + 1, low - 1, low, low + 1, high - 1, high, high + 1, last - 1):
             if k < stays < after:
@@ -110,11 +113,11 @@ def _load_ring(
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append what stays of the blocks of a ring; return the numbers of vertices and runs, and whether all are in range.
 
-    runs: filled with the edges that stand for more than one.
+    runs: filled with the edges that stand for several.
     """
     x, y, origins = given.edges.x, given.edges.y, given.origins
     start = n
-    safe = True
+    is_in_range = True
     i = begin
     while i < end:  # bound: each turn passes one block at least
         if stop[0]:
@@ -123,7 +126,7 @@ def _load_ring(
         if blocks.is_active[i]:
             for k in range(a, blocks.last[i]):
                 px, py = vertices[k, 0], vertices[k, 1]
-                safe &= is_safe(px) & is_safe(py)
+                is_in_range &= is_safe(px) & is_safe(py)
                 if n > start and x[n - 1] == px and y[n - 1] == py:
                     origins[n - 1] = base + k  # the next edge begins here
                     continue
@@ -135,13 +138,13 @@ def _load_ring(
         while j < end and not blocks.is_active[j]:  # bound: the blocks
             j += 1
         b = blocks.last[j - 1] - 1
-        low = np.int64(_low_of(vertices, blocks, i, j))  # of one type with those beside it
-        n, n_runs, is_run_safe = _load_run(
+        low = np.int64(_low_of(vertices, blocks, i, j))  # the type of its neighbours
+        n, n_runs, is_run_in_range = _load_run(
             vertices, a, b, low, top if a <= top <= b else a, base, given, runs, n, n_runs
         )
-        safe &= is_run_safe
+        is_in_range &= is_run_in_range
         i = j
-    return n, n_runs, safe
+    return n, n_runs, is_in_range
 
 
 @inline
@@ -149,26 +152,26 @@ def _load_polygon(
     rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: IntArray,
     runs: Int32Array, reduced: Loaded, stop: FlagArray,
 ) -> tuple[Loaded, bool]:  # fmt: skip
-    """Append what stays of a polygon; return how much there is then, and whether all is in range."""
+    """Append what stays of a polygon; return the counts then, and whether all coordinates are in range."""
     n, n_rings, n_runs, largest = reduced
-    vertices, safe = rings.vertices, True
+    vertices, is_in_range = rings.vertices, True
     for i_ring in range(ring, ring + rings.offsets.shape[0] - 1):
         start = n
         begin, end = blocks.firsts[i_ring], blocks.firsts[i_ring + 1]
-        n, n_runs, is_ring_safe = _load_ring(
+        n, n_runs, is_ring_in_range = _load_ring(
             vertices, blocks, begin, end, highest[i_ring], base, given, runs, n, n_runs, stop
         )  # fmt: skip
-        safe &= is_ring_safe
+        is_in_range &= is_ring_in_range
         n, n_rings = end_ring(given, start, n, n_rings, mask)
-    return Loaded(n, n_rings, n_runs, largest), safe
+    return Loaded(n, n_rings, n_runs, largest), is_in_range
 
 
 @inline
-def _wake(
+def _activate_blocks(
     subjects: RingArrays, clips: RingArrays, blocks: Blocks, end: int, margin: float, n_most: int, tree: BoxTree,
     highest: IntArray, stop: FlagArray,
 ) -> bool:  # fmt: skip
-    """Make blocks active that are near another, or above a ring's top; tell whether few enough are."""
+    """Activate blocks near another block or above the top of a ring; return False if too many."""
     n_subject = subjects.offsets.shape[0] - 1
     n_rings = n_subject + clips.offsets.shape[0] - 1
     for i in range(end):
@@ -177,14 +180,14 @@ def _wake(
         if blocks.firsts[ring + 1] > blocks.firsts[ring]:
             tree.marks[blocks.firsts[ring + 1] - 1] = EVERYWHERE  # what follows is another ring's
     build_tree(tree, end, stop)
-    if stop[0] or not wake_near(blocks, end, 2.0 * margin, tree, n_most, stop):
+    if stop[0] or not activate_blocks_near(blocks, end, 2.0 * margin, tree, n_most, stop):
         return False
     for ring in range(n_rings):
         vertices = subjects.vertices if ring < n_subject else clips.vertices
         if blocks.firsts[ring + 1] > blocks.firsts[ring]:
             top = _top_of(vertices, blocks, blocks.firsts[ring], blocks.firsts[ring + 1])
             highest[ring] = top
-            wake_above(blocks, end, vertices[top, 0], vertices[top, 1], tree)
+            activate_blocks_above(blocks, end, vertices[top, 0], vertices[top, 1], tree)
         if stop[0]:
             return False
     return True
@@ -192,17 +195,17 @@ def _wake(
 
 @kernel
 def reduce_pair(
-    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, words: IntArray
+    subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, addresses: IntArray
 ) -> Loaded:
-    """Load the edges of two polygons into the scratch of overlay_pairs, those that meet nothing as runs.
+    """Load two polygons into the scratch of overlay_pairs, edges that meet nothing as runs.
 
-    size: edges of a block. n_most: edges that are too many to be looked at one by one.
-    There is scratch for a thousand contacts at least. Returns no vertices if it is not worth while.
+    size: edges of a block. n_most: number of active edges from which on it does not pay; then no vertices are returned.
+    There is scratch for at least a thousand contacts.
     """
-    w = rows_of(words)
+    w = workspace_at(addresses)
     n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
-        w.unions.points, w.stars.node_of, w.chains.at, w.tree.boxes, w.rounded.moved, w.found.meets, w.along.starts
+        w.unions.points, w.stars.node_of, w.chains.at, w.tree.boxes, w.rounded.moved, w.rings.meets, w.along.starts
     )
     end_subject = load_blocks(subjects, size, blocks, 0, 0, stop)
     end = load_blocks(clips, size, blocks, end_subject, n_subject, stop)
@@ -217,13 +220,15 @@ def reduce_pair(
     mark_blocks(clips, margin, blocks, n_subject, stop)
     if stop[0] or count_active(blocks, end) >= n_most:
         return Loaded(0, 0, 0, largest)
-    if not _wake(subjects, clips, blocks, end, margin, n_most, w.tree, w.components.highest, stop):
+    if not _activate_blocks(subjects, clips, blocks, end, margin, n_most, w.tree, w.components.highest, stop):
         return Loaded(0, 0, 0, largest)
-    runs, highest = w.tree.places, w.components.highest  # order: the tree is not asked any more
-    reduced, safe = _load_polygon(subjects, blocks, 0, 1, 0, w.given, highest, runs, Loaded(0, 0, 0, largest), stop)
+    runs, highest = w.tree.places, w.components.highest  # order: the tree is not used any more
+    reduced, is_in_range = _load_polygon(
+        subjects, blocks, 0, 1, 0, w.given, highest, runs, Loaded(0, 0, 0, largest), stop
+    )
     n = subjects.vertices.shape[0]
-    reduced, also_safe = _load_polygon(clips, blocks, n_subject, 2, n, w.given, highest, runs, reduced, stop)
-    return reduced if safe and also_safe and not stop[0] else Loaded(0, 0, 0, largest)
+    reduced, is_clip_in_range = _load_polygon(clips, blocks, n_subject, 2, n, w.given, highest, runs, reduced, stop)
+    return reduced if is_in_range and is_clip_in_range and not stop[0] else Loaded(0, 0, 0, largest)
 
 
 @inline
@@ -240,7 +245,7 @@ def count_left_out(sources: Int32Array, first: int, last: int) -> int:
 def _copy(
     vertices: FloatArray, source: int, base: int, step: int, n: int, made: FloatArray, made_sources: Int32Array, at: int
 ) -> None:
-    """Write n vertices, from number ``source`` on, one after another in the order of ``step``."""
+    """Write n consecutive input vertices, from number ``source`` on in the direction of ``step``, and their sources."""
     part, numbers = made[at : at + n], made_sources[at : at + n]
     if step > 0:
         given = vertices[source - base : source - base + n]
@@ -259,11 +264,10 @@ def expand_rings(
     vertices: FloatArray, sources: Int32Array, offsets: IntArray, subjects: FloatArray, clips: FloatArray,
     stop: FlagArray, made: FloatArray, made_sources: Int32Array, made_offsets: IntArray,
 ) -> None:  # fmt: skip
-    """Fill ``made``, (m, 2) float64, and ``made_sources``, (m, 2) int32, with rings and all that was left out of them.
+    """Fill ``made``, (m, 2) float64, and ``made_sources``, (m, 2) int32, with rings and the vertices left out of them.
 
-    vertices, sources, offsets: as overlay_pairs fills them. subjects, clips: (n, 2) float64 vertices. made_offsets:
-    (rings + 1,) int64, filled with where each ring begins in ``made``, and the end of the last.
-    A run is made of vertices one after another in the input, there or back.
+    vertices, sources, offsets: as of overlay_pairs. subjects, clips: (n, 2) float64 vertices. made_offsets: (rings +
+    1,) int64, filled with the offsets of rings into ``made``. A run is consecutive input vertices, in either direction.
     """
     n_subject = subjects.shape[0]
     at = made_offsets[0] = 0

@@ -1,17 +1,21 @@
-"""Areas of rings of implicit points, as certified doubles: double-doubles with a running bound.
+"""Areas of rings of implicit points, as certified doubles: double-doubles with a running error bound.
 
-Twice the area is the sum of x_k (y_k+1 - y_k-1), places counted from a vertex near the ring. A vertex is known exactly;
-the crossing of the edges ab and cd lies at a + t (b - a) with t = |w_a| / (|w_a| + |w_b|), the weights of
-crossing_signs.py: t carries their relative errors and 20 u^2, the place that of t (b - a) and 4 u^2 for each sum. In a
-sum of n terms, each is off by the errors of its factors and 12 u^2 of its size; what sums lose adds up to a second
-double, which is off by less than (2 n + n^2) u^2 of all sizes, twice over. Where a weight is less than a thousand times
-its bound both come from expansions, if exponents allow.
+Twice the area is the sum of x_k (y_k+1 - y_k-1), coordinates relative to a vertex near the ring. Error bounds, u =
+2^-53:
 
-Where the ring runs along the input for long, x is counted from a double o from which no difference is rounded: that of
-the ring's first vertex where all are between its half and its double (P. H. Sterbenz, Floating-point computation, 1974,
-theorem 4.3.1), or else zero, and then x is no larger than twice what the ring is wide.
+    vertex                       0
+    crossing of ab and cd        a + t (b - a), t = |w_a| / (|w_a| + |w_b|) (weights: crossing_signs.py)
+      error of t                 relative errors of the weights + 20 u^2; of the place: that of t (b - a) + 4 u^2 a sum
+    term of the sum              errors of its factors + 12 u^2 of its size
+    sum of n terms               its rounding errors are added up: below (2 n + n^2) u^2 of all sizes, doubled
 
-What the bound leaves open (a tie, a sum that nearly cancels, exponents near the ends) the caller settles in integers.
+Where a weight is less than a thousand times its bound both come from expansions, if exponents allow.
+
+Where the ring follows the input for long, x is relative to a double o from which no difference is rounded: the x of the
+ring's first vertex if all lie between half and twice of it (P. H. Sterbenz, Floating-point computation, 1974, theorem
+4.3.1), else zero, and then x is at most twice the width of the ring.
+
+What the bound does not decide (a tie, cancellation, extreme exponents) the caller settles in integers.
 """
 
 from __future__ import annotations
@@ -32,7 +36,7 @@ from engine.predicates.error_free import (
     dd_sub,
     fast_two_sum,
     fma,
-    surely_rounded,
+    is_correctly_rounded,
     two_diff,
     two_sum,
     workspace,
@@ -40,16 +44,17 @@ from engine.predicates.error_free import (
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 _TINY = 2.0**-1040
-"""More than what an underflow may lose in a term."""
+"""More than an underflow may lose in a term."""
 _LANES: Final = 8
 _SUMS: Final = 3 * _LANES
 _BLOCK: Final = 32
-"""Vertices, one after another in the input, whose terms are summed apart, so many at once. The sums are joined at the
-end: eight terms more are within twice the bound of as many as a block has."""
+"""Consecutive vertices of the input whose terms are summed in lanes. The sums are joined at the end: eight terms more
+are within twice the bound of a block's.
+"""
 
 
 class _Place(NamedTuple):
-    """A point, as double-doubles counted from another, and a bound of the error of each coordinate."""
+    """A point as double-doubles relative to another, and an error bound of each coordinate."""
 
     xh: float
     xl: float
@@ -59,29 +64,30 @@ class _Place(NamedTuple):
 
 
 class _Pair(NamedTuple):
-    """Polygons, and of a pair of them: first vertex of its subject, number of its vertices, first vertex of its clip;
-    known: the ring that was found last, of either polygon."""
+    """Polygons, and of a pair: first vertex of its subject, number of its vertices, first vertex of its clip;
+    last_rings: the ring located last, by side.
+    """
 
     subjects: Any
     clips: Any
     first: int
     n: int
     second: int
-    known: Any
+    last_rings: Any
 
 
 @merged
-def _found(pair: _Pair, v: int) -> tuple[Any, int, int]:
-    """Return the vertices that vertex v of a pair is one of, its place there, and 0 or 1 as it is the subject's."""
+def _polygon_vertex(pair: _Pair, v: int) -> tuple[Any, int, int]:
+    """Return the array that contains vertex v of a pair, its index there, and its side (0: subject, 1: clip)."""
     if v < pair.n:
         return pair.subjects.vertices, pair.first + v, 0
     return pair.clips.vertices, pair.second + v - pair.n, 1
 
 
 @merged
-def _end_of(vertices: FloatArray, offsets: IntArray, v: int, known: Any, side: int) -> int:
-    """Return the next vertex of the ring of vertex v that is not at its place (v if there is none)."""
-    low, n = int(known[side]), offsets.shape[0] - 1
+def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, side: int) -> int:
+    """Return the next distinct vertex of the ring of vertex v (v if there is none)."""
+    low, n = int(last_rings[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
         low = (v - offsets[0]) * n // (offsets[n] - offsets[0])  # where all rings are of one size
     if not offsets[low] <= v < offsets[low + 1]:
@@ -92,7 +98,7 @@ def _end_of(vertices: FloatArray, offsets: IntArray, v: int, known: Any, side: i
                 low = middle
             else:
                 high = middle
-    known[side] = low
+    last_rings[side] = low
     start, stop = offsets[low], offsets[low + 1]
     after = v
     for _ in range(stop - start):
@@ -104,15 +110,15 @@ def _end_of(vertices: FloatArray, offsets: IntArray, v: int, known: Any, side: i
 
 @merged
 def _edge(pair: _Pair, e: int) -> Ends:
-    """Return the ends of the edge that begins with vertex e."""
-    vertices, v, side = _found(pair, e)
-    after = _end_of(vertices, pair.clips.offsets if side else pair.subjects.offsets, v, pair.known, side)
+    """Return the ends of the edge that begins at vertex e."""
+    vertices, v, side = _polygon_vertex(pair, e)
+    after = _end_of(vertices, pair.clips.offsets if side else pair.subjects.offsets, v, pair.last_rings, side)
     return vertices[v, 0], vertices[v, 1], vertices[after, 0], vertices[after, 1]
 
 
 @merged
-def _exactly(x: float, y: float, ox: float, oy: float) -> _Place:
-    """Return a point of doubles, counted from o."""
+def _place_of_doubles(x: float, y: float, ox: float, oy: float) -> _Place:
+    """Return a point of doubles relative to o, exactly."""
     xh, xl = two_diff(x, ox)
     yh, yl = two_diff(y, oy)
     return _Place(xh, xl, yh, yl, 0.0)
@@ -120,11 +126,11 @@ def _exactly(x: float, y: float, ox: float, oy: float) -> _Place:
 
 @inline
 def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
-    """Return where two edges cross, counted from o; exactly where both run along the axes."""
+    """Return the crossing of two edges relative to o; exact where both are axis-parallel."""
     ends, others = _edge(pair, e), _edge(pair, f)
-    (x, knows_x), (y, knows_y) = common_places(ends, others)
-    if knows_x and knows_y:
-        return _exactly(x, y, ox, oy)
+    (x, has_x), (y, has_y) = common_places(ends, others)
+    if has_x and has_y:
+        return _place_of_doubles(x, y, ox, oy)
     ax, ay, bx, by = ends
     ah, al, bh, bl, relative = weights_of(ends, others)
     sum_h, sum_l = dd_add(ah, al, bh, bl)
@@ -144,16 +150,16 @@ def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
 
 @inline
 def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _Place:
-    """Return point k, counted from o."""
+    """Return point k relative to o."""
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
-    vertices, v, _ = _found(pair, sources[k, 0])
-    return _exactly(vertices[v, 0], vertices[v, 1], ox, oy)
+    vertices, v, _ = _polygon_vertex(pair, sources[k, 0])
+    return _place_of_doubles(vertices[v, 0], vertices[v, 1], ox, oy)
 
 
 @merged
 def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
-    """Tell whether `_BLOCK` points and two, from ``first`` on, are vertices that follow each other in the input."""
+    """Return whether `_BLOCK` + 2 points, from ``first`` on, are consecutive vertices of the input."""
     last = first + _BLOCK + 1
     v, w = sources[first, 0], sources[last, 0]
     if abs(w - v) != last - first or (v < pair.n) != (w < pair.n):
@@ -168,9 +174,10 @@ def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
 
 @merged
 def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
-    """Add the terms of `_BLOCK` vertices, those between the first and the last; tell whether ``ox`` is as needed.
+    """Add the terms of `_BLOCK` vertices, without the first and the last; return whether no difference to ``ox`` is
+    rounded.
 
-    sums: (3, LANES) totals, what they lost, and sizes. sign: -1 where they are the ring's from the last to the first.
+    sums: (3, LANES) totals, rounding errors, and sizes. sign: -1 where the ring runs from the last to the first.
     """
     low, high = (min(0.5 * ox, 2.0 * ox), max(0.5 * ox, 2.0 * ox)) if ox != 0.0 else (-np.inf, np.inf)
     is_exact = True
@@ -189,11 +196,11 @@ def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
 
 @inline
 def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tuple[float, float, float, float]:
-    """Return twice the area of a ring as a double-double, the bound of its terms, and the sum of their sizes."""
-    vertices, v, _ = _found(pair, sources[first, 0])
+    """Return twice the area of a ring as a double-double, the error bound of its terms, and the sum of their sizes."""
+    vertices, v, _ = _polygon_vertex(pair, sources[first, 0])
     ox, n = vertices[v, 0], (last - first) >> 2
     for k in range(first, last if n > _BLOCK else first, max(n, 1)):  # the others are likely to be like these
-        some, at, _ = _found(pair, sources[k, 0])
+        some, at, _ = _polygon_vertex(pair, sources[k, 0])
         ox = ox if abs(some[at, 0] - 1.25 * ox) <= 0.75 * abs(ox) else 0.0
     total = rest = size = 0.0
     error = -1.0
@@ -207,7 +214,7 @@ def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tupl
 def _twice_area_from(
     pair: _Pair, sources: Int32Array, first: int, last: int, ox: float, oy: float
 ) -> tuple[float, float, float, float]:
-    """Return what `_twice_area` does, places counted from o; a bound below 0 where that must be zero."""
+    """Return the result of `_twice_area` relative to o; an error below 0 if only zero will do for ``ox``."""
     before = _place(pair, sources, last - 1, ox, oy)
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
@@ -220,7 +227,7 @@ def _twice_area_from(
         begin = k
         while first < k < last - _BLOCK and _is_stretch(pair, sources, k - 1):  # bound: each turn passes points
             low, high = sources[k - 1, 0], sources[k + _BLOCK, 0]
-            some, v, _ = _found(pair, min(low, high))
+            some, v, _ = _polygon_vertex(pair, min(low, high))
             if not _sum_block(some[v : v + _BLOCK + 2], ox, 1.0 if low < high else -1.0, sums):
                 return 0.0, 0.0, -1.0, 0.0
             k += _BLOCK
@@ -252,18 +259,19 @@ def sum_areas(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, sources: Int32Array,
     offsets: IntArray, groups: IntArray, stop: FlagArray, areas: FloatArray,
 ) -> int:  # fmt: skip
-    """Fill ``areas``, (n,) float64, with the doubles nearest to the areas of some rings each, NaN where that is unsure.
+    """Fill ``areas``, (n,) float64, with the nearest doubles of summed ring areas, NaN where uncertified; return their
+    number.
 
     subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or one for all. sources,
-    offsets: of rings, as overlay_pairs fills them. groups: (n + 1,) int64 into the rings. Returns how many are unsure.
+    offsets: of rings, as of overlay_pairs. groups: (n + 1,) int64 offsets into the rings.
     """
-    n_unsure = 0
-    known = workspace(2)
-    known[0] = known[1] = 0.0
+    n_uncertified = 0
+    last_rings = workspace(2)
+    last_rings[0] = last_rings[1] = 0.0
     for k in range(areas.shape[0]):
         number = min(k, subject_items.shape[0] - 2)
         first, end = subjects.offsets[subject_items[number]], subjects.offsets[subject_items[number + 1]]
-        pair = _Pair(subjects, clips, first, end - first, clips.offsets[clip_items[number]], known)
+        pair = _Pair(subjects, clips, first, end - first, clips.offsets[clip_items[number]], last_rings)
         total_h = total_l = error = size = 0.0
         n_points = 0
         for ring in range(groups[k], groups[k + 1]):
@@ -275,7 +283,7 @@ def sum_areas(
             n_points += offsets[ring + 1] - offsets[ring]
         n = float(n_points)
         bound = 1.001 * (error + (16.0 + 4.0 * n + 2.0 * n * n) * U2 * size) + n_points * _TINY
-        is_sure = n_points == 0 or surely_rounded(total_h, total_l, bound + 4.0 * U2 * abs(total_h))
-        areas[k] = (total_h + total_l) / 2.0 + 0.0 if is_sure else float("nan")
-        n_unsure += not is_sure
-    return n_unsure
+        is_certified = n_points == 0 or is_correctly_rounded(total_h, total_l, bound + 4.0 * U2 * abs(total_h))
+        areas[k] = (total_h + total_l) / 2.0 + 0.0 if is_certified else float("nan")
+        n_uncertified += not is_certified
+    return n_uncertified

@@ -1,14 +1,12 @@
-"""Rings as blocks of edges, so that those that meet nothing need not be looked at one by one.
+"""Blocks of consecutive edges, so that edges far from all others are not tested one by one.
 
-    ring  o--o--o--o--o--o--o--o--o--o      a block is so many consecutive edges, with their box, and which way
-          |  block  |  block  |  block      all of them head: right, left, up or down by more than the margin
+    ring  o--o--o--o--o--o--o--o--o--o      a block is so many consecutive edges, their box, and the directions
+          |  block  |  block  |  block      (right, left, up, down) in which all advance by more than the margin
 
-Edges of blocks that head one way together, one after another, have only their common vertices in common.
-
-To be looked at edge by edge, or active, are blocks near another one, and those above a ring's top, found by the walk of
-edge_tree.py. All others meet nothing, by the margin of clearance.py: their boxes are further from all others than that,
-but for the blocks before and after that head the same way, whose edges advance by more than the margin each. So are
-edges of the same block.
+Consecutive blocks with a common direction share only vertices. Active blocks (tested edge by edge) are those near
+another one, by the traversal of edge_tree.py, and those above the top of a ring. All others meet nothing, by the margin
+of clearance.py: their boxes are further from all others than that, but for the neighbours with a common direction,
+whose edges advance by more than the margin each; so do the edges within a block.
 """
 
 from __future__ import annotations
@@ -29,14 +27,21 @@ NOT_LEFT: Final = 4
 NOT_UP: Final = 8
 NOT_DOWN: Final = 16
 EVERYWHERE: Final = NOT_RIGHT | NOT_LEFT | NOT_UP | NOT_DOWN
-"""Marks of a block some edge of which does not head that way, and of one whose edges head no way together."""
+"""Marks of a block: some edge does not advance in that direction; EVERYWHERE: no common direction."""
 _TURN_BOUND: Final = 4.0 * BOUND_2D
-"""Bound of a turn by the larger half of its two products: |r| <= |l| + |l - r|, so BOUND_2D (|l| + |r|) is less."""
+"""Error bound of a turn by one of its products: ``|r| <= |l| + |l - r|``, so ``BOUND_2D (|l| + |r|)`` is less."""
 
 Blocks = namedtuple("Blocks", "first last following boxes marks is_active firsts")
-"""By block: its first vertex, the number after its last edge's first vertex, the block that follows in the ring; boxes:
-x_min, x_max, y_min, y_max; marks: uint8, which way it does not head; is_active: uint8, whether its edges have to be
-looked at one by one; firsts: the first block of each ring, and the end of the last one's."""
+"""Blocks of consecutive edges.
+
+| field | by | meaning |
+| --- | --- | --- |
+| first, last | block | its first vertex; one past the first vertex of its last edge |
+| following | block | the next block of the ring |
+| boxes, marks | block | x_min, x_max, y_min, y_max; uint8, directions in which it does not advance |
+| is_active | block | uint8, its edges are tested one by one |
+| firsts | ring | its first block, and the end |
+"""
 
 
 @inline
@@ -64,7 +69,7 @@ def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int,
 
 @inline
 def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
-    """Return x_min, x_max, y_min, y_max of some blocks; inverted where there is none."""
+    """Return the box of some blocks; inverted where there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
     for i in range(first, last):
@@ -75,10 +80,10 @@ def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
 
 @inline
 def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, stop: FlagArray) -> None:
-    """Fill the marks of all blocks of rings, the block that follows each, and make those active that must be.
+    """Fill the marks and successors of all blocks of rings; activate those without a direction or with a doubtful
+    vertex.
 
-    Active are blocks that head no way, and those that may have a vertex where their ring does not turn, or one that the
-    vertex before repeats.
+    A vertex is doubtful where the ring may not turn, or which may repeat the one before.
     """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     for i_ring in range(n_rings):
@@ -113,6 +118,7 @@ def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, sto
 
 @inline
 def _way(is_right: bool, is_left: bool, is_up: bool, is_down: bool) -> int:
+    """Return the mark of a block."""
     mark = 0 if is_right else NOT_RIGHT
     mark |= 0 if is_left else NOT_LEFT
     mark |= 0 if is_up else NOT_UP
@@ -120,12 +126,12 @@ def _way(is_right: bool, is_left: bool, is_up: bool, is_down: bool) -> int:
 
 
 _VISITS: Final = 8
-"""Leaves looked at against each other, by block, beyond which looking costs more than it can save."""
+"""Visits of node pairs, by block, above which the traversal costs more than it can save."""
 
 
 @merged
 def _are_near(boxes: FloatArray, i: int, others: FloatArray, j: int, gap: float) -> bool:
-    """Tell whether two boxes may be no further apart than ``gap``."""
+    """Return whether the distance of two boxes may be at most ``gap``."""
     return (
         (boxes[i, 0] - others[j, 1] <= gap)
         & (others[j, 0] - boxes[i, 1] <= gap)
@@ -145,11 +151,10 @@ def count_active(blocks: Blocks, n: int) -> int:
 
 
 @inline
-def wake_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: FlagArray) -> bool:
-    """Make blocks active whose boxes may be no further apart than ``gap``; tell whether few enough are.
+def activate_blocks_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: FlagArray) -> bool:
+    """Activate blocks whose boxes may be within ``gap`` of another; return False if too many edges are active.
 
-    tree: built, with marks of which the last of each ring has all bits. n_most: edges of active blocks that are too
-    many.
+    tree: built, with all mark bits on the last block of each ring. n_most: number of edges that is too many.
     """
     nodes, stack = tree.nodes, tree.stack
     n_active = count_active(blocks, n)
@@ -170,21 +175,21 @@ def wake_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, st
                         stack[depth, 0], stack[depth, 1] = a, b
                         depth += 1
         else:
-            n_active += _wake_in_leaves(blocks, n, gap, tree.places, i - n_leaves, j - n_leaves)
+            n_active += _activate_in_leaves(blocks, n, gap, tree.places, i - n_leaves, j - n_leaves)
     return True
 
 
 @merged
 def _head_together(mark: int, other: int) -> bool:
-    """Tell whether blocks that follow each other, with these marks, head one way together."""
+    """Return whether consecutive blocks with these marks have a common direction."""
     return (mark | other) & EVERYWHERE != EVERYWHERE
 
 
 @inline
-def _wake_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf: int, other: int) -> int:
-    """Make active those of two leaves that are near each other; return how many edges these are, not active before."""
+def _activate_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf: int, other: int) -> int:
+    """Activate the blocks of two leaves that are near each other; return the number of edges newly active."""
     first, last, boxes, marks, is_active = blocks.first, blocks.last, blocks.boxes, blocks.marks, blocks.is_active
-    n_woken = 0
+    n_activated = 0
     low, high = LEAF * leaf, LEAF * other
     for p in range(low, min(low + LEAF, n)):
         e = places[p]
@@ -194,16 +199,16 @@ def _wake_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf
                 continue
             if (blocks.following[e] == f or blocks.following[f] == e) and _head_together(marks[e], marks[f]):
                 continue
-            n_woken += 0 if is_active[e] else last[e] - first[e]
-            n_woken += 0 if is_active[f] else last[f] - first[f]
+            n_activated += 0 if is_active[e] else last[e] - first[e]
+            n_activated += 0 if is_active[f] else last[f] - first[f]
             is_active[e] = is_active[f] = 1
-    return n_woken
+    return n_activated
 
 
 @inline
-def wake_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxTree) -> None:
-    """Make active, of the blocks above a point, a step to its right, those that may hold what is next above it."""
-    ceiling = float("inf")  # surely above the edge that is next above the point
+def activate_blocks_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxTree) -> None:
+    """Activate the blocks that may contain the edge next above a point, a step to its right."""
+    ceiling = float("inf")  # certainly above the edge that is next above the point
     for is_searching in (True, False):
         tree.stack[0, 0], depth = 1, 1
         while depth > 0:  # bound: each node enters the stack once
@@ -227,5 +232,5 @@ def wake_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxTree) -> Non
 
 @merged
 def _is_above(boxes: FloatArray, i: int, x: float, y: float, ceiling: float) -> bool:
-    """Tell whether a box holds points above a point, a step to its right, and below a ceiling."""
+    """Return whether a box has points above a point, a step to its right, and below a ceiling."""
     return not (boxes[i, 0] > x or boxes[i, 1] <= x or boxes[i, 3] < y or boxes[i, 2] > ceiling)

@@ -1,13 +1,10 @@
 """Face labelling by a fill rule, with the provenance of rounded rings.
 
-The faces are walked as a tree, from the unbounded one and back: each step takes up or lays down the sources that it
-crosses, however many there are; of two polygons, the bits of a label. What is inside is a rule: the table of an
-operation on two polygons; where any source is (even-odd within each), or the first alone; where all rings together have
-a winding number that is not zero, positive, or negative; or that of a round of rounding:
-
-A face is inside where it lies (even-odd) in a shell and in no hole of that shell. Its evidence names those shells; that
-of a face outside names the holes that it lies in, the innermost of them: those whose shell is smallest. Evidence tells,
-part by part, what the result came from (in_integers.py states the same rule over integers of any length).
+Labels are propagated by a depth-first flood fill from the unbounded face: each step over a half-chain toggles the
+sources that bound there (for two polygons: bits of a label). `Rule` says which labels are inside. By the rule AGAIN, of
+a round of rounding, a face is inside where it lies (even-odd) in a shell and in no hole of that shell. Its evidence
+names those shells; the evidence of a face outside names the innermost holes it lies in (smallest shell). Evidence is
+the provenance of the result's parts (in_integers.py states the same rule over integers of any length).
 
     .------------------.         Rings 0 and 2 are shells, 1 is a hole of 0: shells = [0, 0, 2].
     | 0   .-----.      |
@@ -15,8 +12,6 @@ part by part, what the result came from (in_integers.py states the same rule ove
     |     '-----'   |  | 2 |        {0, 1}   in the hole of the only shell  outside            {1}
     '---------------+--'   |        {0, 2}   in two shells                  inside             {0, 2}
                     '------'        {}       in none                        outside            {}
-
-Only the few rings that a face lies in are looked at.
 
 Source: K. Weiler, P. Atherton, 1977, for two polygons; winding numbers after K. Hormann, A. Agathos, 2001.
 """
@@ -30,7 +25,7 @@ from typing import Any, Final, NamedTuple
 from engine.arrangement.union_find import root_of
 from engine.compiling.jit import called, merged
 from engine.polygon_overlay.compiled.chain_faces import Faces
-from engine.polygon_overlay.compiled.chains import Chains, is_live
+from engine.polygon_overlay.compiled.chains import Chains, is_representative
 from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.polygon_overlay.compiled.loading import Given
 from engine.types import FlagArray, Int32Array, IntArray
@@ -43,24 +38,28 @@ class Rule(IntEnum):
     """Which faces are inside."""
 
     AGAIN = 0
-    """By the shells and holes of a round of rounding."""
+    """Inside a shell and in no hole of it, after a round of rounding."""
     ANY = 1
-    """Within any source."""
+    """Inside any source."""
     NON_ZERO = 2
-    """By the winding number, as for the next two."""
+    """By winding number, like the next two."""
     POSITIVE = 3
     NEGATIVE = 4
     PAIR = 5
     """By a table over the labels of two polygons (bit 0: in the subject, bit 1: in the clip)."""
     FIRST_ALONE = 6
-    """Within source 0 and no other."""
+    """Inside source 0 and no other."""
 
 
 class Nesting(NamedTuple):
-    """AGAIN: by ring the number of its shell, its own where it is one, int64, and how large that shell is, float64.
+    """The fill rule, and what it needs by ring.
 
-    ANY, FIRST_ALONE: by ring the number of its source, no larger than that of the ring. Winding numbers: by ring any
-    number. PAIR: no rings.
+    | rule | shells (n_rings,) int64 | sizes (n_rings,) float64 |
+    | --- | --- | --- |
+    | AGAIN | the number of its shell, its own for a shell | the size of its shell |
+    | ANY, FIRST_ALONE | the number of its source, at most its own number | unused |
+    | winding numbers | unused values | unused |
+    | PAIR | empty | empty |
     """
 
     shells: Any
@@ -69,68 +68,74 @@ class Nesting(NamedTuple):
     """Of `Rule`, as an int: kernels are compiled for that."""
 
 
-Holders = namedtuple("Holders", "held place stamp link first entered ring after region beyond offset")
-"""Scratch. held: the rings that a face lies in; place: by ring its place there, or -1; stamp: by ring.
+FloodFill = namedtuple("FloodFill", "sources place stamp link first entered ring after region beyond offset")
+"""Scratch of the flood fill.
 
-link: by half-chain the next one of its face; first: by face its first; entered: by face the half-chain through which it
-was, from the other side. ring, after: by entry of evidence its ring, and the next of its region; region: by region its
-first entry. beyond: regions on the other side of the rings of the result, those of ring k from offset[k] on.
+| field | by | meaning |
+| --- | --- | --- |
+| sources | - | stack of the sources that contain the current face |
+| place, stamp | ring | its place on the stack or -1; last visitor |
+| link, first | half-chain, face | linked list of the half-chains of a face |
+| entered | face | the half-chain through which it was entered, from the other side |
+| ring, after | entry of evidence | its ring; the next entry of its region |
+| region | region | its first entry of evidence |
+| beyond, offset | ring of the result | the regions on its other side, from offset[k] on |
 """
 
 
 @merged
-def _cross(given: Given, chains: Chains, nesting: Nesting, h: Holders, half: int, n_held: int) -> int:
-    """Go over a half-chain, from its left, and take up or lay down all that it stands for; return how many are held.
+def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFill, half: int, n_sources: int) -> int:
+    """Cross a half-chain from its left and toggle all coinciding sources; return how many contain the face beyond.
 
-    Of winding numbers and labels: return the one beyond, ``n_held`` being the one here.
+    Winding numbers and labels of two polygons: ``n_sources`` is the label here, the result that beyond.
     """
     chain = half >> 1
     if nesting.rule == Rule.PAIR:
-        return n_held ^ chains.mask[chain]
+        return n_sources ^ chains.mask[chain]
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
         if Rule.NON_ZERO <= nesting.rule <= Rule.NEGATIVE:
-            n_held += 1 if (chains.stands[chain] ^ half) & 1 else -1
+            n_sources += 1 if (chains.representative[chain] ^ half) & 1 else -1
         else:
             source = ring if nesting.rule == Rule.AGAIN else nesting.shells[ring]
             if h.place[source] < 0:
-                h.place[source], h.held[n_held] = n_held, source
-                n_held += 1
+                h.place[source], h.sources[n_sources] = n_sources, source
+                n_sources += 1
             else:
-                n_held -= 1
-                last = h.held[n_held]
-                h.held[h.place[source]], h.place[last] = last, h.place[source]
+                n_sources -= 1
+                last = h.sources[n_sources]
+                h.sources[h.place[source]], h.place[last] = last, h.place[source]
                 h.place[source] = -1
         chain = chains.twin[chain]
-    return n_held
+    return n_sources
 
 
 @merged
-def _part_of(rule: int, h: Holders, kept: FlagArray, n_held: int) -> int:
-    """Return the part of the result that a face is in, 0 for none, by a rule other than AGAIN."""
+def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> int:
+    """Return the part of the result that a face belongs to, 0 for none, by a rule other than AGAIN."""
     if rule == Rule.PAIR:
-        return int(kept[n_held])
+        return int(selected[n_sources])
     if rule == Rule.FIRST_ALONE:
-        return int(n_held == 1 and h.place[0] == 0)
-    return int(n_held < 0 if rule == Rule.NEGATIVE else n_held > 0 if rule != Rule.NON_ZERO else n_held != 0)
+        return int(n_sources == 1 and h.place[0] == 0)
+    return int(n_sources < 0 if rule == Rule.NEGATIVE else n_sources > 0 if rule != Rule.NON_ZERO else n_sources != 0)
 
 
 @merged
-def _judge(nesting: Nesting, h: Holders, face: int, n_held: int, n: int) -> tuple[bool, int]:
-    """Tell whether a face is inside, and enter its evidence after n entries; return how many there are then."""
+def _classify_face(nesting: Nesting, h: FloodFill, face: int, n_sources: int, n: int) -> tuple[bool, int]:
+    """Return whether a face is inside by the rule AGAIN, and the number of entries with its evidence appended."""
     shells, sizes, room = nesting.shells, nesting.sizes, h.ring.shape[0]
     least = float("inf")
-    for k in range(n_held):
-        ring = h.held[k]
+    for k in range(n_sources):
+        ring = h.sources[k]
         if shells[ring] != ring:
             h.stamp[shells[ring]] = face
             least = min(least, sizes[ring])
     is_inside = False
-    for k in range(n_held):
-        ring = h.held[k]
+    for k in range(n_sources):
+        ring = h.sources[k]
         is_inside |= shells[ring] == ring and h.stamp[ring] != face
-    for k in range(n_held):
-        ring = h.held[k]
+    for k in range(n_sources):
+        ring = h.sources[k]
         is_shell = shells[ring] == ring
         if (is_shell and h.stamp[ring] != face) if is_inside else (not is_shell and not sizes[ring] > least):
             if n >= room:
@@ -141,14 +146,13 @@ def _judge(nesting: Nesting, h: Holders, face: int, n_held: int, n: int) -> tupl
 
 
 @called
-def spread_sources(
-    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: Holders, kept: FlagArray, sizes: tuple[int, int],
-    stop: FlagArray,
+def propagate_labels(
+    given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: FloodFill, selected: FlagArray,
+    sizes: tuple[int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill ``faces.inside`` and the entries of evidence, ``after`` with their faces; return how many, or NO_ROOM.
+    """Fill ``faces.inside`` by flood fill, and entries of evidence with their faces; return their number, or NO_ROOM.
 
-    kept: by label of two polygons the part of the result that such a face is in, or 0. sizes: the numbers of chains and
-    cycles. ``faces.joined`` joins the cycles of one face.
+    selected: see `overlay_pairs`. sizes: numbers of chains and cycles. ``faces.joined`` joins the cycles of one face.
     """
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
@@ -157,13 +161,13 @@ def spread_sources(
     for i in range(n_cycles + 1):
         h.first[i], h.entered[i] = -1, _NOT_YET
     for half in range(2 * n_chains):
-        if is_live(chains, half >> 1):
+        if is_representative(chains, half >> 1):
             face = root_of(joined, cycle[half])
             h.link[half], h.first[face] = h.first[face], half
-    n_held = n_entries = steps = 0
+    n_sources = n_entries = steps = 0
     face = root_of(joined, n_cycles)
     h.entered[face], inside[face] = -1, 0
-    while True:  # bound: each half-chain is looked at once, each face left once
+    while True:  # bound: each half-chain is visited once, each face left once
         steps += 1
         if steps & POLL == 0 and stop[0]:
             return 0
@@ -172,11 +176,11 @@ def spread_sources(
             h.first[face] = h.link[half]
             other = root_of(joined, cycle[half ^ 1])
             if h.entered[other] == _NOT_YET:
-                n_held = _cross(given, chains, nesting, h, half, n_held)
+                n_sources = _cross_half_chain(given, chains, nesting, h, half, n_sources)
                 if nesting.rule != Rule.AGAIN:
-                    inside[other] = _part_of(nesting.rule, h, kept, n_held)
+                    inside[other] = _part_of(nesting.rule, h, selected, n_sources)
                 else:
-                    inside[other], n_entries = _judge(nesting, h, other, n_held, n_entries)
+                    inside[other], n_entries = _classify_face(nesting, h, other, n_sources, n_entries)
                     if n_entries == NO_ROOM:
                         return NO_ROOM
                 h.entered[other], face = half, other
@@ -184,7 +188,7 @@ def spread_sources(
             half = h.entered[face]
             if half < 0:
                 break
-            n_held = _cross(given, chains, nesting, h, half ^ 1, n_held)
+            n_sources = _cross_half_chain(given, chains, nesting, h, half ^ 1, n_sources)
             face = root_of(joined, cycle[half])
     for i in range(n_cycles):
         inside[i] = inside[root_of(joined, i)]
@@ -192,10 +196,14 @@ def spread_sources(
 
 
 @called
-def gather_evidence(faces: Faces, h: Holders, n_entries: int, n_cycles: int, n_rings: int, stop: FlagArray) -> None:
-    """Put the entries of each region together, each ring once; ``faces.regions`` is filled."""
+def group_provenance_by_region(
+    faces: Faces, h: FloodFill, n_entries: int, n_cycles: int, n_rings: int, stop: FlagArray
+) -> None:
+    """Link the evidence entries of each region, each ring once; ``faces.regions`` is filled."""
     for i in range(n_cycles + 1):
-        h.region[i] = h.entered[i] = -1  # order: from here on `entered` tells which ring of the result was beyond last
+        h.region[i] = h.entered[
+            i
+        ] = -1  # order: from here on `entered` is by region the ring of the result last recorded
     for k in range(n_entries):
         region = root_of(faces.regions, h.after[k])
         h.after[k], h.region[region] = h.region[region], k
@@ -217,8 +225,8 @@ def gather_evidence(faces: Faces, h: Holders, n_entries: int, n_cycles: int, n_r
 
 
 @merged
-def enter_beyond(faces: Faces, h: Holders, path: Int32Array, first: int, last: int, n_rings: int) -> None:
-    """Enter the regions beyond the ring of the half-chains ``path[first:last]``."""
+def record_adjacent_regions(faces: Faces, h: FloodFill, path: Int32Array, first: int, last: int, n_rings: int) -> None:
+    """Record the regions beyond the ring of the half-chains ``path[first:last]``."""
     n = h.offset[n_rings]
     for k in range(first, last):
         region = root_of(faces.regions, faces.cycle[path[k] ^ 1])
@@ -230,11 +238,12 @@ def enter_beyond(faces: Faces, h: Holders, path: Int32Array, first: int, last: i
 
 @called
 def write_evidence(
-    h: Holders, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: IntArray, n: int
+    h: FloodFill, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: IntArray, n: int
 ) -> int:  # fmt: skip
-    """Append rows ``name``, number of a ring that a ring of the result comes from; return how many, or NO_ROOM.
+    """Append rows ``name``, source ring of one ring of the result; return the number of rows, or NO_ROOM.
 
-    A shell comes from what its own region says, a hole from what those beyond say. base: number of the first ring.
+    The sources of a shell are those of its own region, of a hole those of the regions beyond. base: number of the first
+    ring.
     """
     for at in range(h.offset[ring] if is_hole else 0, h.offset[ring + 1] if is_hole else 1):
         k = h.region[h.beyond[at] if is_hole else region]

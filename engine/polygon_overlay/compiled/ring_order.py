@@ -1,8 +1,7 @@
-"""Rings of doubles in their order: pieces by their shells, holes after their shell, each ring from its first vertex.
+"""Canonical order of rounded rings, in which they are written with the sources of vertices and the provenance of rings.
 
-So they are left in the output, with the source of each vertex, and evidence about rings.
-
-The first vertex of a ring is its leftmost, then lowest; rings are compared vertex by vertex from there on.
+Pieces are in order of their shells, holes after their shell; each ring begins at its lexicographically smallest vertex
+(x, then y), and rings are compared vertex by vertex from there.
 """
 
 from __future__ import annotations
@@ -16,23 +15,24 @@ from engine.compiling.jit import inline, merged
 from engine.polygon_overlay.compiled.chain_rings import Rings
 from engine.polygon_overlay.compiled.clearance import Rounded
 from engine.polygon_overlay.compiled.crossing_signs import turn_of_edges
-from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, RUN, box_holds
+from engine.polygon_overlay.compiled.edge_tree import OFTEN, POLL, RUN, box_contains
 from engine.polygon_overlay.compiled.loading import LEFT_OUT
 from engine.polygon_overlay.compiled.ring_nesting import NO_ROOM, write_evidence
 from engine.predicates.orientation import orient2d
 from engine.types import FlagArray, FloatArray, Int32Array, Point2
 
 Output = namedtuple("Output", "vertices sources rings pieces evidence")
-"""Pair after pair: vertices (m, 2) float64, their sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64,
-that begin with 0, evidence (m, 2) int64: a ring, and one that it comes from."""
+"""Pair after pair: vertices (m, 2) float64, sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64, beginning
+with 0, evidence (m, 2) int64: a ring, and one that it comes from.
+"""
 
 Ranking = namedtuple("Ranking", "start x y is_hole piece order spare")
-"""By ring: index of its first vertex, its place, whether it is a hole, rank of its piece; order: the rings in order."""
+"""By ring: index and place of its first vertex, whether it is a hole, rank of its piece; order: the rings in order."""
 
 
 @inline
 def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int) -> bool:
-    """Tell whether ring i stands before ring j."""
+    """Return whether ring i comes before ring j."""
     x, y = rounded.x, rounded.y
     if ranking.piece[i] != ranking.piece[j]:
         return ranking.piece[i] < ranking.piece[j]
@@ -56,9 +56,9 @@ def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int)
 
 @inline
 def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: FlagArray) -> None:
-    """Sort the first n entries of ``ranking.order``: merging runs of doubling length that are not in order.
+    """Merge-sort the first n entries of ``ranking.order``, runs of doubling length.
 
-    is_by_piece: pieces differ.
+    is_by_piece: the rings belong to several pieces.
     """
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
@@ -90,10 +90,10 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 
 @inline
 def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: FloatArray) -> bool:
-    """Fill ``ranking.is_hole`` of rings whose rounded points may turn either way; tell whether it is sure.
+    """Fill ``ranking.is_hole`` for rings whose orientation rounding may have changed; return False if it is ambiguous.
 
-    Rounding keeps order, so the rounded box of a shell holds those of its holes: the one ring of a region whose box
-    holds all others, and is no other's, is its shell. widest: scratch by region; boxes: by ring.
+    Rounding is monotone, so the rounded box of a shell contains those of its holes: the shell of a region is its only
+    ring whose box contains all others and lies in none. widest: scratch by region; boxes: by ring.
     """
     x, y = rounded.x, rounded.y
     for ring in range(n_rings):
@@ -105,11 +105,11 @@ def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, 
         boxes[ring, 0], boxes[ring, 1], boxes[ring, 2], boxes[ring, 3] = x_min, x_max, y_min, y_max
         widest[rings.region[ring]] = ring
     for ring in range(n_rings):
-        if box_holds(boxes, ring, boxes, widest[rings.region[ring]]):
+        if box_contains(boxes, ring, boxes, widest[rings.region[ring]]):
             widest[rings.region[ring]] = ring
     for ring in range(n_rings):
         shell = widest[rings.region[ring]]
-        if ring != shell and (not box_holds(boxes, shell, boxes, ring) or box_holds(boxes, ring, boxes, shell)):
+        if ring != shell and (not box_contains(boxes, shell, boxes, ring) or box_contains(boxes, ring, boxes, shell)):
             return False
         ranking.is_hole[ring] = ring != shell
     return True
@@ -120,9 +120,9 @@ def rank_rings(
     rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Int32Array,
     boxes: FloatArray, stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill ``ranking``; return the number of pieces, -1 if a region has not exactly one shell, or none that is sure.
+    """Fill ``ranking``; return the number of pieces, or -1 if a region has not exactly one proven shell.
 
-    is_valid: whether rounding left the rings what they were. piece_of: scratch by region; boxes: by ring.
+    is_valid: rounding preserved the topology of the rings. piece_of: scratch by region; boxes: by ring.
     """
     if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
@@ -161,7 +161,7 @@ def rank_rings(
 
 @inline
 def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: FlagArray) -> int:
-    """Find the first vertex of a ring, and return the sign of the turn there, 0 where the call is to end."""
+    """Find the first vertex of a ring; return the orientation sign there, 0 if ``stop`` is set."""
     x, y = rounded.x, rounded.y
     first, last = rings.offset[ring], rings.offset[ring + 1]
     low = first
@@ -176,7 +176,7 @@ def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, 
 
 
 class Filled(NamedTuple):
-    """How much output there is."""
+    """How much output is written."""
 
     n_vertices: int
     n_rings: int
@@ -186,7 +186,7 @@ class Filled(NamedTuple):
 
 @merged
 def has_room(output: Output, filled: Filled, n_vertices: int, n_rings: int) -> bool:
-    """Tell whether so much more fits into the output."""
+    """Return whether so many more vertices and rings fit the output."""
     return (filled.n_vertices + n_vertices <= output.vertices.shape[0]) & (
         filled.n_rings + n_rings < output.rings.shape[0]
     )
@@ -194,11 +194,11 @@ def has_room(output: Output, filled: Filled, n_vertices: int, n_rings: int) -> b
 
 @merged
 def write_convex(w: Any, m: int, low: int, output: Output, filled: Filled) -> None:
-    """Append the ring that `_intersect_convex` left, from its point ``low`` on."""
+    """Append the ring of `_intersect_convex`, from its point ``low`` on."""
     i = low
     for k in range(filled.n_vertices, filled.n_vertices + m):
         output.vertices[k, 0], output.vertices[k, 1] = w.rounded.x[i], w.rounded.y[i]
-        output.sources[k, 0], output.sources[k, 1] = w.found.point[i], w.tree.places[i]
+        output.sources[k, 0], output.sources[k, 1] = w.rings.point[i], w.tree.places[i]
         i = i + 1 if i + 1 < m else 0
     output.rings[filled.n_rings + 1] = filled.n_vertices + m
     output.pieces[filled.n_pieces + 1] = filled.n_rings + 1
@@ -206,24 +206,24 @@ def write_convex(w: Any, m: int, low: int, output: Output, filled: Filled) -> No
 
 @merged
 def _source_of(w: Any, n: int, i: int) -> tuple[int, int]:
-    """Return the source of point i of the rings, as `overlay_pairs` tells it."""
-    point, edge, origins = w.found.point[i], w.found.edge[i], w.given.origins
+    """Return the source of point i of the rings, encoded as in `overlay_pairs`."""
+    point, edge, origins = w.rings.point[i], w.rings.edge[i], w.given.origins
     if point >= n:
         first, second = w.events.first[point - n], w.events.second[point - n]
         is_beside = edge == first or (edge != second and turn_of_edges(w.given.edges, edge, first) == 0)
         return origins[edge], origins[second if is_beside else first]
-    if w.found.meets[i] & RUN:
+    if w.rings.meets[i] & RUN:
         return origins[point], LEFT_OUT
     return origins[point], -1 if edge == point else LEFT_OUT - 1 - origins[edge]
 
 
 @merged
-def write_rings(w: Any, n: int, n_found: int, output: Output, filled: Filled, stop: FlagArray) -> None:
-    """Append the rings in their order to the output."""
+def write_rings(w: Any, n: int, n_boundary: int, output: Output, filled: Filled, stop: FlagArray) -> None:
+    """Append the rings to the output in their order."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
-    for k in range(n_found):
-        ring = w.ranking.order[k] if n_found > 1 else 0
-        first, last = w.found.offset[ring], w.found.offset[ring + 1]
+    for k in range(n_boundary):
+        ring = w.ranking.order[k] if n_boundary > 1 else 0
+        first, last = w.rings.offset[ring], w.rings.offset[ring + 1]
         i = w.ranking.start[ring]
         for _ in range(last - first):
             if n_out & POLL == 0 and stop[0]:
@@ -239,23 +239,23 @@ def write_rings(w: Any, n: int, n_found: int, output: Output, filled: Filled, st
 
 
 @merged
-def tell_evidence(w: Any, n_found: int, first: int, output: Output, filled: Filled) -> int:
-    """Append the evidence of the rings to the output; return how much there is then, or NO_ROOM."""
+def write_provenance(w: Any, n_boundary: int, first: int, output: Output, filled: Filled) -> int:
+    """Append the source rings of each ring to the output; return the number of rows then, or NO_ROOM."""
     n = filled.n_evidence
-    for k in range(n_found):
-        ring = w.ranking.order[k] if n_found > 1 else 0
-        is_hole, region = w.ranking.is_hole[ring] != 0, w.found.region[ring]
-        n = write_evidence(w.holders, ring, region, is_hole, filled.n_rings + k, first, output.evidence, n)
+    for k in range(n_boundary):
+        ring = w.ranking.order[k] if n_boundary > 1 else 0
+        is_hole, region = w.ranking.is_hole[ring] != 0, w.rings.region[ring]
+        n = write_evidence(w.flood, ring, region, is_hole, filled.n_rings + k, first, output.evidence, n)
         if n == NO_ROOM:
             return n
     return n
 
 
 @merged
-def tell_parts(w: Any, n_found: int, output: Output, filled: Filled) -> int:
-    """Append of each ring the part of the result that it bounds; return how many rings there are then."""
-    for k in range(n_found):
-        ring = w.ranking.order[k] if n_found > 1 else 0
+def write_component_ids(w: Any, n_boundary: int, output: Output, filled: Filled) -> int:
+    """Append the part of the result that each ring bounds; return the number of rings then."""
+    for k in range(n_boundary):
+        ring = w.ranking.order[k] if n_boundary > 1 else 0
         at = filled.n_rings + k
-        output.evidence[at, 0], output.evidence[at, 1] = at, w.faces.inside[w.found.region[ring]]
-    return filled.n_rings + n_found
+        output.evidence[at, 0], output.evidence[at, 1] = at, w.faces.inside[w.rings.region[ring]]
+    return filled.n_rings + n_boundary

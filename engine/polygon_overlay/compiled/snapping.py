@@ -1,16 +1,16 @@
-"""Snap rounding of valid rings to whole numbers: which edges pass the pixels of which vertices.
+"""Snap rounding of valid rings to integer points: which edges pass the pixels of which vertices.
 
-A pixel is the half-open square of side 1 about a whole point; it is hot if a vertex lies in it. Every edge is led
-through the centres of the hot pixels that it passes: edges that met in vertices only do so again, or coincide, and none
+A pixel is the half-open unit square about an integer point; it is hot if a vertex lies in it. Every edge is routed
+through the centres of the hot pixels that it passes: edges that met in vertices only still do, or coincide, and none
 moves by more than half a diagonal.
 
-    .-----.       The edge passes the pixel unless a corner tells that it enters and leaves on one side: the corners
-    |  .  |_.--   above and below it, as it rises or falls. Sides are exact signs, of doubles and halves of whole
-    '--.--'       numbers.
+    .-----.       The edge passes the pixel unless one corner proves that it enters and leaves on one side: the corners
+    |  .  |_.--   above and below it, as it rises or falls. Sides are exact signs, of doubles and half-integers.
+    '--.--'
 
-Where no edge passes a pixel but those of its ends, and vertices share one only where they are one point, rings stay
-what they are, but for vertices that get straight: a point of ab and the one that parts the moved edge alike differ by
-less than a pixel, all the way there, so that c can come to lie on the edge only if ab passes the pixel of c.
+Where no edge passes a pixel but those of its ends, and vertices share one only where they are one point, rings keep
+their topology, but for vertices that become straight: a point of ab and the one that divides the moved edge in the same
+ratio differ by less than a pixel during the whole motion, so c can come to lie on the edge only if ab passes its pixel.
 
 Source: J. D. Hobby, Practical segment intersection with finite precision output, 1999.
 """
@@ -25,7 +25,7 @@ from engine.compiling.jit import called, inline, kernel, merged
 from engine.polygon_overlay.compiled.crossing_signs import Edges
 from engine.polygon_overlay.compiled.edge_tree import FEW, POLL, begin_pairs, build_tree, next_pairs
 from engine.polygon_overlay.compiled.loading import EVERYTHING, RingArrays, fill_boxes, is_before, load_rings
-from engine.polygon_overlay.compiled.workspace import rows_of
+from engine.polygon_overlay.compiled.workspace import workspace_at
 from engine.predicates.orientation import BOUND_2D, orient2d
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray, Point2
 
@@ -34,14 +34,14 @@ FOLDS: Final = -1
 
 @merged
 def _pixel(x: float) -> float:
-    """Return the whole number whose pixel x lies in, for less than 2^52; a half goes up."""
+    """Return the nearest integer for |x| < 2^52; halves go up."""
     near = np.rint(x)
     return near + 1.0 if x - near == 0.5 else near
 
 
 @called
 def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reach: float) -> bool:
-    """Tell whether the segment ab passes the half-open square of half-side ``reach`` about (x, y)."""
+    """Return whether the segment ab intersects the half-open square of half-side ``reach`` about (x, y)."""
     if bx < ax:
         ax, ay, bx, by = bx, by, ax, ay
     left, right, low, high = x - reach, x + reach, y - reach, y + reach
@@ -59,10 +59,9 @@ def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reac
 def scale(
     values: FloatArray, divisor: float, factor: float, more: float, near_by: float, least: float, scaled: FloatArray
 ) -> float:
-    """Fill ``scaled``, (n, 2), with values by ``divisor``, times ``factor``, times ``more``; return the largest of
-    these, without its sign.
+    """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest magnitude.
 
-    What lies within the part ``near_by`` of it of a whole number is that number then, and less than ``least`` is zero.
+    Within a relative ``near_by`` of an integer it is that integer, and below ``least`` zero.
     """
     largest = 0.0
     for k in range(values.shape[0]):
@@ -77,7 +76,7 @@ def scale(
 
 @inline
 def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> int:
-    """Fill ``pixels`` with the whole points in whose pixels vertices lie; return how many are not there already."""
+    """Fill ``pixels`` with the nearest integer points of vertices; return how many vertices differ from them."""
     n_moved = 0
     for k in range(vertices.shape[0]):
         if k & POLL == 0 and stop[0]:
@@ -91,9 +90,9 @@ def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> i
 def _find_corners(
     pixels: FloatArray, offsets: IntArray, pieces: IntArray, corners: Int32Array, starts: IntArray, stop: FlagArray
 ) -> int:
-    """Fill ``corners`` with the vertices where rings turn, ``starts`` with where those of each ring begin there.
+    """Fill ``corners`` with the vertices where rings turn, and ``starts`` with the offsets of rings into them.
 
-    Returns how many, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order.
+    Returns their number, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order.
     """
     piece = n = 0
     for ring in range(offsets.shape[0] - 1):
@@ -132,7 +131,7 @@ def _find_corners(
 
 @merged
 def _add_passage(passages: Int32Array, m: int, edges: Edges, e: int, f: int, px: float, py: float) -> int:
-    """Append that edge e passes the pixel about (px, py), of vertex f, if it does; return how many there are then."""
+    """Append (e, f) if edge e passes the pixel (px, py) of vertex f; return the number of passages then."""
     x, y, b = edges.x, edges.y, edges.after[e]
     if not _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
         return m
@@ -143,21 +142,24 @@ def _add_passage(passages: Int32Array, m: int, edges: Edges, e: int, f: int, px:
 
 @kernel
 def snap(
-    vertices: FloatArray, offsets: IntArray, pieces: IntArray, stop: FlagArray, words: IntArray, pixels: FloatArray,
+    vertices: FloatArray, offsets: IntArray, pieces: IntArray, stop: FlagArray, addresses: IntArray, pixels: FloatArray,
     corners: Int32Array, starts: IntArray, passages: Int32Array,
 ) -> tuple[int, int, int, bool]:  # fmt: skip
-    """Fill what tells what becomes of valid rings, coordinates below 2^51.
+    """Snap valid rings, coordinates below 2^51, to integer points.
 
-    pixels: (n, 2) float64, the whole points in whose pixels vertices lie; where all lie there nothing else is filled.
-    corners, starts: see `_find_corners`. passages: (m, 2) int32, an edge, by its first vertex, and a vertex of another
-    pixel that it passes. Returns how many vertices are no whole points; how many passages there are, which may be more
-    than there is room for; how many corners, or FOLDS where rings do not stay what they are, without vertices that get
-    straight; whether no edge passes within a cell of a vertex that is none of its ends.
+    | filled | dtype, shape | meaning |
+    | --- | --- | --- |
+    | pixels | float64 (n, 2) | the integer point of each vertex; if none moved, nothing else is filled |
+    | corners, starts | | see `_find_corners` |
+    | passages | int32 (m, 2) | an edge, by its first vertex, and a vertex whose pixel it passes, not that of its ends |
+
+    Returns the number of vertices that are no integer points; of passages, which may exceed the room; of corners, or
+    FOLDS where the topology changes; and whether no edge passes within a cell of a vertex that is not its end.
     """
     n_moved = _find_pixels(vertices, pixels, stop)
     if n_moved == 0:
         return 0, 0, vertices.shape[0], False
-    w = rows_of(words)
+    w = workspace_at(addresses)
     edges, tree = w.given.edges, w.tree
     rings, n_rings = RingArrays(vertices, offsets), offsets.shape[0] - 1
     n, _, _ = load_rings(rings, 0, n_rings, 0, True, 0, EVERYTHING, w.given, 0, 0, stop)
@@ -173,8 +175,8 @@ def snap(
     meets, shares, are_apart = False, False, True
     m, depth = 0, begin_pairs(tree)
     while depth > 0 and not stop[0]:  # bound: the walk through the tree
-        found, depth = next_pairs(tree, n, depth)
-        for k in range(found):
+        n_pairs, depth = next_pairs(tree, n, depth)
+        for k in range(n_pairs):
             e, f = tree.pairs[k, 0], tree.pairs[k, 1]
             for _ in range(2):
                 px, py, b = pixels[f, 0], pixels[f, 1], after[e]

@@ -1,6 +1,6 @@
 """Scratch of the compiled overlay: few arrays by size, their rows by name.
 
-The kernel is handed their addresses and takes rows itself: handing over eighty costs more than a small overlay.
+The kernel takes their addresses and makes the rows itself: passing eighty arrays costs more than a small overlay.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from engine.polygon_overlay.compiled.edge_contacts import Events, Unions
 from engine.polygon_overlay.compiled.edge_events import Along
 from engine.polygon_overlay.compiled.edge_tree import DEEPEST, LEAF, PORTION, BoxTree
 from engine.polygon_overlay.compiled.loading import Given
-from engine.polygon_overlay.compiled.ring_nesting import Holders
+from engine.polygon_overlay.compiled.ring_nesting import FloodFill
 from engine.polygon_overlay.compiled.ring_order import Output, Ranking
 from engine.types import IntArray
 
-_kept: list[Scratch] = []
-"""Scratch that nobody uses now, for whichever thread is next: the last used first, whose pages are in the cache."""
-spare: list[Scratch] = []
-"""Scratch for `FEW_VERTICES` that nobody uses now: taken and given back without a look at its size."""
+_pool: list[Scratch] = []
+"""Unused scratch for any thread; the last used comes first, since its pages are in the cache."""
+small_pool: list[Scratch] = []
+"""Unused scratch for `FEW_VERTICES`, taken and returned without a check of its size."""
 FEW_VERTICES: Final = 500
-_MOST_KEPT: Final = 256_000_000
-"""Bytes of all that is kept; of most of them a fifth was ever written to."""
+_MOST_POOLED: Final = 256_000_000
+"""Bytes of the pool; of most of them a fifth was ever written to."""
 _MORE_CONTACTS: Final = 2**15
 _MANY_CONTACTS: Final = 2**15
 
@@ -51,7 +51,7 @@ _N_BUFFERS: Final = len(Buffers._fields)
 
 
 class Workspace(NamedTuple):
-    """Scratch by name, a tuple for each step, in the order in which data passes: rows of the arrays of `Buffers`."""
+    """Scratch by name, a tuple for each step in the order of the data flow: rows of the arrays of `Buffers`."""
 
     given: Given
     tree: BoxTree
@@ -63,23 +63,24 @@ class Workspace(NamedTuple):
     loose: Loose
     faces: Faces
     components: Components
-    holders: Holders
+    flood: FloodFill
     walk: Walk
-    found: Rings
+    rings: Rings
     rounded: Rounded
     ranking: Ranking
 
 
 Outcomes = namedtuple("Outcomes", "status counts displacement")
-"""By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, pairs of edges beyond the filter;
-displacement (n,) float64: how far rounding moved a vertex at most."""
+"""By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, exactly decided edge pairs;
+displacement (n,) float64: the largest distance by which rounding moved a vertex.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Scratch:
-    """What the kernel writes to, for pairs of up to so many vertices, rings and contacts; outcome: of one pair.
+    """Arrays that the kernel writes to, for pairs of up to so many vertices, rings and contacts.
 
-    words: sizes and addresses of buffers and output, as `rows_of` and `output_at` take them.
+    outcome: of one pair. addresses: sizes and addresses of buffers and output, for `workspace_at` and `output_at`.
     """
 
     n_bytes: int
@@ -89,66 +90,63 @@ class Scratch:
     buffers: Buffers
     output: Output
     outcome: Outcomes
-    words: IntArray
+    addresses: IntArray
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
-    """Return scratch of that size at least: what was kept if that suffices, or else new.
+    """Return scratch of at least that size, from the pool or new; the caller returns it by `return_scratch`.
 
-    It is the caller's until `keep`: a signal handler may overlay while what the kernel left is not copied yet.
-    One pair of that size always finds room in the output: every contact adds a vertex and a ring at most. What is not
-    written to costs nothing; pages that are for the first time cost more than the kernel does.
+    One pair of that size always fits the output: every contact adds at most a vertex and a ring. Pages that are not
+    written to cost nothing; fresh pages cost more than the kernel does.
     """
     try:
-        kept: Scratch | None = _kept.pop()
-    except IndexError:  # whether there is any, only taking it tells: another thread may be quicker
-        kept = None
-    if kept is not None and (kept.n_vertices < n_vertices or kept.n_rings < n_rings or kept.n_contacts < n_contacts):
-        n_vertices, n_rings = max(n_vertices, kept.n_vertices), max(n_rings, kept.n_rings)
-        n_contacts, kept = max(n_contacts, kept.n_contacts), None
-    if kept is not None and len(kept.output.vertices) >= n_out and len(kept.output.rings) > n_out_rings:
-        return kept
+        pooled: Scratch | None = _pool.pop()
+    except IndexError:  # no check before: another thread may be quicker
+        pooled = None
+    if pooled is not None and (
+        pooled.n_vertices < n_vertices or pooled.n_rings < n_rings or pooled.n_contacts < n_contacts
+    ):
+        n_vertices, n_rings = max(n_vertices, pooled.n_vertices), max(n_rings, pooled.n_rings)
+        n_contacts, pooled = max(n_contacts, pooled.n_contacts), None
+    if pooled is not None and len(pooled.output.vertices) >= n_out and len(pooled.output.rings) > n_out_rings:
+        return pooled
     n_out, n_out_rings = max(n_out, n_vertices + n_contacts), max(n_out_rings, n_contacts)
     rings, pieces = np.empty(n_out_rings + 1, np.int64), np.empty(n_out_rings + 1, np.int64)
     rings[0] = pieces[0] = 0
     evidence = np.empty((n_out, 2), np.int64)
     output = Output(np.empty((n_out, 2)), np.empty((n_out, 2), np.int32), rings, pieces, evidence)
     outcome = Outcomes(np.empty(1, np.int8), np.empty((1, 4), np.int64), np.empty(1))
-    if kept is not None:
-        n_vertices, n_rings, n_contacts, buffers = kept.n_vertices, kept.n_rings, kept.n_contacts, kept.buffers
+    if pooled is not None:
+        n_vertices, n_rings, n_contacts, buffers = pooled.n_vertices, pooled.n_rings, pooled.n_contacts, pooled.buffers
     else:
         buffers = buffers_for(n_vertices, n_rings, n_contacts)
     n_bytes = sum(array.nbytes for array in (*buffers, *output))
-    words = words_of(buffers, output)
-    return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome, words)
+    addresses = addresses_of(buffers, output)
+    return Scratch(n_bytes, n_vertices, n_rings, n_contacts, buffers, output, outcome, addresses)
 
 
 def scratch_for_few() -> Scratch:
-    """Return scratch for one pair of up to `FEW_VERTICES`, whatever its rings; to be appended to `spare`."""
+    """Return scratch for one pair of up to `FEW_VERTICES`; the caller appends it to `small_pool`."""
     try:
-        return spare.pop()
+        return small_pool.pop()
     except IndexError:  # as in scratch_for
         return scratch_for(FEW_VERTICES, FEW_VERTICES // 2, first_contacts(FEW_VERTICES), 0, 0)
 
 
 def first_contacts(n_vertices: int) -> int:
-    """Return for how many contacts to try first; of large polygons few, so that the scratch is not too much to keep."""
+    """Return the room for contacts to try first: few for large polygons, so that the scratch fits the pool."""
     return max(256, min(4 * n_vertices, n_vertices + _MORE_CONTACTS))
 
 
 def more_contacts(n: int) -> int:
-    """Return for how many contacts to try next where there was scratch for ``n``.
-
-    Few are multiplied at once, since every try begins anew and pages that are not written to cost nothing; many are
-    doubled, since a system may refuse to promise more memory than it has.
-    """
+    """Return the room for contacts to try after ``n``: eight times as much, or twice where memory may be refused."""
     return 8 * n if n < _MANY_CONTACTS else 2 * n
 
 
-def keep(scratch: Scratch) -> None:
-    """Keep scratch for the next call, unless that is too much with what is kept."""
-    if scratch.n_bytes + sum([other.n_bytes for other in _kept]) <= _MOST_KEPT:
-        _kept.append(scratch)
+def return_scratch(scratch: Scratch) -> None:
+    """Return scratch to the pool, unless that exceeds `_MOST_POOLED`."""
+    if scratch.n_bytes + sum([other.n_bytes for other in _pool]) <= _MOST_POOLED:
+        _pool.append(scratch)
 
 
 def release() -> None:
@@ -163,8 +161,8 @@ def release() -> None:
     >>> import engine
     >>> engine.release()
     """
-    _kept.clear()
-    spare.clear()
+    _pool.clear()
+    small_pool.clear()
 
 
 def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
@@ -189,8 +187,8 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
     )  # fmt: skip
 
 
-def words_of(buffers: Buffers, output: Output) -> IntArray:
-    """Return sizes and addresses of what stays as long as they are in use."""
+def addresses_of(buffers: Buffers, output: Output) -> IntArray:
+    """Return (words,) int64: sizes, then addresses of arrays, which must outlive it."""
     sizes = (
         buffers.vertex_floats.shape[1], buffers.ring_integers.shape[1], buffers.contact_floats.shape[1],
         len(buffers.boxes), len(buffers.tree), len(output.vertices), len(output.rings),
@@ -199,21 +197,21 @@ def words_of(buffers: Buffers, output: Output) -> IntArray:
 
 
 @merged
-def output_at(words: IntArray) -> Output:
-    """Return the output of a `Scratch` by its words."""
-    n, n_rings, first = words[5], words[6], _N_SIZES + _N_BUFFERS
+def output_at(addresses: IntArray) -> Output:
+    """Return the output of a `Scratch` from its addresses."""
+    n, n_rings, first = addresses[5], addresses[6], _N_SIZES + _N_BUFFERS
     return Output(
-        array_at(words[first], (n, 2), np.float64), array_at(words[first + 1], (n, 2), np.int32),
-        array_at(words[first + 2], (n_rings,), np.int64), array_at(words[first + 3], (n_rings,), np.int64),
-        array_at(words[first + 4], (n, 2), np.int64),
+        array_at(addresses[first], (n, 2), np.float64), array_at(addresses[first + 1], (n, 2), np.int32),
+        array_at(addresses[first + 2], (n_rings,), np.int64), array_at(addresses[first + 3], (n_rings,), np.int64),
+        array_at(addresses[first + 4], (n, 2), np.int64),
     )  # fmt: skip
 
 
 @merged
-def rows_of(words: IntArray) -> Workspace:
-    """Return the rows of the buffers of a `Scratch` by name; those that are in one place are not in use at one time."""
-    n, n_rings, k, m, n_nodes = words[0], words[1], words[2], words[3], words[4]
-    at = words[_N_SIZES : _N_SIZES + _N_BUFFERS]
+def workspace_at(addresses: IntArray) -> Workspace:
+    """Return the rows of the buffers of a `Scratch` by name; rows at one address are never in use at the same time."""
+    n, n_rings, k, m, n_nodes = addresses[0], addresses[1], addresses[2], addresses[3], addresses[4]
+    at = addresses[_N_SIZES : _N_SIZES + _N_BUFFERS]
     vx, v = array_at(at[0], (_VERTEX_FLOATS, n), np.float64), array_at(at[1], (_VERTEX_INTEGERS, n), np.int32)
     r, cx = array_at(at[2], (_RING_INTEGERS, n_rings), np.int64), array_at(at[3], (_CONTACT_FLOATS, k), np.float64)
     c, h = array_at(at[4], (_CONTACT_INTEGERS, k + 1), np.int32), array_at(at[5], (_HALF_INTEGERS, 2 * k + 1), np.int32)
@@ -235,9 +233,9 @@ def rows_of(words: IntArray) -> Workspace:
         loose=Loose(h[3], hl[0], px[0], px[1]),
         faces=Faces(h[2], h[4], h[5], hb[1], hb[2], c[16]),
         components=Components(r[3], r[4], r[5]),
-        holders=Holders(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[9]),
+        flood=FloodFill(r[4], r[5], r[6], h[3], h[6], hl[0], h[7], h[8], h[9], h[10], c[9]),
         walk=Walk(h[6], c[8]),
-        found=Rings(p[0], p[5], pb[0], c[10], c[11]),
+        rings=Rings(p[0], p[5], pb[0], c[10], c[11]),
         rounded=Rounded(px[0], px[1], pb[3], crossing_x, crossing_y, error),
         ranking=Ranking(c[5], cx[0], cx[2], hb[0], c[6], c[7], c[8]),  # in place of chains and events
     )  # fmt: skip

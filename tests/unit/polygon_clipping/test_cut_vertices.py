@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_clipping.clip_polygons import clip_polygons
-from engine.polygon_clipping.cut_vertices import Share, between, is_at, on_edge, share_of_edge
+from engine.polygon_clipping.cut_vertices import CutWeights, edge_parameter, interpolate, is_exactly_at, point_on_edge
 from engine.polygon_clipping.in_integers import MOST_BITS, clip_polygon, integer_row, plane_through
 from engine.predicates.error_free import dd_add, dd_div
 from engine.solids.primitives import Aabb, Convex
@@ -27,11 +27,11 @@ def test_cuts_are_within_their_bounds() -> None:
         exact = Fraction(x) + (Fraction(a) - Fraction(place)) / (Fraction(a) - Fraction(b)) * (
             Fraction(y) - Fraction(x)
         )
-        th, tl, is_known = share_of_edge(a, b, place)
-        h, rest, bound = on_edge(x, y, th, tl)
+        th, tl, is_known = edge_parameter(a, b, place)
+        h, rest, bound = point_on_edge(x, y, th, tl)
         assert is_known
         assert abs(Fraction(h) + Fraction(rest) - exact) <= Fraction(bound)
-        assert not is_at(x, y, a, b, place, h) or Fraction(h) == exact
+        assert not is_exactly_at(x, y, a, b, place, h) or Fraction(h) == exact
 
 
 def test_a_cut_between_cut_vertices_is_within_its_bound() -> None:
@@ -42,17 +42,17 @@ def test_a_cut_between_cut_vertices_is_within_its_bound() -> None:
         (x_low, pl), (y_low, ql) = rng.uniform(-1, 1, (2, 2)) * 2.0**-56
         sum_h, sum_l = dd_add(ph, pl, qh, ql)
         th, tl = dd_div(ph, pl, sum_h, sum_l)
-        share = Share(ph, pl, qh, ql, sum_h, sum_l, th, tl, 0.0)
+        share = CutWeights(ph, pl, qh, ql, sum_h, sum_l, th, tl, 0.0)
         p, q = Fraction(ph) + Fraction(pl), Fraction(qh) + Fraction(ql)
         for low in (0.0, 1.0):
             first, second = Fraction(x) + Fraction(low * x_low), Fraction(y) + Fraction(low * y_low)
-            h, rest, bound = between((x, low * x_low, 0.0), (y, low * y_low, 0.0), share)
+            h, rest, bound = interpolate((x, low * x_low, 0.0), (y, low * y_low, 0.0), share)
             assert abs(Fraction(h) + Fraction(rest) - (first * q + second * p) / (p + q)) <= Fraction(bound)
 
 
 def test_a_cut_at_a_double_is_known_to_be_there() -> None:
-    assert is_at(0.0, 1.0, 0.0, 4.0, 1.0, 0.25)
-    assert not is_at(0.0, 1.0, 0.0, 3.0, 1.0, 1 / 3)
+    assert is_exactly_at(0.0, 1.0, 0.0, 4.0, 1.0, 0.25)
+    assert not is_exactly_at(0.0, 1.0, 0.0, 3.0, 1.0, 1 / 3)
 
 
 # --- What doubles and double-doubles prove: long rings in runs, lattices through corners ---

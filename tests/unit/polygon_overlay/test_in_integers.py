@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay.compiled.kernel import PairStatus
-from engine.polygon_overlay.in_integers import arranged_again, overlay_exactly
+from engine.polygon_overlay.in_integers import overlay_exactly, rebuild_from_rounded_rings
 from engine.polygon_overlay.pair_arrays import one_pair
 from engine.running.budget import Budget
 from tests.unit.polygon_overlay.checks import OPERATIONS
@@ -34,7 +34,7 @@ def test_valid_rings_arranged_again_are_themselves() -> None:
     ]
     vertices = np.array([vertex for ring in rings for vertex in ring], float)
     given = one_pair(vertices, np.array([0, 4, 7, 10, 13]), np.array([0, 3, 4]), 0.0, 0)
-    found = arranged_again(given, Budget())
+    found = rebuild_from_rounded_rings(given, Budget())
     assert found.vertices.tolist() == vertices.tolist()
     assert (found.ring_offsets.tolist(), found.piece_offsets.tolist()) == ([0, 4, 7, 10, 13], [0, 3, 4])
     assert (found.status[0], found.evidence.tolist()) == (PairStatus.DONE, [[ring, ring] for ring in range(4)])

@@ -12,7 +12,16 @@ from engine.polygon_overlay.batch import join_batches, overlay_batch
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.implicit_rings import ImplicitRings
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.pair_arrays import NO_PAIRS, Found, chained, gathered, joined, one_pair, ring_sizes, taken
+from engine.polygon_overlay.pair_arrays import (
+    NO_PAIRS,
+    PairResults,
+    concatenate_offsets,
+    concatenate_pairs,
+    one_pair,
+    polygon_arrays_of,
+    ring_sizes,
+    take_pairs,
+)
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb
 from engine.solids.ragged import summed
@@ -59,13 +68,13 @@ def test_gathered(most_rings: int) -> None:
         [random.random((random.integers(3, 9), 2)) for _ in range(random.integers(most_rings + 1))] for _ in "1234567"
     ]
     polygons = [Polygon(each) for each in rings]
-    found = gathered(polygons)
+    found = polygon_arrays_of(polygons)
     assert np.diff(found.polygon_offsets).tolist() == list(map(len, rings))
     assert np.diff(found.ring_offsets).tolist() == [len(ring) for each in rings for ring in each]
     assert found.sizes().tolist() == [sum(map(len, each)) for each in rings]
     assert found.most() == (max(found.sizes()), max(map(len, rings)))
     numbers = random.permutation(7)[:4]
-    some = found.taken(numbers)
+    some = found.take(numbers)
     for k, number in enumerate(numbers.tolist()):
         one, other = some.polygon(k), polygons[number]
         assert (one.vertices.tolist(), one.ring_offsets.tolist()) == (
@@ -77,27 +86,27 @@ def test_gathered(most_rings: int) -> None:
 # --- Pairs taken from what was found, and put together again, are what they were ---
 
 
-def pair_of(random: np.random.Generator) -> Found:
+def pair_of(random: np.random.Generator) -> PairResults:
     sizes = random.integers(3, 6, random.integers(0, 4))
     return one_pair(random.random((sizes.sum(), 2)), summed(sizes), np.arange(len(sizes) + 1), 0.25, 7)
 
 
-def same(first: Found, second: Found) -> bool:
+def same(first: PairResults, second: PairResults) -> bool:
     return all(a.tolist() == b.tolist() for a, b in zip(first, second, strict=True))
 
 
 def test_taken_and_joined() -> None:
     random = np.random.default_rng(1)
     pairs = [pair_of(random) for _ in range(9)]
-    together = joined([NO_PAIRS, *pairs])
+    together = concatenate_pairs([NO_PAIRS, *pairs])
     order = random.permutation(9)
-    assert same(taken(together, order), joined([pairs[k] for k in order.tolist()]))
-    assert same(taken(together, np.arange(9)), together)
-    assert same(taken(together, np.zeros(0, np.int64)), NO_PAIRS)
+    assert same(take_pairs(together, order), concatenate_pairs([pairs[k] for k in order.tolist()]))
+    assert same(take_pairs(together, np.arange(9)), together)
+    assert same(take_pairs(together, np.zeros(0, np.int64)), NO_PAIRS)
 
 
 def test_offsets() -> None:
-    assert chained([np.array([0, 2, 5]), np.array([0]), np.array([0, 1])]).tolist() == [0, 2, 5, 6]
+    assert concatenate_offsets([np.array([0, 2, 5]), np.array([0]), np.array([0, 1])]).tolist() == [0, 2, 5, 6]
     assert ring_sizes(one_pair(np.array([[0.0, 1], [3, 1], [3, 2]]), np.array([0, 3]), np.array([0, 1]), 0, 0)) == [2]
     assert len(ring_sizes(NO_PAIRS)) == 0
 

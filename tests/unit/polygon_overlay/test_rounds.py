@@ -13,9 +13,9 @@ from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.pair_arrays import Found, gathered, joined, taken
-from engine.polygon_overlay.rounds import settle_pairs
-from engine.polygon_overlay.run import KEPT_ARRAYS, arranged_again, overlay_compiled, run_kernel
+from engine.polygon_overlay.pair_arrays import PairResults, concatenate_pairs, polygon_arrays_of, take_pairs
+from engine.polygon_overlay.rounds import make_pairs_valid
+from engine.polygon_overlay.run import SELECTED_ARRAYS, overlay_compiled, rebuild_from_rounded_rings, run_kernel
 from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 from tests.unit.polygon_overlay import families as families
@@ -158,23 +158,23 @@ def test_pieces_in_holes_stay_what_they_are_where_a_round_is_taken() -> None:
     assert (result.n_holes, result.holes_joined, result.holes_parted) == (result.n_holes_exact, 0, 0)
 
 
-def doubtful() -> Found:
+def doubtful() -> PairResults:
     found = []
     for family in (families.slivers, families.pencils, families.nearly_coincident):
         for seed in range(8):
-            first, second = (gathered([Polygon(list(each))]) for each in families.drawn(family, seed))
-            found.append(run_kernel(first, second, KEPT_ARRAYS["union"], Budget()))
-    return joined(found)
+            first, second = (polygon_arrays_of([Polygon(list(each))]) for each in families.drawn(family, seed))
+            found.append(run_kernel(first, second, SELECTED_ARRAYS["union"], Budget()))
+    return concatenate_pairs(found)
 
 
 def test_pairs_together_are_pairs_alone() -> None:
     found = doubtful()
     n_doubtful = int((found.status == PairStatus.MAY_CROSS).sum())
     assert n_doubtful > 3
-    together = settle_pairs(found, arranged_again, Budget())
+    together = make_pairs_valid(found, rebuild_from_rounded_rings, Budget())
     assert len(together.pairs) <= n_doubtful
     for k, pair in enumerate(together.pairs.tolist()):
-        alone = settle_pairs(taken(found, np.array([pair])), arranged_again, Budget()).found
-        now = taken(together.found, np.array([k]))
+        alone = make_pairs_valid(take_pairs(found, np.array([pair])), rebuild_from_rounded_rings, Budget()).rings
+        now = take_pairs(together.rings, np.array([k]))
         for name in ("vertices", "ring_offsets", "piece_offsets", "displacement"):
             assert getattr(alone, name).tolist() == getattr(now, name).tolist()

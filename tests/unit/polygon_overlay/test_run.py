@@ -16,9 +16,9 @@ import pytest
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.overlay import overlay
-from engine.polygon_overlay.pair_arrays import gathered
+from engine.polygon_overlay.pair_arrays import polygon_arrays_of
 from engine.polygon_overlay.result import Overlay
-from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, overlay_few, run_kernel
+from engine.polygon_overlay.run import SELECTED_ARRAYS, Operation, overlay_few, run_kernel
 from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 
@@ -81,7 +81,7 @@ def test_a_few_are_told_as_many_are(operation: Any) -> None:
             Polygon([draw.integers(0, 4, (draw.integers(3, 9), 2)) / draw.choice([1.0, 3.0]) for _ in range(n_rings)])
             for n_rings in draw.integers(1, 3, 2)
         )
-        few = overlay_few(first, second, KEPT_ARRAYS[operation])
+        few = overlay_few(first, second, SELECTED_ARRAYS[operation])
         if few is not None:
             n_few += 1
             assert told(few) == told(overlay(first, second, operation, report=True)[0])
@@ -113,7 +113,7 @@ def test_fields_are_listed_before_they_are_made() -> None:
 def test_many_vertices_and_doubt_are_left() -> None:
     circle = np.stack([np.cos(np.arange(300.0)), np.sin(np.arange(300.0))], axis=1)
     far = Polygon([1e200 * np.array(TWO[0].vertices[:4])])
-    kept = KEPT_ARRAYS["union"]
+    kept = SELECTED_ARRAYS["union"]
     assert overlay_few(Polygon([circle]), Polygon([circle]), kept) is None
     assert overlay_few(far, TWO[1], kept) is None
     near = np.nextafter(1.0, 2.0)  # rounding parts the triangles anew
@@ -126,8 +126,8 @@ def test_room_is_made() -> None:
     n = 60
     teeth = np.array([[k + 0.5 * (j > 1), 0.1 if j in (0, 3) else n] for k in range(n) for j in range(4)])
     comb = np.concatenate([teeth, [[n, 0.0], [0, 0.0]]])
-    sides = [gathered([Polygon([each])] * 3) for each in (comb, comb[:, ::-1])]
-    found = run_kernel(*sides, KEPT_ARRAYS["intersection"], Budget())
+    sides = [polygon_arrays_of([Polygon([each])] * 3) for each in (comb, comb[:, ::-1])]
+    found = run_kernel(*sides, SELECTED_ARRAYS["intersection"], Budget())
     assert found.status.tolist() == [PairStatus.DONE] * 3
     assert len(set(found.counts[:, 0].tolist())) == 1
     assert found.counts[0, 0] > n * (n - 2)

@@ -14,7 +14,7 @@ from engine.errors import DeadlineExceededError
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import parts_exactly
-from engine.polygon_overlay.pair_arrays import Chosen, gathered
+from engine.polygon_overlay.pair_arrays import PolygonSelection, polygon_arrays_of
 from engine.polygon_overlay.run import EACH_PART, run_kernel
 from engine.polygon_overlay.touching import Touching, _read, touching
 from engine.running.budget import Budget
@@ -67,9 +67,11 @@ def test_sets_of_triangles(matrix: Any, share: float, pytestconfig: pytest.Confi
     every = [(x, y, half) for x in range(SIZE) for y in range(SIZE) for half in (False, True)]
     pairs = [tuple({t for t in every if rng.random() < share} or {every[k]} for k in range(2)) for _ in range(n)]
     matrix = np.array(matrix)
-    arrays = [gathered([Polygon([np.array(corners(t)) @ matrix for t in each[k]]) for each in pairs]) for k in (0, 1)]
+    arrays = [
+        polygon_arrays_of([Polygon([np.array(corners(t)) @ matrix for t in each[k]]) for each in pairs]) for k in (0, 1)
+    ]
     with Budget(None, None) as budget:
-        found = touching(*(Chosen(each, np.arange(n)) for each in arrays), budget)
+        found = touching(*(PolygonSelection(each, np.arange(n)) for each in arrays), budget)
     to_lattice = np.linalg.inv(matrix)
     vertices, places = (np.rint(each @ to_lattice) for each in (found.vertices, found.places))
     assert np.array_equal(vertices @ matrix, found.vertices)
@@ -97,10 +99,10 @@ def test_rings_that_cross_themselves(pytestconfig: pytest.Config) -> None:
     n_settled = n_met = 0
     for size in (4, 6, 9) * (400 if pytestconfig.getoption("--full") else 25):
         pair = [Polygon([rng.integers(0, size, (rng.integers(3, 8), 2)) for _ in range(2)]) for _ in range(2)]
-        one, other = (gathered([each]) for each in pair)
+        one, other = (polygon_arrays_of([each]) for each in pair)
         with Budget(None, None) as budget:
             n_settled += int(run_kernel(one, other, EACH_PART, budget).status[0] == PairStatus.DONE)
-            found = touching(Chosen(one, np.arange(1)), Chosen(other, np.arange(1)), budget)
+            found = touching(PolygonSelection(one, np.arange(1)), PolygonSelection(other, np.arange(1)), budget)
             exact, places = parts_exactly(RingArrays(*one[:2]), RingArrays(*other[:2]), budget)
         parts = exact.evidence[:, 1]
         assert shapes(found) == shapes(_read(exact, parts, np.zeros(len(parts), np.int64), places))
@@ -116,9 +118,9 @@ def test_where_a_polygon_crosses_itself_on_a_border(order: int) -> None:
     below = [(-1, -8), (3, -8), (1, 8), (-1, -8)] if order == 0 else [(-1, -8), (1, 8), (-9, 8)]
     sides = [[np.roll(bow, order, axis=0)], [np.roll(below, order // 2, axis=0)]]
     for pair in (sides, sides[::-1]):
-        one, other = (gathered([Polygon(rings)]) for rings in pair)
+        one, other = (polygon_arrays_of([Polygon(rings)]) for rings in pair)
         with Budget(None, None) as budget:
-            found = touching(Chosen(one, np.arange(1)), Chosen(other, np.arange(1)), budget)
+            found = touching(PolygonSelection(one, np.arange(1)), PolygonSelection(other, np.arange(1)), budget)
             exact, places = parts_exactly(RingArrays(*one[:2]), RingArrays(*other[:2]), budget)
         parts = exact.evidence[:, 1]
         assert shapes(found) == shapes(_read(exact, parts, np.zeros(len(parts), np.int64), places))
@@ -126,10 +128,15 @@ def test_where_a_polygon_crosses_itself_on_a_border(order: int) -> None:
 
 def test_far_exponents_and_nothing() -> None:
     near, far = Polygon([[(0, 0), (1, 0), (1, 1)]]), Polygon([[(1, 0), (1e300, 1e-300), (1, 1)]])
-    sides = [Chosen(gathered(each), np.arange(3)) for each in ([near, near, near], [far, near, Polygon([])])]
+    sides = [
+        PolygonSelection(polygon_arrays_of(each), np.arange(3))
+        for each in ([near, near, near], [far, near, Polygon([])])
+    ]
     with Budget(None, None) as budget:
         found = touching(*sides, budget)
-        assert touching(*(Chosen(gathered([near]), np.arange(0)) for _ in range(2)), budget).offsets.tolist() == [0]
+        assert touching(
+            *(PolygonSelection(polygon_arrays_of([near]), np.arange(0)) for _ in range(2)), budget
+        ).offsets.tolist() == [0]
     assert found.lines.tolist() == [0]
     assert found.vertices.tolist() == [[1.0, 0.0], [1.0, 1.0]]
     assert not len(found.points)
@@ -138,7 +145,7 @@ def test_far_exponents_and_nothing() -> None:
 def test_a_hole_that_is_filled_is_a_line_all_around() -> None:
     square = [(1, 1), (2, 1), (2, 2), (1, 2)]
     sides = [
-        Chosen(gathered([Polygon(rings)]), np.arange(1))
+        PolygonSelection(polygon_arrays_of([Polygon(rings)]), np.arange(1))
         for rings in ([[(0, 0), (3, 0), (3, 3), (0, 3)], square], [square])
     ]
     with Budget(None, None) as budget:
@@ -150,4 +157,4 @@ def test_deadline() -> None:
     rng = np.random.default_rng(0)
     many = [Polygon([rng.random((4000, 2))]) for _ in range(2)]
     with pytest.raises(DeadlineExceededError), Budget(0.05, None) as budget:
-        touching(*(Chosen(gathered([each]), np.arange(1)) for each in many), budget)
+        touching(*(PolygonSelection(polygon_arrays_of([each]), np.arange(1)) for each in many), budget)

@@ -18,7 +18,7 @@ from engine.predicates.error_free import (
     dd_mul,
     dd_scale,
     dd_sub,
-    surely_rounded,
+    is_correctly_rounded,
 )
 
 
@@ -68,12 +68,12 @@ def test_operations_keep_their_bounds(pytestconfig: pytest.Config) -> None:
 
 
 def test_rounding_is_sure_only_where_both_ends_round_alike() -> None:
-    assert surely_rounded(1.0, 0.0, 0.0)
-    assert surely_rounded(1.0, 1e-20, 1e-25)
-    assert not surely_rounded(1.0, 2.0**-53, 1e-25), "a tie"
-    assert not surely_rounded(0.0, 0.0, 1e-300), "zero is only sure without any bound"
-    assert not surely_rounded(math.nan, 0.0, 0.0)
-    assert not surely_rounded(1.0, 0.0, math.nan)
+    assert is_correctly_rounded(1.0, 0.0, 0.0)
+    assert is_correctly_rounded(1.0, 1e-20, 1e-25)
+    assert not is_correctly_rounded(1.0, 2.0**-53, 1e-25), "a tie"
+    assert not is_correctly_rounded(0.0, 0.0, 1e-300), "zero is only sure without any bound"
+    assert not is_correctly_rounded(math.nan, 0.0, 0.0)
+    assert not is_correctly_rounded(1.0, 0.0, math.nan)
 
 
 def test_sure_roundings_hold_for_every_number_within_the_bound() -> None:
@@ -81,7 +81,7 @@ def test_sure_roundings_hold_for_every_number_within_the_bound() -> None:
     numbers = pairs(rng, 3_000)
     for h, low in numbers.tolist():
         bound = abs(h) * 2.0 ** -int(rng.integers(54, 100))
-        if surely_rounded(h, low, bound + 2 * U2 * abs(h)):
+        if is_correctly_rounded(h, low, bound + 2 * U2 * abs(h)):
             value = Fraction(h) + Fraction(low)
             for number in (value - Fraction(bound), value + Fraction(bound)):
                 assert number.numerator / number.denominator == h + low

@@ -12,7 +12,7 @@ import pytest
 import engine
 from engine import Polygon, overlay, overlay_batch, polygons
 from engine.errors import InvalidArrayError, NotFiniteError, RingTooShortError, WrongDimensionError
-from engine.polygon_overlay.pair_arrays import Chosen, arrays_of, joined_arrays
+from engine.polygon_overlay.pair_arrays import PolygonSelection, arrays_of, concatenate_polygons
 from engine.solids.ragged import closed_rings
 
 SQUARE = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]
@@ -65,15 +65,15 @@ def test_arrays_are_those_of_objects() -> None:
     arrays = arrays_of(flat, offsets, [0, 1, 3, 3, 5])  # the last ring has no area, and is left out
     assert [ring_lists(arrays.polygon(k)) for k in range(4)] == [[SQUARE], [SQUARE, HOLE], [], [SQUARE]]
     assert arrays.sizes().tolist() == [4, 7, 0, 4]
-    some = Chosen(arrays, np.array([3, 1, 2, 1]))
+    some = PolygonSelection(arrays, np.array([3, 1, 2, 1]))
     assert [ring_lists(each) for each in some[1:]] == [[SQUARE, HOLE], [], [SQUARE, HOLE]]
     assert some.n_vertices == 18
-    assert [ring_lists(joined_arrays([arrays, some.together()]).polygon(k)) for k in (4, 5)] == [
+    assert [ring_lists(concatenate_polygons([arrays, some.arrays()]).polygon(k)) for k in (4, 5)] == [
         [SQUARE],
         [SQUARE, HOLE],
     ]
     assert ring_lists(arrays.merged(np.array([0, 2])).polygon(0)) == [SQUARE, SQUARE, HOLE]
-    found: Any = overlay_batch(some, Chosen(arrays, np.array([1, 0, 0, 2])), "difference")
+    found: Any = overlay_batch(some, PolygonSelection(arrays, np.array([1, 0, 0, 2])), "difference")
     expected: Any = overlay_batch(list(some), [arrays.polygon(k) for k in (1, 0, 0, 2)], "difference")
     for name in ("vertices", "ring_offsets", "piece_offsets", "pair_offsets", "areas", "n_pieces_exact"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))

@@ -92,9 +92,9 @@ def test_many_rings_in_any_order(seed: int) -> None:
 
     (first, in_first), (second, in_second) = scattered(700), scattered(300)
     expected = in_first & in_second, in_first | in_second, in_first & ~in_second, in_first ^ in_second
-    for operation, kept in zip(OPERATIONS, expected, strict=True):
+    for operation, selected in zip(OPERATIONS, expected, strict=True):
         found = overlay(Polygon(first), Polygon(second), operation)
         again = overlay(Polygon([first[k] for k in random.permutation(len(first))]), Polygon(second[::-1]), operation)
         for name in ("vertices", "ring_offsets", "piece_offsets", "sources"):
             assert np.array_equal(getattr(found, name), getattr(again, name))
-        assert found.area_exact == kept.sum()
+        assert found.area_exact == selected.sum()

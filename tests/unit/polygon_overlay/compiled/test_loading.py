@@ -80,14 +80,14 @@ def arrays_of(part: Any) -> list[np.ndarray]:
 
 def test_rows_in_use_together_lie_apart() -> None:
     scratch = workspace.scratch_for(100, 5, 300, 0, 0)
-    w = workspace.rows_of(scratch.words)
+    w = workspace.workspace_at(scratch.addresses)
     steps = (
         [w.given, w.tree, w.events, w.unions, w.along],
         [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.loose],
         [w.given, w.tree, w.events, w.unions, w.along.starts, w.along.order, w.chains, w.stars, w.faces, w.components],
-        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.holders],
-        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.walk, w.found, *w.holders[:3], *w.holders[6:]],
-        [w.given, w.events.first, w.events.second, w.found, w.rounded, w.ranking, *w.holders[:3], *w.holders[6:]],
+        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.flood],
+        [w.given, w.tree.marks, w.chains, w.stars, w.faces, w.walk, w.rings, *w.flood[:3], *w.flood[6:]],
+        [w.given, w.events.first, w.events.second, w.rings, w.rounded, w.ranking, *w.flood[:3], *w.flood[6:]],
     )
     for step in steps:
         assert not any(itertools.starmap(np.shares_memory, itertools.combinations(arrays_of(step), 2)))
@@ -96,15 +96,15 @@ def test_rows_in_use_together_lie_apart() -> None:
 def test_what_suffices_is_kept() -> None:
     workspace.release()
     first = workspace.scratch_for(100, 2, 300, 50, 5)
-    workspace.keep(first)
+    workspace.return_scratch(first)
     assert workspace.scratch_for(50, 1, 200, 40, 4) is first
     assert workspace.scratch_for(50, 1, 200, 40, 4) is not first  # it is the caller's until it is kept
-    workspace.keep(first)
+    workspace.return_scratch(first)
     wider = workspace.scratch_for(100, 2, 300, 10**7, 5)
     assert wider.buffers is first.buffers
     assert len(wider.output.vertices) >= 10**7
-    workspace.keep(wider)  # it is too large
+    workspace.return_scratch(wider)  # it is too large
     assert workspace.scratch_for(1, 1, 1, 1, 1) is not wider
-    workspace.keep(first)
+    workspace.return_scratch(first)
     workspace.release()
     assert workspace.scratch_for(50, 1, 200, 40, 4) is not first

@@ -12,7 +12,7 @@ from engine.polygon_overlay.compiled.loading import LEFT_OUT, RingArrays
 from engine.polygon_overlay.compiled.reducing import count_left_out, expand_rings
 from engine.polygon_overlay.implicit_rings import ImplicitRings, one_polygon
 from engine.polygon_overlay.pair_arrays import PolygonArrays
-from engine.polygon_overlay.run import KEPT_ARRAYS, Operation, run_blocks
+from engine.polygon_overlay.run import SELECTED_ARRAYS, Operation, run_blocks
 from engine.running.budget import Budget
 from engine.types import read_only
 from tests.unit.polygon_overlay.checks import OPERATIONS
@@ -107,9 +107,9 @@ def compare(subject: Rings, clip: Rings, operation: Operation, size: int, has_ar
     """Compare with the ordinary way; tell whether edges were left out."""
     sides = tuple(PolygonArrays(*arrays(rings), one_polygon(len(rings))) for rings in (subject, clip))
     largest = sum(len(each.vertices) for each in sides), len(subject) + len(clip)
-    expected = run_blocks(*sides, largest, KEPT_ARRAYS[operation], Budget())
+    expected = run_blocks(*sides, largest, SELECTED_ARRAYS[operation], Budget())
     assert expected is not None
-    found = run_blocks(*sides, largest, KEPT_ARRAYS[operation], Budget(), size=size, most=2.0)
+    found = run_blocks(*sides, largest, SELECTED_ARRAYS[operation], Budget(), size=size, most=2.0)
     if found is None:
         return False
     if expected.status[0] == PairStatus.DONE:
@@ -172,12 +172,12 @@ def test_runs_there_and_back() -> None:
     names = [(2, LEFT_OUT), (5, -1), (7, 12), (18, LEFT_OUT), (14, -1), (9, LEFT_OUT), (9, -1)]
     sources, offsets = np.array(names, np.int32), np.array([0, 5, 7])
     both = np.concatenate([subjects, clips])
-    kept = both[sources[:, 0]] + 0.5
+    selected = both[sources[:, 0]] + 0.5
     full = [2, 3, 4, 5, 7, 18, 17, 16, 15, 14, 9, 9]
     n = len(names) + int(count_left_out(sources, 0, 5)) + int(count_left_out(sources, 5, 6))
     made = np.empty((n, 2)), np.empty((n, 2), np.int32), np.empty(3, np.int64)
     expand_rings(
-        kept,
+        selected,
         sources,
         offsets[:2],
         subjects,

@@ -44,7 +44,7 @@ def test_most_areas_are_sure_without_the_exact_sum() -> None:
     for n in (5, 40, 400):
         found = overlay(Polygon([star(random, n)]), Polygon([star(random, n) + 0.1]), "union").exact
         assert isinstance(found, ImplicitRings)
-        assert found.sure_areas(np.array([0, found.n_rings]))[1] == 0
+        assert found.certified_areas(np.array([0, found.n_rings]))[1] == 0
 
 
 @pytest.mark.parametrize("x", [0.0, 1.5, 3.0, -3.0, -1e7, 2.0**40])
@@ -56,7 +56,7 @@ def test_areas_of_long_rings_wherever_they_lie(x: float) -> None:
         found = overlay(Polygon([subject]), Polygon([clip]), "union")
         assert_nearest(found)
         assert isinstance(found.exact, ImplicitRings)
-        assert found.exact.sure_areas(np.array([0, found.exact.n_rings]))[1] == 0
+        assert found.exact.certified_areas(np.array([0, found.exact.n_rings]))[1] == 0
 
 
 def test_a_tie_and_a_sum_that_cancels_are_left_to_the_exact_sum() -> None:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from engine.polygon_overlay import in_integers
-from engine.polygon_overlay.pair_arrays import Found, joined, one_pair
-from engine.polygon_overlay.run import arranged_again
+from engine.polygon_overlay.pair_arrays import PairResults, concatenate_pairs, one_pair
+from engine.polygon_overlay.run import rebuild_from_rounded_rings
 from engine.running.budget import Budget
 
 Ring = list[tuple[float, float]]
 
 
-def found_of(pieces: list[list[Ring]]) -> Found:
+def found_of(pieces: list[list[Ring]]) -> PairResults:
     rings = [ring for piece in pieces for ring in piece]
     vertices = np.array([vertex for ring in rings for vertex in ring], float)
     offsets, piece_offsets = np.cumsum([0, *map(len, rings)]), np.cumsum([0, *map(len, pieces)])
@@ -28,8 +28,11 @@ def crowd(random: np.random.Generator, n_pieces: int, reach: int) -> list[list[R
     ]
 
 
-def agree(given: Found) -> Found:
-    compiled, exact = arranged_again(given, Budget()), in_integers.arranged_again(given, Budget())
+def agree(given: PairResults) -> PairResults:
+    compiled, exact = (
+        rebuild_from_rounded_rings(given, Budget()),
+        in_integers.rebuild_from_rounded_rings(given, Budget()),
+    )
     for name in ("vertices", "ring_offsets", "piece_offsets"):
         assert getattr(compiled, name).tolist() == getattr(exact, name).tolist()
     assert sorted(compiled.evidence.tolist()) == sorted(exact.evidence.tolist())
@@ -64,10 +67,10 @@ def test_rings_through_one_point() -> None:
 def test_pairs_together_are_pairs_alone() -> None:
     random = np.random.default_rng(1)
     pairs = [found_of(crowd(random, 5, 5)) for _ in range(9)]
-    together, n_before, n_found = arranged_again(joined(pairs), Budget()), 0, 0
+    together, n_before, n_found = rebuild_from_rounded_rings(concatenate_pairs(pairs), Budget()), 0, 0
     expected: list[list[int]] = []
     for pair in pairs:
-        alone = arranged_again(pair, Budget())
+        alone = rebuild_from_rounded_rings(pair, Budget())
         expected += (alone.evidence + np.array([n_found, n_before])).tolist()
         n_found, n_before = n_found + int(alone.counts[0, 1]), n_before + int(pair.counts[0, 1])
     assert together.evidence.tolist() == expected
