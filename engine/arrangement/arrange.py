@@ -114,11 +114,11 @@ def arrange(
         if count % _POLL == 0:
             budget.check()
         lines.append(line_through(nodes.points[tail], nodes.points[head]))
-    on_segment, n_exact = _meet_all(nodes, ends, lines, budget)
+    on_segment, n_exact = _intersect_all(nodes, ends, lines, budget)
     return _split(nodes, ends, lines, list(merged.values()), on_segment, n_exact, budget)
 
 
-def _meet_all(
+def _intersect_all(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], budget: Budget
 ) -> tuple[dict[int, set[int]], int]:
     """Return by segment the nodes inside it, if any, and the number of pairs decided in integers."""
@@ -147,7 +147,7 @@ def _meet_all(
                 on_segment.setdefault(j, set()).add(number)
             else:
                 n_exact += 1
-                _meet(nodes, ends, lines, i, j, on_segment)
+                _intersect_pair(nodes, ends, lines, i, j, on_segment)
     return on_segment, n_exact
 
 
@@ -188,7 +188,7 @@ def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray,
     return result
 
 
-def _meet(
+def _intersect_pair(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], i: int, j: int, on_segment: dict[int, set[int]]
 ) -> None:
     """Add the common nodes of the segments `i` and `j` that lie inside one of them to `on_segment`."""

@@ -16,7 +16,7 @@ from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, measure, minus2, place, point
 from engine.predicates.error_free import U2, is_correctly_rounded, two_sum, workspace
-from engine.predicates.orientation import lower
+from engine.predicates.orientation import smaller_nonzero
 from engine.predicates.parameters import compare_differences
 from engine.predicates.vectors import as_point2
 from engine.types import FlagArray, FloatArray, IntArray, Point2
@@ -192,8 +192,8 @@ def _are_tied(a: Placed, b: Placed, one: Found, two: Found) -> bool:
             return False
     u, v = as_point2(own.points, p), as_point2(own.points, q)
     c, d = as_point2(other.points, edge), as_point2(other.points, other.following[edge])
-    least = lower(lower(lower(lower(np.inf, u.x), u.y), v.x), v.y)
-    if lower(lower(lower(lower(least, c.x), c.y), d.x), d.y) < _LEAST_FACTOR:
+    least = smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(np.inf, u.x), u.y), v.x), v.y)
+    if smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(least, c.x), c.y), d.x), d.y) < _LEAST_FACTOR:
         return False
     return compare_differences(v.x, u.x, d.y, c.y, v.y, u.y, d.x, c.x, workspace(16)) == 0
 

@@ -23,7 +23,7 @@ _SOUPS: Final = ("stl",)
 M = TypeVar("M", bound=Mesh)
 _ELEMENT: Final = re.compile(rb"^[ \t]*([vf])(?=\s|\Z)([^\n#]*)", re.MULTILINE)
 """The lines of an OBJ file that define vertices and faces."""
-_BESIDE: Final = re.compile(rb"/\S*")
+_TEXTURE_AND_NORMAL: Final = re.compile(rb"/\S*")
 """The texture and normal numbers after that of a vertex."""
 
 
@@ -153,7 +153,7 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
         ) from error
     if not len(faces):
         raise EmptyGeometryError(f"the {file_format} file holds no faces", ("file",))
-    return _merged(vertices, *_cut(vertices, faces), file_format)
+    return _merge_vertices(vertices, *_triangulate(vertices, faces), file_format)
 
 
 def _read_obj(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
@@ -165,7 +165,7 @@ def _read_obj(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
             vertices.append(fields.split()[:3])
             continue
         if b"/" in fields:
-            fields = _BESIDE.sub(b"", fields)
+            fields = _TEXTURE_AND_NORMAL.sub(b"", fields)
         corners = [*map(int, fields.split())]
         if len(corners) < 3 or min(corners) < 1:
             given, n = corners, len(vertices) + 1
@@ -216,7 +216,7 @@ _READERS: Final[dict[str, Callable[[IO[bytes]], tuple[FloatArray, Any]]]] = {
 """Readers of formats with polygons: trimesh cuts them as fans, also those that are not convex."""
 
 
-def _cut(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
+def _triangulate(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
     """Return the triangles of faces, cut like in the constructors (ear_cutting.py), and the face of each."""
     counts, numbers = np.fromiter(map(len, faces), np.int64), np.arange(len(faces))
     indices = (
@@ -238,8 +238,8 @@ def _cut(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
     ends = np.cumsum(counts)
     following = np.arange(1, len(indices) + 1)
     following[ends - 1] = ends - counts
-    stands = (merged == merged[following]) & (indices != indices[following]) & (counts[owners] > 3)
-    left = np.flatnonzero(~stands)
+    is_zero_edge = (merged == merged[following]) & (indices != indices[following]) & (counts[owners] > 3)
+    left = np.flatnonzero(~is_zero_edge)
     left = left[np.bincount(owners[left], minlength=len(faces))[owners[left]] > 2]
     numbers, counts = np.unique(owners[left], return_counts=True)
     offsets = np.append(np.int64(0), np.cumsum(counts))
@@ -253,7 +253,7 @@ def _cut(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
     return triangles.reshape(-1, 3), numbers[cut_from]
 
 
-def _merged(vertices: FloatArray, faces: IntArray, numbers: IntArray, file_format: str) -> MeshOfFile:
+def _merge_vertices(vertices: FloatArray, faces: IntArray, numbers: IntArray, file_format: str) -> MeshOfFile:
     """Return the vertices without duplicates, by first occurrence, and the faces that this does not collapse."""
     n_faces, remaining = len(faces), np.arange(len(faces))
     first, originals = first_equal(frozen(vertices)), np.arange(len(vertices))

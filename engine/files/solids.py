@@ -94,7 +94,7 @@ def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> Non
     elif suffix == ".npz":
         np.savez(str(target), **columns)  # type: ignore[arg-type]
     elif suffix in ("", ".csv"):
-        with _opened(target) as file:
+        with _open_output(target) as file:
             file.write(_csv(columns))
     else:
         several = "" if len(columns) == 1 else " (one .npy array cannot hold several columns)"
@@ -113,7 +113,7 @@ def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
 
 def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
     """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if any."""
-    with _opened(target) as file:
+    with _open_output(target) as file:
         member = "" if crs is None else f'"crs": {json.dumps(crs)}, '
         file.write(f'{{"type": "FeatureCollection", {member}"features": [')
         for number, feature in enumerate(features):
@@ -122,7 +122,7 @@ def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: A
         file.write("\n]}\n")
 
 
-def _opened(target: str | None) -> AbstractContextManager[TextIO]:
+def _open_output(target: str | None) -> AbstractContextManager[TextIO]:
     return nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8")
 
 

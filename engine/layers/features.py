@@ -34,7 +34,7 @@ from engine.solids.checks import as_points, shown
 from engine.solids.ragged import summed
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
-_CHECKED: Final = 1000
+_BATCH: Final = 1000
 """Features made in one step."""
 _ROW: Final = 55
 """Lower bound of the bytes of JSON of a row, without copied members and positions."""
@@ -74,8 +74,8 @@ class FeatureRows:
         return len(self.offsets) - 1
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        for start in range(0, len(self), _CHECKED):
-            yield from self.make(start, min(len(self), start + _CHECKED))
+        for start in range(0, len(self), _BATCH):
+            yield from self.make(start, min(len(self), start + _BATCH))
 
     @property
     def crs(self) -> Any:

@@ -41,7 +41,7 @@ _BUDGET_STEP: Final = 2**20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Copied:
+class _CopiedMembers:
     """JSON that rows copy from the features of a layer.
 
     | field | by | meaning |
@@ -128,7 +128,7 @@ def members_of(
             "one",
             (),
         )
-    left, right = (_copied(side, shared, end, limits) for side, end in zip(sides, ("_1", "_2")))
+    left, right = (_copied_members(side, shared, end, limits) for side, end in zip(sides, ("_1", "_2")))
 
     def members(first: int, second: int) -> bytes:
         inside, sources, ids = [], b"", b""
@@ -147,7 +147,7 @@ def members_of(
     return members, n_bytes
 
 
-def _copied(side: Collection, shared: set[str], end: str, limits: Limits) -> _Copied:
+def _copied_members(side: Collection, shared: set[str], end: str, limits: Limits) -> _CopiedMembers:
     """Return the JSON that rows copy of a layer; names that both layers have get an ending."""
 
     def renamed() -> Iterator[dict[str, Any]]:
@@ -159,7 +159,7 @@ def _copied(side: Collection, shared: set[str], end: str, limits: Limits) -> _Co
     ids = texts_of(side, ({"id": each["id"]} if "id" in each else {} for each in side.features), "id", limits)
     ids = [b"," + text[1:-1] if len(text) > 2 else b"" for text in ids]
     id_bytes = np.array([*map(len, ids), 0], np.int64)
-    return _Copied(properties, ids, np.array([*map(len, properties), 0], np.int64) + id_bytes, id_bytes)
+    return _CopiedMembers(properties, ids, np.array([*map(len, properties), 0], np.int64) + id_bytes, id_bytes)
 
 
 def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntArray, list[dict[int, bytes]]]:

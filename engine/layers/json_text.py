@@ -143,19 +143,19 @@ def _encoded(value: Any) -> bytes:
         except UnicodeEncodeError:  # half a surrogate pair, which only an escape can write
             return _encode_ascii(value).encode()
     except (ValueError, TypeError, RecursionError) as error:
-        path, is_number = _place(value)
+        path, is_number = _find_invalid(value)
         raise NotJsonError(error, path, is_number) from None
 
 
-def _listed(value: Any) -> Any:
+def _as_list(value: Any) -> Any:
     """Return an array of numbers as a list."""
     if not isinstance(value, (np.ndarray, np.generic)):
         raise TypeError(f"it is of type {type(value).__name__}")
     return value.tolist()
 
 
-_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=_listed).encode
-_encode_ascii = json.JSONEncoder(allow_nan=False, separators=(",", ":"), default=_listed).encode
+_encode = json.JSONEncoder(allow_nan=False, ensure_ascii=False, separators=(",", ":"), default=_as_list).encode
+_encode_ascii = json.JSONEncoder(allow_nan=False, separators=(",", ":"), default=_as_list).encode
 
 
 def _count(value: Any, most: int) -> int:
@@ -185,7 +185,7 @@ def _count(value: Any, most: int) -> int:
     return n
 
 
-def _place(value: Any) -> tuple[Path, bool]:
+def _find_invalid(value: Any) -> tuple[Path, bool]:
     """Return the path to the first part of a small value that has no JSON, and whether that is a float."""
     items: Iterable[tuple[Any, Any]] = ()
     if isinstance(value, dict):
@@ -196,6 +196,6 @@ def _place(value: Any) -> tuple[Path, bool]:
         try:
             _encode({name: item})
         except (ValueError, TypeError, RecursionError):
-            path, is_number = _place(item)
+            path, is_number = _find_invalid(item)
             return (name if isinstance(name, (str, int)) else str(name), *path), is_number
     return (), isinstance(value, (float, np.floating))

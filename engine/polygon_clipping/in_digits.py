@@ -28,7 +28,7 @@ from engine.polygon_clipping.rings import (
     has_bridges,
     plane_of,
 )
-from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, put_double, sign_of, sum_products
+from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, sign_of, store_double, sum_products
 from engine.types import OPEN, FlagArray, FloatArray, IntArray
 
 TOO_LONG = -1
@@ -102,7 +102,7 @@ def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
             s.loaded[side, k] = _ONE
         else:
             s.loaded[side, k] = _LOADED + (4 * side + k) * SLOT
-            put_double(s.heap, s.loaded[side, k], s.points[v, k])
+            store_double(s.heap, s.loaded[side, k], s.points[v, k])
 
 
 @inline

@@ -58,11 +58,11 @@ class Grid(NamedTuple):
     into: tuple[float, float, float]
     back: tuple[float, float, float]
 
-    def units_of(self, vertices: FloatArray) -> FloatArray:
+    def to_units(self, vertices: FloatArray) -> FloatArray:
         """Return coordinates in units of the grid; for powers of ten they are rounded to doubles."""
-        near_by = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
+        near_integer = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
         units = np.empty_like(vertices)
-        if not entry_of(scale)(vertices, *self.into, near_by, _LEAST, units) < _MOST:
+        if not entry_of(scale)(vertices, *self.into, near_integer, _LEAST, units) < _MOST:
             raise InvalidInputError(
                 f"grid must be no finer than 2^-51 of the largest coordinate, {np.abs(vertices).max().item()!r}; got "
                 f"{self.spacing!r}",
@@ -70,7 +70,7 @@ class Grid(NamedTuple):
             )
         return read_only(units)
 
-    def places_of(self, units: FloatArray) -> tuple[FloatArray, float]:
+    def to_coordinates(self, units: FloatArray) -> tuple[FloatArray, float]:
         """Return the doubles nearest to whole multiples of the grid, and their largest magnitude."""
         places = np.empty_like(units)
         largest = entry_of(scale)(units, *self.back, 0.0, 0.0, places)
@@ -94,6 +94,7 @@ def grid_of(size: object) -> Grid:
 
 @functools.lru_cache(64)
 def _grid_of(size: float) -> Grid | None:
+    """Return the grid of a power of two or ten, else None."""
     mantissa, exponent = frexp(size)
     if mantissa == 0.5:
         half = (exponent - 1) // 2
@@ -183,7 +184,7 @@ def snapped_overlay(pair: PairResults, snapped: _SnappedRings, grid: Grid, start
     # by powers of ten a vertex and an edge come nearer by less than half a cell, below 2^51 cells
     if grid.base == 10 and not snapped.are_apart and not _are_distinguishable(snapped.vertices, snapped.offsets):
         return None
-    places, largest = grid.places_of(snapped.vertices)
+    places, largest = grid.to_coordinates(snapped.vertices)
     has_moved = snapped.n_moved > 0 or snapped.edges is not None
     moved = pair.displacement.item()
     displacement = nextafter(moved + HALF_DIAGONAL, inf) if has_moved else moved
@@ -246,7 +247,7 @@ def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budg
 
     start: the first vertex of the clip. again: arranges rings.
     """
-    vertices, largest = grid.places_of(read_only(result.vertices))
+    vertices, largest = grid.to_coordinates(read_only(result.vertices))
     if grid.base == 10 and not _are_distinguishable(result.vertices, result.ring_offsets):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=PairStatus.MAY_CROSS)
         if not np.array_equal(again(rings, budget).vertices, vertices):

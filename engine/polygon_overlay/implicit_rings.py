@@ -27,7 +27,7 @@ from engine.types import BoolArray, FloatArray, IntArray, read_only
 _NEVER: Final = np.zeros(1, np.uint8)
 
 
-NOTHING: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
+NO_RINGS: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
 
 
 def edges_along(sources: npt.NDArray[np.signedinteger]) -> IntArray:
@@ -145,18 +145,18 @@ class ImplicitRings(NamedTuple):
 def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
     """Return rings of doubles as rings over themselves."""
     own = RingArrays(read_only(vertices), read_only(offsets))
-    n, few = len(vertices), _FEW_THEMSELVES
-    sources = few[:n] if n <= len(few) else _themselves(n)
-    return ImplicitRings(own, NOTHING, sources, own.offsets)
+    n, few = len(vertices), _FEW_IDENTITY_SOURCES
+    sources = few[:n] if n <= len(few) else _identity_sources(n)
+    return ImplicitRings(own, NO_RINGS, sources, own.offsets)
 
 
-def _themselves(n: int) -> npt.NDArray[np.int32]:
+def _identity_sources(n: int) -> npt.NDArray[np.int32]:
     sources = np.full((n, 2), -1, np.int32)
     sources[:, 0] = np.arange(n)
     return read_only(sources)
 
 
-_FEW_THEMSELVES: Final = _themselves(1024)
+_FEW_IDENTITY_SOURCES: Final = _identity_sources(1024)
 """Sources of small rings, which are requested often."""
 
 

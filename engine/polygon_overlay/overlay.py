@@ -27,7 +27,7 @@ from engine.errors import InvalidArrayError, InvalidOperationError, UnsupportedS
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.grid import from_units, grid_of
-from engine.polygon_overlay.implicit_rings import NOTHING
+from engine.polygon_overlay.implicit_rings import NO_RINGS
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.pair_arrays import polygon_arrays_of
 from engine.polygon_overlay.result import Overlay, OverlayOptions
@@ -186,8 +186,8 @@ def overlay_rings(
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
     if units is not None:
-        first = RingArrays(units.units_of(subject.vertices), subject.offsets)
-        second = RingArrays(units.units_of(clip.vertices), clip.offsets)
+        first = RingArrays(units.to_units(subject.vertices), subject.offsets)
+        second = RingArrays(units.to_units(clip.vertices), clip.offsets)
     compiled = overlay_compiled(first, second, operation, budget, nesting, units)
     if compiled is not None:
         result, n_exact, n_rational = *compiled, 0
@@ -344,7 +344,7 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
     given = rings_of(Polygon(rings))
     nesting = Nesting(np.zeros(len(given.offsets) - 1, np.int64), np.zeros(0), int(_RULES[rule]))
     with Budget(deadline, cancel) as budget:
-        result, _, _ = overlay_rings(given, NOTHING, "union", budget, nesting)
+        result, _, _ = overlay_rings(given, NO_RINGS, "union", budget, nesting)
     return Polygon(result.rings)
 
 
@@ -354,7 +354,7 @@ def _arrange_all(
     """Arrange the rings of all polygons, each polygon a source."""
     rings, sources, starts = _rings_of_all(polygons)
     nesting = Nesting(sources, np.zeros(0), int(rule))
-    result, n_exact, n_rational = overlay_rings(rings, NOTHING, "union", budget, nesting, grid)
+    result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)
     object.__setattr__(result, "_starts", starts)
     return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
 
@@ -369,7 +369,7 @@ def _rings_of_all(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntA
             rings_of(polygon, "polygons", k)
     each = cast("Sequence[Polygon]", polygons)
     if not each:
-        return NOTHING, np.zeros(0, np.int64), np.zeros(0, np.int64)
+        return NO_RINGS, np.zeros(0, np.int64), np.zeros(0, np.int64)
     flat = polygon_arrays_of(each)
     n_rings = np.diff(flat.polygon_offsets)
     sources = np.repeat(np.cumsum(n_rings > 0) - 1, n_rings)

@@ -10,7 +10,7 @@ import numpy as np
 from engine.compiling.jit import entry_of
 from engine.errors import RingTooShortError
 from engine.polygon_overlay.compiled.kernel import PairStatus
-from engine.polygon_overlay.compiled.loading import find_most
+from engine.polygon_overlay.compiled.loading import largest_counts
 from engine.polygon_overlay.implicit_rings import one_polygon
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted, summed
@@ -144,9 +144,9 @@ class PolygonArrays(NamedTuple):
         starts = self.ring_offsets[self.polygon_offsets]
         return starts[1:] - starts[:-1]
 
-    def most(self) -> tuple[int, int]:
+    def largest_counts(self) -> tuple[int, int]:
         """Return the largest numbers of vertices and of rings of a polygon."""
-        largest: tuple[int, int] = entry_of(find_most)(self.ring_offsets, self.polygon_offsets)
+        largest: tuple[int, int] = entry_of(largest_counts)(self.ring_offsets, self.polygon_offsets)
         return largest
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:

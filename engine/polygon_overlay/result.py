@@ -204,14 +204,14 @@ class Overlay:
         return made[name]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Fill in what was pickled, checked: kernels, and whoever goes by offsets, trust these."""
+        """Restore the fields from a pickle, checked: kernels trust offsets."""
         vars(self).update(state)
         as_nested_offsets(len(self.vertices), ring_offsets=self.ring_offsets, piece_offsets=self.piece_offsets)
         if isinstance(self.exact, ImplicitRings):
             self.exact.check()
 
     def __dir__(self) -> Iterable[str]:
-        """Name what is not made yet as well, for who completes names."""
+        """List also the fields that are not computed yet."""
         return {*super().__dir__(), *self.__dataclass_fields__}
 
     @property

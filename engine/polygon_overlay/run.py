@@ -29,7 +29,7 @@ from engine.polygon_overlay.compiled.workspace import (
     small_pool,
 )
 from engine.polygon_overlay.grid import Grid, from_units, snap_vertices, snapped_overlay, snapped_to_units
-from engine.polygon_overlay.implicit_rings import NOTHING, ImplicitRings, one_polygon
+from engine.polygon_overlay.implicit_rings import NO_RINGS, ImplicitRings, one_polygon
 from engine.polygon_overlay.pair_arrays import PairResults, PolygonArrays, concatenate_parts, ring_sizes
 from engine.polygon_overlay.result import Overlay, build_overlay
 from engine.polygon_overlay.rounds import make_valid_after_rounding
@@ -77,7 +77,7 @@ def run_kernel(
     selected: as of `overlay_pairs`, one of `SELECTED_ARRAYS`, or `EACH_PART`. nesting: of the rings of subjects, each a
     source of its own, as of `overlay_pairs`.
     """
-    n_vertices, n_rings = map(sum, zip(subjects.most(), clips.most(), strict=True))
+    n_vertices, n_rings = map(sum, zip(subjects.largest_counts(), clips.largest_counts(), strict=True))
     is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and selected[3] < 2
     if is_plain and n_vertices >= max(_MANY, _MANY_IN_RING * n_rings):
         size = _BLOCK if n_vertices < _BLOCKS_GROW else 2 * _BLOCK
@@ -89,12 +89,12 @@ def run_kernel(
 
 def run_blocks(
     subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], selected: FlagArray, budget: Budget,
-    nesting: Nesting = UNNAMED, size: int = 0, most: float = _MOST,
+    nesting: Nesting = UNNAMED, size: int = 0, max_active: float = _MOST,
 ) -> PairResults | None:  # fmt: skip
     """Overlay polygons pair by pair; with a ``size``, one pair reduced by blocks of so many edges.
 
-    Then None where the fraction ``most`` of edges or more is active, or the pair is not DONE: doubtful rounded rings
-    are arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair.
+    Then None where a fraction ``max_active`` or more of the edges is active, or the pair is not DONE: doubtful rounded
+    rings are arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair.
     """
     n, (n_vertices, n_rings) = len(subjects.polygon_offsets) - 1, largest
     first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
@@ -108,7 +108,7 @@ def run_blocks(
     while reached < n:  # bound: each turn advances, or makes room for one pair, geometrically
         scratch = scratch_for(n_vertices, n_rings, n_contacts, n_out, n_out_rings)
         if size:
-            n_most = int(most * n_vertices)
+            n_most = int(max_active * n_vertices)
             reduced = entry_of(reduce_pair)(first, second, size, n_most, budget.flag, scratch.addresses)
             if reduced.n == 0:
                 budget.check()
@@ -149,6 +149,7 @@ def _expand(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArr
 def _run_pair(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting
 ) -> PairResults:
+    """Overlay one pair; large ones are charged to the budget first."""
     if (n_vertices := len(subject.vertices) + len(clip.vertices)) >= _MANY:
         budget.take(_BY_VERTEX * n_vertices)
     first, second = (PolygonArrays(*side, one_polygon(len(side.offsets) - 1)) for side in (subject, clip))
@@ -210,7 +211,7 @@ def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResult
     items = summed(n_rings)
     shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))
     subjects = PolygonArrays(read_only(rings.vertices), read_only(rings.ring_offsets), items)
-    none = PolygonArrays(*NOTHING, read_only(np.zeros_like(items)))
+    none = PolygonArrays(*NO_RINGS, read_only(np.zeros_like(items)))
     nesting = Nesting(shells - np.repeat(items[:-1], n_rings), ring_sizes(rings)[shells], int(Rule.AGAIN))
     return run_kernel(subjects, none, SELECTED_ARRAYS["union"], budget, nesting)
 

@@ -71,11 +71,10 @@ def touching(
 ) -> Touching:
     """Return where pairs of polygons, firsts[k] and seconds[k], each even-odd, meet without common area.
 
-    Boundary, degenerate input: polygons are closed sets, the closure of their interior: spikes and rings without area
-    are not there, walls between parts are not seen. A line bends where the border does, and ends where lines meet.
-    Accuracy: decisions exact. Coordinates are those of the input, but for places where a polygon crosses itself: the
-    nearest doubles.
-    Cost: as `overlay_batch`; of pairs whose rounded rings need another look, some 10 us per edge more.
+    Boundary, degenerate input: polygons are closed sets, the closure of their interior: spikes, rings without area and
+    walls between parts are ignored. A line bends where the border does, and ends where lines meet.
+    Accuracy: decisions exact. Coordinates are those of the input; self-intersections are the nearest doubles.
+    Cost: as `overlay_batch`; for pairs whose rounded rings are doubtful some 10 us per edge more.
     """
     by_block: dict[int, Touching] = {}
 

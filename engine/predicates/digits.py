@@ -68,7 +68,7 @@ def normalise(heap: IntArray, a: int) -> None:
 
 
 @inline
-def put_double(heap: IntArray, a: int, x: float) -> None:
+def store_double(heap: IntArray, a: int, x: float) -> None:
     """Store a finite double at place a."""
     fraction, exponent = math.frexp(x)
     whole, exponent = int(fraction * 2.0**53), exponent - 53
@@ -158,8 +158,8 @@ def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, 
         return double, True
     side = 1.0 if low > 0.0 else -1.0
     other = np.nextafter(double, side * np.inf)
-    put_double(heap, free, double)
-    put_double(heap, free + SLOT, 0.5 * (other - double))
+    store_double(heap, free, double)
+    store_double(heap, free + SLOT, 0.5 * (other - double))
     terms[0, 0], terms[0, 1], terms[0, 2] = x, one, 1
     terms[1, 0], terms[1, 1], terms[1, 2] = free, w, -1
     terms[2, 0], terms[2, 1], terms[2, 2] = free + SLOT, w, -1

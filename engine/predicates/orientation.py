@@ -142,7 +142,7 @@ def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
 
 
 @inline
-def lower(smallest: float, value: float) -> float:
+def smaller_nonzero(smallest: float, value: float) -> float:
     """Return the smaller of `smallest` and |value|, ignoring zero."""
     return min(smallest, abs(value)) if value != 0.0 else smallest
 
@@ -150,7 +150,7 @@ def lower(smallest: float, value: float) -> float:
 @inline
 def _shift_of(a: float, b: float, c: float, d: float, bottom: int, top: int) -> int:
     """Return the `axis_shift` of four coordinates."""
-    smallest = lower(lower(lower(lower(float("inf"), a), b), c), d)
+    smallest = smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(float("inf"), a), b), c), d)
     return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), bottom, top)
 
 
@@ -219,11 +219,11 @@ def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
     e, m = workspace(192), workspace(16)  # 3 minors of 16 components, times 2, as 2 products each
     n = 0
     if az != 0.0:
-        n = _add_times(e, n, m, minor(m, cx, cx_tail, cy, cy_tail, bx, bx_tail, by, by_tail), az, az_tail)
+        n = _add_scaled_minor(e, n, m, minor(m, cx, cx_tail, cy, cy_tail, bx, bx_tail, by, by_tail), az, az_tail)
     if bz != 0.0:
-        n = _add_times(e, n, m, minor(m, ax, ax_tail, ay, ay_tail, cx, cx_tail, cy, cy_tail), bz, bz_tail)
+        n = _add_scaled_minor(e, n, m, minor(m, ax, ax_tail, ay, ay_tail, cx, cx_tail, cy, cy_tail), bz, bz_tail)
     if cz != 0.0:
-        n = _add_times(e, n, m, minor(m, bx, bx_tail, by, by_tail, ax, ax_tail, ay, ay_tail), cz, cz_tail)
+        n = _add_scaled_minor(e, n, m, minor(m, bx, bx_tail, by, by_tail, ax, ax_tail, ay, ay_tail), cz, cz_tail)
     return sign(e, n)
 
 
@@ -253,7 +253,7 @@ def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
         heights += abs(z)
         lows += abs(z_tail) + abs(qx_tail) + abs(qy_tail) + abs(left_tail) + abs(right_tail)
         lows += abs(minor_tail) + abs(term_tail) + abs(total_tail)
-        smallest = lower(lower(lower(smallest, z), qx), qy)
+        smallest = smaller_nonzero(smaller_nonzero(smaller_nonzero(smallest, z), qx), qy)
         p, q, r = q, r, p
     bound = 32.0 * U2 * permanent + 2.0 * GUARD_3D * (1.0 + heights)
     if lows == 0.0 and smallest >= SMALLEST_EXACT:
@@ -264,7 +264,7 @@ def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 
 @inline
-def _add_times(e: Components, n: int, m: Components, length: int, z: float, z_tail: float) -> int:
+def _add_scaled_minor(e: Components, n: int, m: Components, length: int, z: float, z_tail: float) -> int:
     """Add (z + z_tail) times the minor m to e; return the new length of e."""
     if z_tail != 0.0:
         n = add_scaled(e, n, m, length, z_tail)

@@ -30,9 +30,9 @@ from engine.predicates.orientation import (
     GUARD_3D,
     OUT_OF_RANGE,
     axis_shift,
-    lower,
     orient3d_exact,
     rounded_determinant,
+    smaller_nonzero,
 )
 from engine.predicates.vectors import minus
 from engine.types import UNDECIDED, FloatArray, Point3
@@ -208,10 +208,10 @@ def _common_shift(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoi
         p = a if k == 0 else (b if k == 1 else (c if k == 2 else d))
         if p.pose != UNPOSED:
             for i in range(9):
-                smallest_entry = lower(smallest_entry, float(poses[p.pose, i]))
+                smallest_entry = smaller_nonzero(smallest_entry, float(poses[p.pose, i]))
         for i in range(3 if p.pose == UNPOSED else 6):
             value = float(poses[p.pose, 6 + i]) if i > 2 else (p.x if i == 0 else (p.y if i == 1 else p.z))
-            largest, smallest = max(largest, abs(value)), lower(smallest, value)
+            largest, smallest = max(largest, abs(value)), smaller_nonzero(smallest, value)
     # a multiple of the lowest bit of the smallest entry: as if the smallest coordinate were smaller by that factor
     return axis_shift(smallest, largest, BOTTOM - exponent_of(smallest_entry), TOP)
 

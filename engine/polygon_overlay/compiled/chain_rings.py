@@ -247,6 +247,7 @@ def has_only_proper_crossings(
 
 @merged
 def _turns_left(given: Given, ring: int) -> bool:
+    """Return whether a ring is counter-clockwise."""
     top = given.tops[ring]
     return orient(given.edges, given.edges.before[top], top, given.edges.after[top]) > 0
 

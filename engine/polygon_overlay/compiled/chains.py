@@ -215,7 +215,7 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 
 @called
 def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, last: int, masks: IntArray) -> int:
-    """Let the lowest chain of each direction represent all, and close the gaps; return where the star then ends.
+    """Replace coinciding half-chains by the lowest, their representative; return where the star then ends.
 
     The other end of coinciding chains has the same chains in one direction, so it chooses the same representative.
     """

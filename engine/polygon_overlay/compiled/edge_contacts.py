@@ -115,6 +115,7 @@ rings: forest of connected rings.
 
 @merged
 def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: float, slack: float) -> None:
+    """Write event ``at``."""
     events.edge[at], events.point[at], events.other[at] = edge, point, other
     events.t[at], events.slack[at], events.reach[at] = t, slack, slack
 

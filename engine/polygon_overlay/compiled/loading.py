@@ -202,7 +202,7 @@ def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> Non
 
 
 @kernel
-def find_most(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[int, int]:
+def largest_counts(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[int, int]:
     """Return the largest numbers of vertices and of rings of a polygon."""
     n_vertices = n_rings = 0
     for k in range(polygon_offsets.shape[0] - 1):

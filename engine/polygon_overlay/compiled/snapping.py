@@ -57,11 +57,17 @@ def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reac
 
 @kernel
 def scale(
-    values: FloatArray, divisor: float, factor: float, more: float, near_by: float, least: float, scaled: FloatArray
+    values: FloatArray,
+    divisor: float,
+    factor: float,
+    more: float,
+    near_integer: float,
+    least: float,
+    scaled: FloatArray,
 ) -> float:
     """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest magnitude.
 
-    Within a relative ``near_by`` of an integer it is that integer, and below ``least`` zero.
+    Within a relative ``near_integer`` of an integer it is that integer, and below ``least`` zero.
     """
     largest = 0.0
     for k in range(values.shape[0]):
@@ -69,7 +75,7 @@ def scale(
             value = values[k, axis] / divisor * factor * more
             largest = max(largest, abs(value))
             near = np.rint(value)
-            value = near if abs(value - near) <= near_by * abs(value) else value
+            value = near if abs(value - near) <= near_integer * abs(value) else value
             scaled[k, axis] = 0.0 if abs(value) < least else value + 0.0
     return largest
 

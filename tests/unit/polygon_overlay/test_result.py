@@ -72,7 +72,7 @@ def test_gathered(most_rings: int) -> None:
     assert np.diff(found.polygon_offsets).tolist() == list(map(len, rings))
     assert np.diff(found.ring_offsets).tolist() == [len(ring) for each in rings for ring in each]
     assert found.sizes().tolist() == [sum(map(len, each)) for each in rings]
-    assert found.most() == (max(found.sizes()), max(map(len, rings)))
+    assert found.largest_counts() == (max(found.sizes()), max(map(len, rings)))
     numbers = random.permutation(7)[:4]
     some = found.take(numbers)
     for k, number in enumerate(numbers.tolist()):

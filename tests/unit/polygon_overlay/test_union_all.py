@@ -12,7 +12,7 @@ import pytest
 
 import engine
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
-from engine.polygon_overlay.implicit_rings import NOTHING
+from engine.polygon_overlay.implicit_rings import NO_RINGS
 from engine.polygon_overlay.in_integers import overlay_exactly
 from engine.polygon_overlay.overlay import less_all
 from engine.running.budget import Budget
@@ -178,7 +178,7 @@ def test_integers_agree(draw: Callable[[Random], list[Rings]], seed: int) -> Non
     layer = draw(np.random.default_rng(seed))
     sources = np.repeat(np.arange(len(layer)), [len(rings) for rings in layer])
     rings = arrays([ring for rings in layer for ring in rings])
-    exact, _ = overlay_exactly(rings, NOTHING, "union", Budget(), Nesting(sources, np.zeros(0), Rule.ANY))
+    exact, _ = overlay_exactly(rings, NO_RINGS, "union", Budget(), Nesting(sources, np.zeros(0), Rule.ANY))
     result = engine.union_all([engine.Polygon(rings) for rings in layer])
     for name in ("vertices", "ring_offsets", "piece_offsets", "area_exact", "n_pieces_exact", "n_holes_exact"):
         assert np.array_equal(getattr(exact, name), getattr(result, name)), name
@@ -211,7 +211,7 @@ def assert_filled(rule: str, number: int, seed: int | list[int]) -> None:
         rings = [ring for layer in far([rings]) for ring in layer]
     found, body = engine.filled(rings, rule), [[ring.tolist() for ring in rings]]
     nesting = Nesting(np.zeros(len(rings), np.int64), np.zeros(0), code)
-    exact, _ = overlay_exactly(arrays(rings), NOTHING, "union", Budget(), nesting)
+    exact, _ = overlay_exactly(arrays(rings), NO_RINGS, "union", Budget(), nesting)
     check(exact, body, lambda windings: is_inside(windings[0]))
     assert np.array_equal(found.vertices, exact.vertices)
     assert found.ring_offsets.tolist() == exact.ring_offsets.tolist()

@@ -16,8 +16,8 @@ from engine.predicates.digits import (
     nearest_quotient,
     negate,
     packed_numbers,
-    put_double,
     sign_of,
+    store_double,
     sum_products,
 )
 
@@ -27,7 +27,7 @@ ONE, FREE, SUM, BELOW, ROWS = 8 * SLOT, 9 * SLOT, 12 * SLOT, 13 * SLOT, 14 * SLO
 @kernel
 def put_all(heap: Any, numbers: Any) -> None:
     for i in range(numbers.size):
-        put_double(heap, i * SLOT, numbers[i])
+        store_double(heap, i * SLOT, numbers[i])
 
 
 @kernel

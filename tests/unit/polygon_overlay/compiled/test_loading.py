@@ -16,8 +16,8 @@ from engine.polygon_overlay.compiled.loading import (
     RingArrays,
     box_of,
     common_box,
-    find_most,
     is_empty,
+    largest_counts,
     load_rings,
 )
 
@@ -67,8 +67,8 @@ def test_boxes() -> None:
 
 def test_the_largest_of_many_is_found() -> None:
     ring_offsets, polygon_offsets = np.array([0, 3, 7, 10, 14]), np.array([0, 2, 2, 4])
-    assert find_most(ring_offsets, polygon_offsets) == (7, 2)
-    assert find_most(ring_offsets[:1], polygon_offsets[:1]) == (0, 0)
+    assert largest_counts(ring_offsets, polygon_offsets) == (7, 2)
+    assert largest_counts(ring_offsets[:1], polygon_offsets[:1]) == (0, 0)
 
 
 # --- Scratch: what is in use at one time lies apart, and a thread keeps what suffices ---

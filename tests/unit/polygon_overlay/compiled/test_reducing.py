@@ -109,7 +109,7 @@ def compare(subject: Rings, clip: Rings, operation: Operation, size: int, has_ar
     largest = sum(len(each.vertices) for each in sides), len(subject) + len(clip)
     expected = run_blocks(*sides, largest, SELECTED_ARRAYS[operation], Budget())
     assert expected is not None
-    found = run_blocks(*sides, largest, SELECTED_ARRAYS[operation], Budget(), size=size, most=2.0)
+    found = run_blocks(*sides, largest, SELECTED_ARRAYS[operation], Budget(), size=size, max_active=2.0)
     if found is None:
         return False
     if expected.status[0] == PairStatus.DONE:
