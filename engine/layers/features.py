@@ -172,11 +172,11 @@ def overlay_features(
     limits = Limits(deadline, cancel)
     sides = [collection_of(value, (name,), limits) for value, name in ((left, "left"), (right, "right"))]
     crs = crs_of(sides, limits)
-    members_of_row, n_bytes = members_of(sides, ("left", "right"), limits)
+    write_members, n_bytes = members_of(sides, ("left", "right"), limits)
     layers = [polygons_of(side, limits) for side in sides]
     rows = overlay_rows(layers[0], layers[1], how, limits)
     made = _with_areas(
-        rows, lambda row: members_of_row(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
+        rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
     )
     return (made, limits.accuracy) if report else made
 
@@ -233,11 +233,8 @@ def dissolve_features(
     side = collection_of(layer, ("layer",), limits)
     crs = crs_of([side], limits)
     names = _checked_names(by)
-    for member, values_of_member in (
-        ("properties", side.properties),
-        ("id", ({"id": each.get("id")} for each in side.features)),
-    ):
-        checked = texts_of(side, values_of_member, member, limits)  # none may be what JSON cannot hold
+    for member, column in (("properties", side.properties), ("id", ({"id": each.get("id")} for each in side.features))):
+        checked = texts_of(side, column, member, limits)  # none may be what JSON cannot hold
         limits.budget().take(-sum(map(len, checked)))
         del checked
     groups, values = groups_of(side, names, limits)
@@ -245,14 +242,14 @@ def dissolve_features(
     counts = np.bincount(groups, minlength=len(rows)).tolist()
     texts = [b"%b:null" % text_of(name) for name in names]
 
-    def members_of_row(row: int) -> bytes:
+    def write_members(row: int) -> bytes:
         own = texts.copy()
         for place, value in values[row].items():
             own[place] = own[place][:-4] + value
         return b'"properties":{%b}' % b",".join([*own, b'"count":%d' % counts[row]])
 
     lengths = [sum(len(value) - 4 for value in each.values()) for each in polled(values)]
-    made = _with_areas(rows, members_of_row, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
+    made = _with_areas(rows, write_members, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
     return (made, limits.accuracy) if report else made
 
 
@@ -328,7 +325,7 @@ def locate_features(
         except EngineError:
             positions = check_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
     geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
-    members_of_row, n_bytes = members_of(sides, ("point", "polygon"), limits)
+    write_members, n_bytes = members_of(sides, ("point", "polygon"), limits)
     layer = polygons_of(sides[1], limits)
     first, second, on_boundary = locate_points_in_layer(positions, layer, limits)
     first = np.array(there, np.int64)[first]
@@ -337,7 +334,7 @@ def locate_features(
 
     def members(row: int) -> bytes:
         more = (b',"boundary":false', b',"boundary":true')[int(on_boundary[row])] if second[row] != NONE else b""
-        return members_of_row(int(first[row]), int(second[row])) + more
+        return write_members(int(first[row]), int(second[row])) + more
 
     sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
     offsets, n_bytes_before = read_only(np.arange(len(first) + 1)), summed(_ROW + sizes)

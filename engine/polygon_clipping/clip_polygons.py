@@ -171,7 +171,7 @@ def clip_polygons(
 
     Examples
     --------
-    >>> from engine.solids.half_space import HalfSpace
+    >>> from engine import HalfSpace, clip_polygons
     >>> clipped = clip_polygons([[[[0, 0], [4, 0], [0, 4]]]], HalfSpace(normal=[-1.0, 0.0], offset=1.0))
     >>> clipped.rings(0)[0].tolist()
     [[0.0, 0.0], [1.0, 0.0], [1.0, 3.0], [0.0, 4.0]]

@@ -147,7 +147,7 @@ def test_rings_that_stay_are_as_arranged_again(family: str, size: float, monkeyp
 
     def bent(vertices: Any, offsets: Any, *rest: Any) -> Any:
         found = snapped(vertices, offsets, *rest)
-        return found._replace(stays=False, vertices=np.floor(vertices + 0.5), offsets=offsets, edges=None)
+        return found._replace(keeps_topology=False, vertices=np.floor(vertices + 0.5), offsets=offsets, edges=None)
 
     for operation in OPERATIONS:
         told = []

@@ -16,7 +16,7 @@ from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.in_integers import parts_exactly
 from engine.polygon_overlay.pair_arrays import PolygonSelection, polygon_arrays_of
 from engine.polygon_overlay.run import EACH_PART, run_kernel
-from engine.polygon_overlay.touching import Touching, _read, touching
+from engine.polygon_overlay.touching import Touching, _extract, touching
 from engine.running.budget import Budget
 from engine.solids.polygon import Polygon
 
@@ -105,7 +105,7 @@ def test_rings_that_cross_themselves(pytestconfig: pytest.Config) -> None:
             found = touching(PolygonSelection(one, np.arange(1)), PolygonSelection(other, np.arange(1)), budget)
             exact, places = parts_exactly(RingArrays(*one[:2]), RingArrays(*other[:2]), budget)
         parts = exact.evidence[:, 1]
-        assert shapes(found) == shapes(_read(exact, parts, np.zeros(len(parts), np.int64), places))
+        assert shapes(found) == shapes(_extract(exact, parts, np.zeros(len(parts), np.int64), places))
         n_met += len(found.lines) + len(found.points)
     assert n_settled > 0
     assert n_met > 0
@@ -123,7 +123,7 @@ def test_where_a_polygon_crosses_itself_on_a_border(order: int) -> None:
             found = touching(PolygonSelection(one, np.arange(1)), PolygonSelection(other, np.arange(1)), budget)
             exact, places = parts_exactly(RingArrays(*one[:2]), RingArrays(*other[:2]), budget)
         parts = exact.evidence[:, 1]
-        assert shapes(found) == shapes(_read(exact, parts, np.zeros(len(parts), np.int64), places))
+        assert shapes(found) == shapes(_extract(exact, parts, np.zeros(len(parts), np.int64), places))
 
 
 def test_far_exponents_and_nothing() -> None:
