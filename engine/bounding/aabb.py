@@ -7,7 +7,7 @@ With u = 2^-53, centre c and half widths h of a box, and m its largest coordinat
 stretch lengths by up to 1.5e-12 (`engine.solids.pose.TOLERANCE`), and a ball under the pose of another body counts as
 unposed.
 
-The flat cylinders around the faces below each child of a tree's inner nodes: what `lanes/boxes.py` asks.
+The flat cylinders around the faces below each child of a tree's inner nodes: the input of `lanes/boxes.py`.
 
 A disc stands on the axis through the middle of the child's box along the sum of the normals of its faces; it is as
 thick and as wide as their corners reach along that axis and away from it.

@@ -8,7 +8,7 @@
 
 Node 0 is the root. Coordinates are those of the tree: x = origin + scale * local with a power of two for scale, so that
 every local coordinate is at most 2 in magnitude and float32 will do. The origin lies where most items are, in the
-median of a few: there float32 is fine enough for details that are small beside the whole. Half widths are enlarged by
+median of a few: there float32 is fine enough for details that are small against the whole. Half widths are enlarged by
 what the conversion may lose: a child's box holds its items. `lanes/boxes.py` tests all eight lanes at the same time, so
 a block of eight items costs as much as one item.
 

@@ -9,7 +9,7 @@ Two rays are adjacent if no other ray lies on all constraints they have in commo
 determinants they are, since common factors are taken out.
 
 Source: T. S. Motzkin et al., "The double description method", 1953; K. Fukuda, A. Prodon, "Double description method
-revisited", 1996 (lines kept apart, combinatorial neighbours).
+revisited", 1996 (lines apart from rays, combinatorial neighbours).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MAX_RAYS = 20_000
 class Corners:
     """Vertices and unbounded directions of an intersection of half-spaces."""
 
-    points: list[tuple[Fraction, ...]]  # its corners; none if it is empty or holds a whole line
+    points: list[tuple[Fraction, ...]]  # its corners; none if it is empty or contains a line
     is_empty: bool  # no point at all
     is_bounded: bool  # no direction leads out of it for ever; True when empty
 

@@ -51,7 +51,7 @@ class MinimalSphere:
     """Smallest enclosing sphere, its support and the work it took."""
 
     center: FloatArray  # (dimension,): each coordinate the double nearest to the exact one
-    radius: float  # the smallest double whose closed ball about `center` holds every point
+    radius: float  # the smallest double whose closed ball about `center` contains every point
     exact_center: Rational  # before rounding
     exact_square: Fraction  # the squared radius of the exact ball
     support: tuple[int, ...]  # points on the exact sphere that have the exact centre in their convex hull

@@ -198,7 +198,7 @@ def batch_of(
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
-    is_named = witnesses is not None  # then a search for contacts has to follow, and tells all relations
+    is_named = witnesses is not None  # then a search for contacts follows, which decides all relations
     has_detail = answers.details is not None
     batch = posed_batch(first, second, poses, relations, answers.boolean or is_named, has_detail, budget)
     if first.dimension == 2 or not (has_faces(first) and has_faces(second)):
@@ -210,7 +210,7 @@ def batch_of(
         if batch is not None:
             batch(start, stop)
         items: IntArray | slice = slice(start, stop)
-        if batch is not None:  # those apart are told, and without witnesses more
+        if batch is not None:  # disjoint pairs are decided, and without witnesses more
             items = start + np.flatnonzero(relations[items] != DISJOINT if is_named else relations[items] == UNSETTLED)
         some = PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), True)
         rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)

@@ -25,7 +25,7 @@ of two rounded posed points, of which a coordinate is off by at most `error` = e
 less than e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3 where no coordinate exceeds m, and by 2^-50 of six
 products at most m^3 for rounding. Bodies with an interior then share an interior point.
 
-Exponents: the caller keeps coordinates below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a
+Exponents: caller guarantees coordinates below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a
 direction or a determinant of at most 2^-900 proves nothing, so what underflow loses is below the margins.
 
 Source: G. Snethen, XenoCollide: complex collision made simple, Game Programming Gems 7, 2008; both answers certified.
@@ -85,11 +85,11 @@ def relation_of_intersecting(
     error = a.place.error + b.place.error
     first_lies = second_lies = _OUT
     if not exceeds_distance(square, pool.numbers[second, RADIUS], error):
-        first_lies = _classify_hull_in_hull(pool, first, second, a, b, square)
+        first_lies = _classify_in_hull(pool, first, second, a, b, square)
     if first_lies == _WITHIN:
         return FIRST_INSIDE_SECOND
     if not exceeds_distance(square, pool.numbers[first, RADIUS], error):
-        second_lies = _classify_hull_in_hull(pool, second, first, b, a, square)
+        second_lies = _classify_in_hull(pool, second, first, b, a, square)
     if second_lies == _WITHIN:
         return SECOND_INSIDE_FIRST
     return OVERLAPPING if first_lies == _OUT and second_lies == _OUT else UNSETTLED
@@ -125,14 +125,12 @@ def exceeds_distance(square: float, distance: float, error: float) -> bool:
 
 
 @inline
-def _classify_hull_in_hull(
-    pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float
-) -> int:
+def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
     """Return whether a body lies in the open interior of another: _WITHIN, _OUT (some of it does not) or UNDECIDED."""
     error = 8.0 * (a.place.error + b.place.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
-        return _classify_hull_in_ball(pool.points, a, interior_point(pool.numbers, outer, b, CENTER), b.round, error)
+        return _classify_in_ball(pool.points, a, interior_point(pool.numbers, outer, b, CENTER), b.round, error)
     extent, result = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS], _WITHIN
     for face in range(first, stop):
         n = rotate(b.place, point_of(pool.normals, face))
@@ -146,7 +144,7 @@ def _classify_hull_in_hull(
 
 
 @inline
-def _classify_hull_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
+def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
     """Return the same for a ball, by its centre and the farthest point of the other body."""
     most = 0.0
     for point in range(a.first, a.stop):

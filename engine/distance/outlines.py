@@ -217,7 +217,7 @@ def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, 
         is_first, vertex, edge = row_of(near, row)
         other = b if is_first else a
         if point(other.points, edge) == point(other.points, other.following[edge]):
-            continue  # case: no length; the edges beside it end there
+            continue  # case: no length; the edges next to it end there
         candidate, is_placed = (
             _measure_pair(a, b, vertex, edge, True) if is_first else _measure_pair(b, a, vertex, edge, False)
         )

@@ -61,7 +61,7 @@ class SpreadPair:
         self.meshes = spread_of(first), spread_of(second)
         self.poses = own, second_poses
         self.budget = budget
-        self.n_exact = 0  # poses that the exact stage was asked about
+        self.n_exact = 0  # poses decided by the exact stage
         self._radii = radius_of(first), radius_of(second)
         a, b = self.meshes
         self._room = _room()
@@ -113,7 +113,7 @@ class SpreadPair:
             if how in (DONE, ANSWERED):
                 yield how, start, self._room.candidates.pairs[:n].tolist()
             elif how == BEYOND:
-                every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
+                every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never in memory together
                 yield how, start, every
             else:
                 self._room = new_room(2 * len(self._room.candidates.bounds))

@@ -153,7 +153,7 @@ def _first_hits(
 
     def task(first: int, last: int) -> None:
         reached, room = np.array([first, 0, 0, 0, 0, 0]), scratch_for(scene.n_rows)
-        while True:  # bound: each turn reaches the end, or prepares what a body wants
+        while True:  # bound: each turn reaches the end, or prepares a body
             entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, state, out, reached)
             budget.check()
             _, wanted, body, *_ = reached.tolist()
@@ -206,7 +206,7 @@ def _cut_near(
     parts, left, n = list[LoosePieces](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
     words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(scene.n_rows)
-    while n[0] < last:  # bound: each turn has room for a body, or prepares what one wants
+    while n[0] < last:  # bound: each turn has room for a body, or prepares one
         out, names = room_for(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
         pairs = np.empty((_LEFT + last - first, 2), np.int64)
         entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)

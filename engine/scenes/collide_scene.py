@@ -355,7 +355,7 @@ def distances_below(
 
     run_chunks(by_batch, len(pairs), budget=budget, workers=workers)
     still = np.flatnonzero(np.isnan(distances))
-    still = still[np.lexsort(kinds[still].T)]  # pairs of the same two solids are asked together
+    still = still[np.lexsort(kinds[still].T)]  # one query for all pairs of the same two solids
 
     def by_search(start: int, stop: int) -> None:
         some = kinds[still[start:stop]]

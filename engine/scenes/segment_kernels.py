@@ -109,7 +109,7 @@ def cut_near(
     |---|---|
     | 0, 1 | on entry the first segment and its first candidate, on return where to continue |
     | 2, 3 | number of rows of `out`, of `left` |
-    | 4, 5 | 0, or what the next one wants (of `crossings_in`), and the body |
+    | 4, 5 | 0, or the structure that the next one needs (of `crossings_in`), and the body |
     | 6 | whether a segment is out of the kernels' range |
     """
     near = scratch_at(scratch).near
@@ -178,7 +178,7 @@ def _write_first_hit(scratch: Scratch, out: Firsts, row: int, item: int) -> None
 def _query_body(
     words: IntArray, body: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
-    """Query a body for the first piece, or any; return SETTLED to continue, MET or OPEN to end, or what it wants."""
+    """Query a body for the first piece, or any; return SETTLED to continue, MET or OPEN to end, or what it needs."""
     scratch = scratch_at(room)
     n_pieces = _cut_on(words, body, segments, item, is_any, room, stop, scratch.room, 0)
     if n_pieces < UNSURE:
@@ -246,7 +246,7 @@ def find_first(
     | n | meaning |
     |---|---|
     | 0 | on entry the first segment, on return where to continue |
-    | 1, 2 | 0, or what the next one wants (of `crossings_in`), and the body |
+    | 1, 2 | 0, or the structure that the next one needs (of `crossings_in`), and the body |
     | 3, 4 | number of MET, of OPEN segments |
     | 5 | whether rows of `out` are filled consecutively, not at the segment's index |
     """

@@ -52,7 +52,7 @@ class Table:
             words = self._cached[id(solid)]
             words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
             words[TREE + 1 : TREE + 5] = addresses[1:]
-            words[TREE] = addresses[0]  # order: last, kernels of other threads look at it
+            words[TREE] = addresses[0]  # order: last, kernels of other threads read it
         elif self.rows[body, 0] == BodyKind.UNREADY:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 

@@ -1,7 +1,7 @@
 """Dual traversal: all pairs of faces of two placed bodies that have a common point, or the first pair that decides.
 
 The two trees are descended together: a pair of nodes is replaced by the pairs of children whose boxes
-(`box_lanes.meeting`) and discs (`lanes/boxes.py`) may intersect; two blocks of faces by the pairs of faces that neither
+(`lanes/boxes.py`) and discs may intersect; two blocks of faces by the pairs of faces that neither
 boxes nor planes separate (`lanes/faces.py`), which are classified by signs. All tests are conservative under a pose, so
 no contact is missed. Pairs beyond the room are counted; the caller enlarges the room and searches again. Of the faces
 with a common corner only (`contact_kinds.py`) just enough pairs are listed to know every face in contact.
@@ -307,7 +307,7 @@ def search(s: Search) -> tuple[int, int]:
                 return how, n_pairs
     pairs, kinds, _ = s.contacts
     room = capacity_of(s.contacts)
-    for row in range(room, kinds.shape[0]):  # what `contact_kinds.py` keeps
+    for row in range(room, kinds.shape[0]):  # the pairs that name the witness
         if pairs[row, 0] >= 0:
             if n_pairs < room:
                 pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = pairs[row, 0], pairs[row, 1], kinds[row]

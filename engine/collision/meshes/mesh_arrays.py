@@ -66,7 +66,7 @@ MeshArrays = namedtuple(
     "has_inside",
 )
 """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
-inner nodes (`lanes/boxes.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels as
+inner nodes (`lanes/boxes.py`) hold besides boxes, the rows of the other kind not set. `state` is filled by kernels as
 needed, and `inner`, on which side of a face its body lies (`parity.py`), 0 unknown: any thread writes the same values.
 components: of triangles connected through vertices, one each, ascending. faces: the caller's face of each triangle;
 first_face: the least in the first component. has_inside: False for surfaces and flat boxes."""
@@ -239,7 +239,7 @@ def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     faces = np.arange(6)
     if not flat.any():
         return corners, BOX_TRIANGLES.reshape(-1, 3), np.repeat(faces, 2)
-    # the two faces across a flat axis are one: keep that; a segment or point: any face will do
+    # the two faces across a flat axis are one: unchanged; a segment or point: any face will do
     faces = faces[2 * int(np.argmax(flat)) :][:1]
     _, first, merged = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     return corners, first[merged.reshape(-1)][BOX_TRIANGLES[faces].reshape(-1, 3)], np.repeat(faces, 2)

@@ -54,7 +54,7 @@ def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
             theirs = regions.sides_at(other, q, axis)
             if theirs.above if is_above else theirs.below:
                 return True, False
-        return False, False  # a point of the face within the other body has both insides beside it
+        return False, False  # a point of the face within the other body has both insides next to it
     pierces = False
     for q in regions.regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
         theirs = regions.sides_at(other, q, axis)
@@ -194,7 +194,7 @@ def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
 
 
 def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
-    """Tell whether two meshes have the same triangles, in any order and orientation."""
+    """Return whether two meshes have the same triangles, in any order and orientation."""
     if first is second:
         return True
     if len(first.faces) != len(second.faces) or first.arrays.extent.reach != second.arrays.extent.reach:

@@ -69,7 +69,7 @@ MISSED = 3
 
 @inline
 def perturbed_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
-    """Return the side of the line a b, along z, on which q moved by (eps, eps^2) lies (ties.py); 0 for a = b."""
+    """Return the side of the line a b, along z, on which q moved by (eps, eps^2) lies (orientation.py); 0 for a = b."""
     side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
     return side if side != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
@@ -127,7 +127,7 @@ def _rotate_axis_last(p: Point3, axis: int) -> Point3:
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
     """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
     where = locate_along(own, mesh, 2, -1)
-    for axis in range(2 if where == UNDECIDED else 0):  # another half-line may keep clear of edges
+    for axis in range(2 if where == UNDECIDED else 0):  # another ray may miss the edges
         where = locate_along(own, mesh, axis, -1) if where == UNDECIDED else where
     return where
 

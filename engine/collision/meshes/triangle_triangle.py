@@ -1,7 +1,7 @@
 """Triangle-triangle intersection in space, by orientation signs only.
 
 Each triangle is compared with the plane of the other. Where both straddle, each plane cuts the other triangle in an
-interval of the common line, and two more signs tell whether the intervals have a common point, strictly or not. Two
+interval of the common line, and two more signs decide whether the intervals have a common point, strictly or not. Two
 stages:
 
 - `classify_near`: float64 with one bound for all signs; answers APART or CROSSING, UNDECIDED where any sign is near 0.
@@ -86,7 +86,7 @@ def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
 
 @inline
 def is_one_side(p: int, q: int, r: int) -> bool:
-    """Tell whether three signs are all 1 or all -1."""
+    """Return whether three signs are all 1 or all -1."""
     return (p == 1 and q == 1 and r == 1) or (p == -1 and q == -1 and r == -1)
 
 
@@ -168,7 +168,7 @@ def classify_near(t1: Facet, t2: Facet, error: float) -> int:
 
 @inline
 def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
-    """Tell whether two points of one pose coincide."""
+    """Return whether two points of one pose coincide."""
     return p.x == q.x and p.y == q.y and p.z == q.z and p.pose == q.pose
 
 

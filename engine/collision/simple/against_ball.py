@@ -89,7 +89,7 @@ def _surface_against_ball(
     stack[0] = 0
     best, witness, unsure, box_slack = np.inf, -1, np.inf, 2.0**-50 * largest_of(center) + 2.0**-1070
     reach = (radius + 2.0 * error) * (1.0 + 2.0**-40)
-    beyond = reach * reach + 2.0**-990  # what is as far from the rounded centre keeps clear of the ball
+    beyond = reach * reach + 2.0**-990  # farther from the rounded centre is outside the ball
     face, n = parity.next_face(mesh, stack, 1, box)
     while face >= 0:  # bound: the faces of the body
         t = triangle_of(mesh, face)

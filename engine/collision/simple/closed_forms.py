@@ -250,7 +250,7 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
     the first of which are listed in `unsure` (n,) int64; one more than fit if the flag was set.
     """
     beyond, before, n_unsure, n = -1, -1, 0, mesh.vertices.shape[0]
-    for start in range(0, n, _BLOCK):  # many vertices at once, without branches
+    for start in range(0, n, _BLOCK):  # many vertices in one pass, without branches
         stop, n_beyond, n_before = min(start + _BLOCK, n), 0, 0
         for vertex in range(start, stop):
             side = _side(mesh, vertex, plane)
