@@ -7,8 +7,8 @@ lie in T's plane there, and each flips the status.
 
 Regions are sampled by slabs: between neighbouring abscissas of end points and crossings of the traces no two traces
 cross, so one point between neighbours on the middle of every slab reaches every region with an interior. The line is
-moved by (eps, eps^2) across itself (orientation.py), so that it meets no edge; its plane decides whether a face contains the
-point.
+moved by (eps, eps^2) across itself (orientation.py), so that it meets no edge; its plane decides whether a face
+contains the point.
 """
 
 from __future__ import annotations

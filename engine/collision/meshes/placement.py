@@ -10,7 +10,7 @@ a lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so do
 (|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
 that is below 2^-50 (3 reach + max |t|) + 2^-1060, with room for the rounding of the bound itself.
 
-**Frames.** From the tree of one placed body to the tree of another, the maps that `meeting` (`lanes/boxes.py`) takes, with their
+**Frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with their
 margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of two
 bodies give
 

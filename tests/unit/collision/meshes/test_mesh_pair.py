@@ -106,7 +106,7 @@ def test_agrees_with_single_questions(size: int, room: int) -> None:
 def test_finds_what_looking_at_all_pairs_finds(
     room: int, pose: Pose | None, at: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(SPACE, "found", new_contacts(room))
+    monkeypatch.setattr(SPACE, "contacts", new_contacts(room))
     a, b = mesh(2), mesh(1, at)
     row, found = relate(a, b, (a.posed(pose), b.posed(pose)), SEEK_OVERLAP, Work())
     pairs = set(map(tuple, found.pairs[: row[N_CONTACTS]].tolist()))
