@@ -80,8 +80,10 @@ def relate_convex(
 def relation_of_intersecting(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, square: float
 ) -> int:
-    """Return the relation of two bodies whose open interiors intersect, or UNSETTLED; square: squared distance of the
-    centres."""
+    """Return the relation of two bodies whose open interiors intersect, or UNSETTLED.
+
+    square: squared distance of an interior point of each.
+    """
     error = a.place.error + b.place.error
     first_lies = second_lies = _OUT
     if not exceeds_distance(square, pool.numbers[second, RADIUS], error):

@@ -188,7 +188,7 @@ def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
 
 @merged
 def _half_of(view: View, at: int) -> float:
-    """Return the largest half width of a box."""
+    """Return the largest half width of a box in a lane."""
     node, lane, b = at >> 3, at & 7, view.mesh.boxes
     return 2.0 if at == ROOT else float(max(b[node, 3, lane], b[node, 4, lane], b[node, 5, lane]))
 

@@ -1,5 +1,4 @@
-"""Placements of the bodies of a scene: as last prepared together, except for a few that moved since; and pairs with a
-selected body, by boxes.
+"""Placements of the bodies of a scene: prepared together, except for a few moved since; pairs of selected bodies.
 
 Kernels take both: of n bodies, unmoved ones are numbered by index, moved ones from n on.
 """

@@ -68,7 +68,7 @@ class Scene(Immutable):
     (0, 1)
     """
 
-    __slots__ = ("_standing",)
+    __slots__ = ("_placements",)
 
     type: ClassVar[str] = "scene"
     _placements: Placements
@@ -76,7 +76,7 @@ class Scene(Immutable):
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None] | None = None) -> None:
         check_bodies(solids, poses)
         bodies = Bodies(tuple(solids), (None,) * len(solids) if poses is None else tuple(poses))
-        object.__setattr__(self, "_standing", Placements(bodies, {}))
+        object.__setattr__(self, "_placements", Placements(bodies, {}))
 
     def __len__(self) -> int:
         return len(self.solids)
@@ -145,7 +145,7 @@ class Scene(Immutable):
             if type(pose) is not Pose or len(pose.translation) != solids[0].dimension:
                 check_pose(pose, solids[body], f"poses[{body}]")
         scene = object.__new__(Scene)
-        object.__setattr__(scene, "_standing", self._placements.after(given))
+        object.__setattr__(scene, "_placements", self._placements.after(given))
         return scene
 
     def locate(

@@ -271,7 +271,7 @@ def where_faces_are(
 
     | result | meaning |
     |---|---|
-    | OUTSIDE | a point of every face, all its corners off the other body, and all other components are |
+    | OUTSIDE | every face has points outside: its corners off the other body; so are all components without contact |
     | INSIDE | one provably lies inside, with an inside of its own body next to it |
 
     own: column of the body in contacts (n, 2); their classes: corners on the other face, maybe others in its plane

@@ -23,7 +23,7 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
     before = [Pose(turn, place) for place in places]
     moved = {int(body): Pose(turn, places[body] + 1.5) for body in rng.choice(n, 9, replace=False)}
     for poses in ({}, moved):
-        placements = Scene([box] * n, before).moved(poses)._standing
+        placements = Scene([box] * n, before).moved(poses)._placements
         named = np.unique(rng.integers(0, n, 12))
         rows = PairRows(
             np.empty(room, np.int64),
