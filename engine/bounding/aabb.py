@@ -7,7 +7,7 @@ With u = 2^-53, centre c and half widths h of a box, and m its largest coordinat
 stretch lengths by up to 1.5e-12 (`engine.solids.pose.TOLERANCE`), and a ball under the pose of another body counts as
 unposed.
 
-The flat cylinders around the faces below each child of a tree's inner nodes: what `lanes/boxes.py` asks.
+The flat cylinders around the faces below each child of a tree's inner nodes: the input of `lanes/boxes.py`.
 
 A disc stands on the axis through the middle of the child's box along the sum of the normals of its faces; it is as
 thick and as wide as their corners reach along that axis and away from it.
@@ -51,9 +51,9 @@ def place_boxes(
     """Fill low and high (n, d), rounded outward.
 
     boxes (n_kinds, 2, d), of a ball its centre twice; reaches (n_kinds,): how far the body's points are at most from
-    the middle of the box (of a ball: its centre from there); radii (n_kinds,), 0.0 for others; kinds (n,) int64: which
-    of these each body is; rows (n,) int64: of each body's pose in rotations (n_poses, d, d) and translations (n_poses,
-    d), -1 for none.
+    the middle of the box (of a ball: its centre from there); radii (n_kinds,), 0.0 for others; kinds (n,) int64: the
+    row of each body in these; rows (n,) int64: of each body's pose in rotations (n_poses, d, d) and translations
+    (n_poses, d), -1 for none.
     """
     dimension = low.shape[1]
     for body in range(low.shape[0]):
@@ -89,7 +89,7 @@ _ENLARGED: Final = 2.0**-20
 
 @allocating_kernel
 def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array) -> None:
-    """Fill discs (n_nodes, 8, 8), of inner nodes only, from blocks (`lanes/faces.py`) and boxes of the same tree."""
+    """Fill the discs (n_nodes, 8, 8) of the inner nodes of a tree from its blocks (`lanes/faces.py`) and boxes."""
     n_nodes = child.shape[0]
     parents = np.full(n_nodes, -1, np.int64)  # 8 times the parent, and the lane
     for node in range(n_nodes):
@@ -127,7 +127,8 @@ def _corner(rows: Float32Array, node: int, lane: int, corner: int) -> Point3:
 
 @inline
 def _set_normals(blocks: Float32Array, child: Int32Array, parents: IntArray, normals: FloatArray) -> None:
-    """Set normals (n_nodes, 3), zeros, to the direction of the sum of the normals of all faces below a node."""
+    """Set normals (n_nodes, 3), zeros on entry, to the direction of the sum of the normals of all faces below each
+    node."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
             continue
@@ -155,8 +156,8 @@ def _set_reached(
     blocks: Float32Array, child: Int32Array, boxes: Float32Array, parents: IntArray, normals: FloatArray,
     reached: FloatArray,
 ) -> None:  # fmt: skip
-    """Set reached (n_nodes, 3) to the least and largest product of a corner below with the normal, and the largest
-    squared distance from the axis, counted from the middle of the node's box."""
+    """Set reached (n_nodes, 3): minimum and maximum of dot(corner, normal) over the corners below a node, and their
+    largest squared distance from the axis, relative to the middle of the node's box."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
             continue

@@ -1,7 +1,7 @@
 """Pairs of boxes with a common point: by a grid of cells at least as wide as all boxes but a few, or by a sweep.
 
 A box stands in the cell of its low corner. Two boxes of one cell's width or less that meet have their low corners at
-most a width apart on each axis, so in the same or in neighbouring cells. Each pair is looked for from one side only:
+most a width apart on each axis, so in the same or in neighbouring cells. Each pair is tested from one side only:
 
     y   a a a      boxes are laid out by cell, so that the cells marked with one letter are one run of boxes: b the
     ^   . B b      later ones of the box's own cell B and those of the next cell, a the row above; then three such
@@ -11,9 +11,9 @@ The few largest boxes, infinite ones among them, stand last and are compared wit
 floating point and corners a width apart are at most one cell apart, because the width is enlarged first. Right for many
 boxes of like size.
 
-Few are all compared. Others are sorted by their start on one axis, each compared with those that start before it ends:
-on the axis on which the boxes cover the smallest share of the whole width. Infinite bounds are welcome: such a box
-meets everything that its finite bounds allow.
+Few boxes: all pairs are compared. Others are sorted by their start on one axis, each compared with those that start
+before it ends: on the axis on which the boxes cover the smallest share of the whole width. Infinite bounds are welcome:
+such a box meets everything that its finite bounds allow.
 
 Source: C. Ericson, Real-Time Collision Detection, 2005, section 7.1 (uniform grids); here by one sort, for one instant;
 D. Baraff, Dynamic simulation of non-penetrating rigid bodies, 1992 (sweep and prune), for one instant too.
@@ -21,9 +21,9 @@ D. Baraff, Dynamic simulation of non-penetrating rigid bodies, 1992 (sweep and p
 Uniform grids: which cell a value is in.
 
 It is ``int((x / 2 - low / 2) * cells_per_unit)``, cut off at the last cell. Each of these steps is monotone in floating
-point, so what is listed from the cell of its lower side to the cell of its upper side is found from every value between
-them, ties and roundings included. Halving keeps the difference finite for every input (for subnormal values it rounds,
-monotonically too).
+point, so an item listed from the cell of its lower bound to the cell of its upper bound is listed in the cell of every
+value between them, ties and roundings included. Halving keeps the difference finite for every input (for subnormal
+values it rounds, monotonically too).
 """
 
 from __future__ import annotations
@@ -64,14 +64,14 @@ def make_axis(low: float, high: float, n_cells: int) -> Axis:
 
 
 BLOCK: Final = 1 << 18
-"""Pairs given out at once: a scene in which all meet all has n^2 / 2, which need not fit into memory. Sorting one block
+"""Most pairs yielded in one block: n boxes have up to n^2 / 2 pairs, which need not fit into memory; sorting a block
 takes some 20 ms."""
 _FEW, _FEWEST = 96, 256
-"""Boxes that are all compared, and those that a grid is made for."""
+"""Below _FEW boxes all pairs are compared; from _FEWEST boxes on a grid is built."""
 _LARGE: Final = 64
 _ENLARGED: Final = 1.0 + 2.0**-20
-_CROWD: Final = 48
-"""Boxes that share a cell with one box, on average, beyond which a sweep is no worse."""
+_MOST_PER_CELL: Final = 48
+"""Average number of boxes in the cell of a box beyond which a sweep is no slower than the grid."""
 
 
 CornerGrid = namedtuple("CornerGrid", "boxes numbers cells starts row layer")
@@ -84,18 +84,18 @@ without cells where the first column of `boxes` ascends.
 
 
 def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: FlagArray, block: int = BLOCK) -> Iterator[IntArray]:
-    """Yield ``(n_pairs, 2)`` pairs first < second of closed boxes ``(n, d)`` with a common point, block by block.
+    """Yield the pairs ``(n_pairs, 2)``, first < second, of closed boxes ``(n, d)`` that have a common point, in blocks.
 
-    Each block is sorted, but where there are several a later one may hold smaller indices; it has about `block` pairs,
-    or those of one box if these are more.
-    Polls `flag` (1,) uint8 and ends early, with wrong blocks, when it is set: the caller looks at it after each.
+    Each block is sorted; a later block may hold smaller indices. A block has about `block` pairs, or all pairs of one
+    box if these are more. Polls `flag` (1,) uint8 and stops early, with an invalid block, when it is set: the caller
+    checks the flag after each block.
     """
     for keys in _keys_of_pairs(low, high, flag, block):
         yield np.stack([keys // len(low), keys % len(low)], axis=1)
 
 
 def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
-    """Return all of `pairs_of_boxes` at once, sorted. Raises as `Budget.check` when the call must end."""
+    """Return all pairs of `pairs_of_boxes` in one sorted array. Raises: as `Budget.check`."""
     blocks = [np.zeros(0, np.int64)]
     for block in _keys_of_pairs(low, high, budget.flag, BLOCK):
         budget.check()
@@ -111,47 +111,47 @@ def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> Int
 
 
 def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: FlagArray, block: int) -> Iterator[IntArray]:
-    """Yield the blocks of `pairs_of_boxes`, a pair as first * n + second."""
+    """Yield the blocks of `pairs_of_boxes`; each pair is encoded as first * n + second."""
     n_boxes = len(low)
-    grid = _without_cells(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
-    grid = grid or (_grid_of(low, high) if n_boxes >= _FEWEST else None) or _sorted_along_axis(low, high)
+    grid = _sweep_grid(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
+    grid = grid or (_build_grid(low, high) if n_boxes >= _FEWEST else None) or _sorted_along_axis(low, high)
     start, enough = 0, max(block, 1)
     keys = np.empty(min(enough, n_boxes * n_boxes // 2) + n_boxes, np.int64)  # one box meets fewer than there are
     while start < n_boxes:  # bound: start grows
-        n_found, start = entry_of(_collect)(grid, start, enough, keys, flag)
-        if n_found:
-            yield np.sort(keys[:n_found])
+        n_pairs, start = entry_of(_collect_pairs)(grid, start, enough, keys, flag)
+        if n_pairs:
+            yield np.sort(keys[:n_pairs])
 
 
 @np.errstate(all="ignore")
 def _sorted_along_axis(low: FloatArray, high: FloatArray) -> CornerGrid:
-    """Return boxes by where they start on the axis on which they are thin against the width of the whole."""
+    """Return the boxes sorted by their low bounds on the axis where they are thinnest relative to the whole extent."""
     finite = np.isfinite(low) & np.isfinite(high)
     width = np.where(finite, high, -np.inf).max(axis=0) - np.where(finite, low, np.inf).min(axis=0)
     share = np.where(finite, high - low, 0.0).sum(axis=0) / width
     axis = int(np.argmin(np.where(np.isfinite(share), share, np.inf)))
     columns = (axis + np.arange(low.shape[1])) % low.shape[1]
     order = np.argsort(low[:, axis], kind="stable")
-    return _without_cells(low[order][:, columns], high[order][:, columns], order, 0)
+    return _sweep_grid(low[order][:, columns], high[order][:, columns], order, 0)
 
 
-def _without_cells(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) -> CornerGrid:
+def _sweep_grid(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) -> CornerGrid:
     (n_boxes, dimension), boxes = low.shape, np.zeros((len(low), 6))
     boxes[:, :dimension], boxes[:, 3 : 3 + dimension] = low, high
     return CornerGrid(boxes, numbers, np.full(n_boxes, -1), np.zeros(1, np.int32), row, 0)
 
 
 @np.errstate(all="ignore")
-def _grid_of(low: FloatArray, high: FloatArray) -> CornerGrid | None:
-    """Return the grid of boxes (n, d), None where a sweep is better."""
+def _build_grid(low: FloatArray, high: FloatArray) -> CornerGrid | None:
+    """Return the grid of boxes (n, d), or None if a sweep is faster."""
     n_boxes, dimension = low.shape
     extent = np.empty(n_boxes)
-    _measure(low, high, extent)
+    _measure_extents(low, high, extent)
     widest, widest_of_all = float(np.partition(extent, n_boxes - _LARGE - 1)[n_boxes - _LARGE - 1]), float(extent.max())
     if widest * 4.0 >= widest_of_all:  # all of like size: none is large
         widest = widest_of_all
     span = np.array([[np.inf] * 3, [-np.inf] * 3])
-    _spread(low, extent, widest, span)
+    _corner_ranges(low, extent, widest, span)
     least, most = span
     least[dimension:] = most[dimension:] = 0.0
     width = np.maximum(widest, (most - least) / (n_boxes ** (1.0 / dimension) * 2.0))
@@ -164,11 +164,11 @@ def _grid_of(low: FloatArray, high: FloatArray) -> CornerGrid | None:
     boxes, numbers, cells = np.zeros((n_boxes, 6)), np.empty(n_boxes, np.int64), np.empty(n_boxes, np.int64)
     starts = np.zeros(layer * int(counts[2]) + 1, np.int32)
     grid = CornerGrid(boxes, numbers, cells, starts, row, layer)
-    return None if _sort_into_cells(low, high, extent, widest, least, width, grid) > _CROWD * n_boxes else grid
+    return None if _sort_into_cells(low, high, extent, widest, least, width, grid) > _MOST_PER_CELL * n_boxes else grid
 
 
 @kernel
-def _measure(low: FloatArray, high: FloatArray, extent: FloatArray) -> None:
+def _measure_extents(low: FloatArray, high: FloatArray, extent: FloatArray) -> None:
     """Fill extent (n,) with the largest side of each box, infinite where a bound is or the side overflows."""
     for box in range(low.shape[0]):
         side = 0.0
@@ -180,8 +180,8 @@ def _measure(low: FloatArray, high: FloatArray, extent: FloatArray) -> None:
 
 
 @kernel
-def _spread(low: FloatArray, extent: FloatArray, widest: float, span: FloatArray) -> None:
-    """Fill span (2, 3) with the least and the greatest low corner of boxes that are not large."""
+def _corner_ranges(low: FloatArray, extent: FloatArray, widest: float, span: FloatArray) -> None:
+    """Fill span (2, 3) with the least and greatest low corner of the boxes that are not large."""
     for box in range(low.shape[0]):
         if extent[box] <= widest:
             for axis in range(low.shape[1]):
@@ -194,8 +194,8 @@ def _sort_into_cells(
     low: FloatArray, high: FloatArray, extent: FloatArray, widest: float, least: FloatArray, width: FloatArray,
     grid: CornerGrid,
 ) -> int:  # fmt: skip
-    """Fill the arrays of the grid, boxes and starts zero before; return the sum of the squares of how many share a
-    cell."""
+    """Fill the arrays of the grid; return the sum over cells of the squared number of boxes. boxes and starts are zero
+    on entry."""
     starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
     cells = np.empty(n_boxes, np.int64)
     n_small = 0
@@ -229,8 +229,8 @@ def _sort_into_cells(
 
 
 @inline
-def _meet(boxes: FloatArray, box: int, other: int) -> bool:
-    """Tell whether two closed boxes have a common point; without branches, which would be guessed wrong."""
+def _boxes_intersect(boxes: FloatArray, box: int, other: int) -> bool:
+    """Return whether two closed boxes have a common point; without branches, because a branch would be mispredicted."""
     return (
         (boxes[box, 0] <= boxes[other, 3])
         & (boxes[other, 0] <= boxes[box, 3])
@@ -242,43 +242,45 @@ def _meet(boxes: FloatArray, box: int, other: int) -> bool:
 
 
 @inline
-def _add_run(
-    boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, keys: IntArray, n_found: int
+def _append_run(
+    boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, keys: IntArray, n_pairs: int
 ) -> int:
-    """Write the keys of the pairs of a box with those of a run that it meets; return the number then found. One key
-    more than is found may be written."""
+    """Append the keys of the pairs of a box and the boxes of a run that intersect it; return the new number of keys.
+    One key beyond that number may be overwritten."""
     n_boxes, own = numbers.shape[0], numbers[box]
     for other in range(start, stop):
         number = numbers[other]
-        keys[n_found] = min(own, number) * n_boxes + max(own, number)
-        n_found += 1 if _meet(boxes, box, other) else 0
-    return n_found
+        keys[n_pairs] = min(own, number) * n_boxes + max(own, number)
+        n_pairs += 1 if _boxes_intersect(boxes, box, other) else 0
+    return n_pairs
 
 
 @kernel
-def _collect(grid: CornerGrid, start: int, enough: int, keys: IntArray, flag: FlagArray) -> tuple[int, int]:
-    """Write first * n + second of the pairs of boxes from place `start` on with those after them, until `enough` are
-    found; return their number and the place to go on from."""
+def _collect_pairs(grid: CornerGrid, start: int, enough: int, keys: IntArray, flag: FlagArray) -> tuple[int, int]:
+    """Write the keys first * n + second of the pairs of boxes from place `start` on, until there are at least `enough`.
+
+    Returns the number of keys and the place to continue from.
+    """
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer
-    n_boxes, n_small, n_found = numbers.shape[0], int(starts[-1]), 0
+    n_boxes, n_small, n_pairs = numbers.shape[0], int(starts[-1]), 0
     for box in range(start, n_boxes):
         if flag[0] != 0:
             return 0, n_boxes
-        if n_found >= enough:
-            return n_found, box
+        if n_pairs >= enough:
+            return n_pairs, box
         cell = grid.cells[box]
         if cell < 0:
             stop = n_boxes if row > 0 else box + 1
             while stop < n_boxes and boxes[stop, 0] <= boxes[box, 3]:
                 stop += 1
-            n_found = _add_run(boxes, numbers, box, box + 1, stop, keys, n_found)
+            n_pairs = _append_run(boxes, numbers, box, box + 1, stop, keys, n_pairs)
             continue
-        n_found = _add_run(boxes, numbers, box, box + 1, starts[cell + 2], keys, n_found)
+        n_pairs = _append_run(boxes, numbers, box, box + 1, starts[cell + 2], keys, n_pairs)
         cell += row
-        n_found = _add_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_found)
+        n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_pairs)
         cell += layer - 2 * row
         for _ in range(3):
-            n_found = _add_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_found)
+            n_pairs = _append_run(boxes, numbers, box, starts[cell - 1], starts[cell + 2], keys, n_pairs)
             cell += row
-        n_found = _add_run(boxes, numbers, box, n_small, n_boxes, keys, n_found)
-    return n_found, n_boxes
+        n_pairs = _append_run(boxes, numbers, box, n_small, n_boxes, keys, n_pairs)
+    return n_pairs, n_boxes

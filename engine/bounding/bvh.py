@@ -4,19 +4,19 @@
              centre and half width of each child, one child to a lane
     inner    boxes that hold whole subtrees                              index of the child's node
     block    at most eight items, first lane always filled               -1 - item
-    unused   centre 0, half width -1e30: apart from every box            EMPTY
+    unused   centre 0, half width -1e30: intersects no box            EMPTY
 
 Node 0 is the root. Coordinates are those of the tree: x = origin + scale * local with a power of two for scale, so that
 every local coordinate is at most 2 in magnitude and float32 will do. The origin lies where most items are, in the
-median of a few: there float32 is fine enough for details that are small beside the whole. Half widths are enlarged by
-what the conversion may lose: a child's box holds its items. Lanes are asked side by side by `lanes/boxes.py`; a block
-of eight items costs what one costs.
+median of a few: there float32 is fine enough for details that are small against the whole. Half widths are enlarged by
+what the conversion may lose: a child's box holds its items. `lanes/boxes.py` tests all eight lanes at the same time, so
+a block of eight items costs as much as one item.
 
-The heuristic only decides how fast a query is: where its areas overflow, or many items share one centre, a run of items
-is halved as it stands.
+The heuristic affects the speed of queries only: where its areas overflow, or many items share one centre, a run of
+items is split in the middle.
 
-Source: I. Wald, On fast construction of SAH-based bounding volume hierarchies, 2007 (binning); I. Wald, C. Benthin,
-S. Boulos, Getting rid of packets: efficient SIMD single-ray traversal using multi-branching BVHs, 2008 (collapsing).
+Source: I. Wald, On fast construction of SAH-based bounding volume hierarchies, 2007 (binning); I. Wald, C. Benthin, S.
+Boulos, Getting rid of packets: efficient SIMD single-ray traversal using multi-branching BVHs, 2008 (collapsing).
 """
 
 from __future__ import annotations
@@ -39,29 +39,29 @@ HEURISTIC_DEPTH = 40
 """Below this depth runs are halved, so no block lies deeper than `MAX_DEPTH`."""
 MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
 STACK = WIDTH * (MAX_DEPTH + 1)
-"""Nodes that wait on a way down a tree at most: eight for each level."""
+"""Bound on the nodes waiting in a descent of a tree: eight for each level."""
 UNUSED = np.float32(-1e30)
 ENLARGED = 2.0**-21
-"""Part of |centre| + half width that is added to half widths: low and high are off by 2^-24 of themselves in float32,
-their middle and half their distance by as much each, and both of these once more."""
+"""Relative enlargement of half widths, as a part of |centre| + half width: low and high are off by 2^-24 of themselves
+in float32, their middle and half difference by as much each, and both are rounded once more."""
 LEAST = 2.0**-100
-"""Added to that: more than what is lost where numbers underflow, less than what any query tells apart."""
+"""Absolute enlargement of half widths: above all underflow, below every difference that a query can detect."""
 _SAMPLE = 31
 _HUGE = 2.0**1022
 """Half of an extent whose origin is its middle: from an end, twice as far could be no double."""
 
 _FEW_ROWS = 64
 _FEW_ITEMS, _FEW_BINS = 64, 8
-"""A run of so few items is cut by fewer bins: there the bins cost more than the items."""
+"""A run of at most _FEW_ITEMS items is split with _FEW_BINS bins, because the bins would cost more than the items."""
 _FINITE = 1e30
 _NO_BOX = np.float32(np.inf)
-"""What joins any box as nothing."""
+"""Bound of the empty box, which leaves any box that it is joined to unchanged."""
 _WORK = 1 << 18
-"""Items looked at, or nodes filled, between two looks at the deadline: a hundredth of a second."""
+"""Items processed, or nodes filled, between two deadline checks: about 10 ms."""
 
 
 class Bvh(NamedTuple):
-    """The arrays of the picture above."""
+    """Arrays of the tree, laid out as in the table above."""
 
     boxes: Float32Array
     child: Int32Array
@@ -74,53 +74,59 @@ Items = namedtuple("Items", "boxes centres order")
 """The items, in the order of the tree: boxes (n, 8), as lanes/boxes.py has them; centres (n, 8), boxes without extent;
 order (n,), which item it is."""
 
-Halves = namedtuple("Halves", "boxes centres left runs")
+BinaryTree = namedtuple("BinaryTree", "boxes centres left runs")
 """A binary tree whose leaves are runs of at most eight items: boxes and centres (2 n - 1, 8), around the items of a
 node and around their centres; left, the left child, the right one follows, or -1; runs (2 n - 1, 2), first item and
 end."""
 
 Bins = namedtuple("Bins", "boxes centres numbers costs")
-"""Items of a run by where their centres lie along an axis: boxes, centres (16, 8); numbers (16,), how many items;
-costs (16,), of what lies from a bin on, to the right."""
+"""Bins of the surface-area heuristic along an axis.
+
+| field | shape | meaning |
+|---|---|---|
+| boxes, centres | (16, 8) | bounds of the items, and of their centres |
+| numbers | (16,) | number of items |
+| costs | (16,) | cost of the items of this bin and all bins to the right |
+"""
 
 
 def build_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
 
-    Cost: n log n; two arrays are kept, of some 45 bytes an item.
-    Raises: what `poll` does.
+    Cost: n log n; the two stored arrays take some 45 bytes an item. Raises: what `poll` does.
     """
     n_items, origin = len(boxes), np.empty(3)
     n_halves = 2 * n_items - 1
     own, around = np.empty((2, n_items, WIDTH), np.float32), np.empty((2, n_halves, WIDTH), np.float32)
     items = Items(own[0], own[1], np.arange(n_items))
-    halves = Halves(around[0], around[1], np.empty(n_halves, np.int64), np.empty((n_halves, 2), np.int64))
+    halves = BinaryTree(around[0], around[1], np.empty(n_halves, np.int64), np.empty((n_halves, 2), np.int64))
     stack, state = np.zeros((STACK, 2), np.int64), np.array([int(n_items > WIDTH), 1])
     with np.errstate(all="ignore"):  # what underflows here is far below the enlargement of the boxes
         scale = _normalise(read_only(boxes), origin, items, halves)
         while state[0] > 0:  # bound: each turn ends a node
             poll()
-            _halve(items, halves, stack, state)
+            _build_binary_tree(items, halves, stack, state)
         nodes, child = np.empty((state[1], 6, WIDTH), np.float32), np.empty((state[1], WIDTH), np.int32)
         stack[0], state[:] = 0, 1
         while state[0] > 0:  # bound: each turn fills a node
             poll()
-            _widen(items, halves, nodes, child, stack, state)
+            _collapse_to_eight(items, halves, nodes, child, stack, state)
     origin.setflags(write=False)
-    return Bvh(on_lines(nodes[: state[1]]), on_lines(child[: state[1]]), origin, scale)
+    return Bvh(cache_aligned(nodes[: state[1]]), cache_aligned(child[: state[1]]), origin, scale)
 
 
-def on_lines(array: Any) -> Any:
-    """Return a read-only copy that begins with a line of the cache, unless it is small."""
-    kept = aligned(array.shape, array.dtype) if len(array) > _FEW_ROWS else np.empty_like(array)
-    kept[:] = array
-    kept.setflags(write=False)
-    return kept
+def cache_aligned(array: Any) -> Any:
+    """Return a read-only copy aligned to a cache line, unless the array is small."""
+    aligned_copy = aligned(array.shape, array.dtype) if len(array) > _FEW_ROWS else np.empty_like(array)
+    aligned_copy[:] = array
+    aligned_copy.setflags(write=False)
+    return aligned_copy
 
 
 @kernel
-def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: Halves) -> float:
-    """Fill origin (3,), items with the boxes in the coordinates of the tree, and the root of halves; return scale."""
+def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: BinaryTree) -> float:
+    """Write the boxes in the coordinates of the tree to items, the origin (3,), and the root of the binary tree; return
+    the scale."""
     n_items, half = boxes.shape[0], 0.0
     for axis in range(3):
         low, high = boxes[0, axis], boxes[0, 3 + axis]
@@ -133,7 +139,7 @@ def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: Halv
     once = ldexp(1.0, -power // 2)
     again = ldexp(1.0, -power - (-power // 2))  # order: two factors, since 2^-power may be no float
     halves.runs[0, 0], halves.runs[0, 1], halves.left[0] = 0, n_items, -1
-    _clear(halves, 0)
+    _set_empty(halves, 0)
     for item in range(n_items):
         for axis in range(4):
             low, high = 0.0, 0.0
@@ -148,7 +154,7 @@ def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: Halv
 
 @allocating
 def _middle_of(boxes: FloatArray, axis: int) -> float:
-    """Return the median of some boxes' centres along an axis."""
+    """Return the median of a sample of the centres of boxes along an axis."""
     n_seen, step = 0, (len(boxes) - 1) // _SAMPLE + 1
     sorted_centres = np.empty(_SAMPLE)
     for item in range(0, len(boxes), step):
@@ -162,25 +168,25 @@ def _middle_of(boxes: FloatArray, axis: int) -> float:
 
 
 @inline
-def _clear(halves: Any, node: int) -> None:
-    """Make the boxes of a node, or of a bin, those of nothing."""
+def _set_empty(halves: Any, node: int) -> None:
+    """Set the boxes of a node, or of a bin, to the empty box."""
     fill(halves.boxes, node, _NO_BOX)
     fill(halves.centres, node, _NO_BOX)
 
 
 @inline
 def _include(halves: Any, node: int, others: Any, other: int) -> None:
-    """Join boxes and centres of an item, or of a bin, to those of a node or a bin."""
+    """Join the boxes and centres of an item (or bin) to those of a node (or bin)."""
     join(halves.boxes, node, others.boxes, other)
     join(halves.centres, node, others.centres, other)
 
 
 @allocating_kernel
-def _halve(items: Items, halves: Halves, stack: IntArray, state: IntArray) -> None:
-    """Go on with the binary tree for `_WORK` items.
+def _build_binary_tree(items: Items, halves: BinaryTree, stack: IntArray, state: IntArray) -> None:
+    """Continue to build the binary tree, for at most `_WORK` items.
 
-    Caller guarantees 2 n - 1 rows, of which the first is there. stack: rows of node and depth; state: how many rows
-    wait there, and how many nodes there are.
+    stack: rows (node, depth) waiting. state: the number of rows waiting, the number of nodes. Caller guarantees 2 n - 1
+    rows of nodes, the first filled.
     """
     n_stack, n_nodes, n_seen = state[0], state[1], 0
     boxes, centres = np.empty((N_BINS, WIDTH), np.float32), np.empty((N_BINS, WIDTH), np.float32)
@@ -193,11 +199,11 @@ def _halve(items: Items, halves: Halves, stack: IntArray, state: IntArray) -> No
         if end - start <= WIDTH:
             halves.left[node] = -1
             continue
-        middle = _split(items, halves, node, bins, n_nodes) if depth < HEURISTIC_DEPTH else start
+        middle = _partition(items, halves, node, bins, n_nodes) if depth < HEURISTIC_DEPTH else start
         if middle == start:
             middle = (start + end) // 2
-            _clear(halves, n_nodes)
-            _clear(halves, n_nodes + 1)
+            _set_empty(halves, n_nodes)
+            _set_empty(halves, n_nodes + 1)
             for item in range(start, end):
                 _include(halves, n_nodes + (item >= middle), items, item)
         halves.left[node] = n_nodes
@@ -211,12 +217,13 @@ def _halve(items: Items, halves: Halves, stack: IntArray, state: IntArray) -> No
 
 
 @allocating_kernel
-def _widen(
-    items: Items, halves: Halves, boxes: Float32Array, child: Int32Array, stack: IntArray, state: IntArray
+def _collapse_to_eight(
+    items: Items, halves: BinaryTree, boxes: Float32Array, child: Int32Array, stack: IntArray, state: IntArray
 ) -> None:
-    """Go on to join binary nodes to nodes of eight, the largest boxes opened first, for `_WORK` / 8 nodes.
+    """Continue to collapse binary nodes into nodes of eight children, largest boxes first, for at most `_WORK` / 8
+    nodes.
 
-    stack: rows of binary node and node; state: how many rows wait there, and how many nodes are filled or wait.
+    stack: rows (binary node, node) waiting. state: the number of rows waiting, the number of nodes filled or waiting.
     """
     n_stack, n_nodes = state[0], state[1]
     gathered, left, runs = np.empty(WIDTH, np.int64), halves.left, halves.runs
@@ -258,7 +265,7 @@ def _widen(
 
 @inline
 def _set_lane(boxes: Float32Array, node: int, lane: int, rows: Float32Array, row: int) -> None:
-    """Store a box as centre and half width, enlarged."""
+    """Store a box in a lane as centre and enlarged half widths."""
     for axis in range(3):
         low, high = float(rows[row, axis]), -float(rows[row, 4 + axis])
         boxes[node, axis, lane] = 0.5 * (low + high)
@@ -272,9 +279,9 @@ def _half_area(rows: Float32Array, row: int) -> float:
 
 
 @inline
-def _split(items: Items, halves: Halves, node: int, bins: Bins, parts: int) -> int:
-    """Reorder the run of a node so that its left and right part make a good pair of children, and set the boxes of the
-    nodes `parts` and `parts` + 1 to theirs; return where the right part starts, where the run does if there is none."""
+def _partition(items: Items, halves: BinaryTree, node: int, bins: Bins, parts: int) -> int:
+    """Partition the run of a node by the heuristic and set the boxes of its children `parts` and `parts` + 1; return
+    the start of the right part, or the start of the run if there is no useful cut."""
     start, end, low, width, axis = halves.runs[node, 0], halves.runs[node, 1], np.float32(0.0), np.float32(-1.0), 0
     for candidate in range(3):
         smallest, largest = halves.centres[node, candidate], -halves.centres[node, 4 + candidate]
@@ -285,13 +292,13 @@ def _split(items: Items, halves: Halves, node: int, bins: Bins, parts: int) -> i
     if not (0.0 < scale < _FINITE):  # case: one centre for all
         return start
     for index in range(n_bins):
-        _clear(bins, index)
+        _set_empty(bins, index)
         bins.numbers[index] = 0
     for item in range(start, end):
         index = _bin_of(items.centres[item, axis], low, scale, n_bins)
         _include(bins, index, items, item)
         bins.numbers[index] += 1
-    cut = _best_cut(halves.boxes, parts, bins, n_bins)
+    cut = _cheapest_cut(halves.boxes, parts, bins, n_bins)
     if cut == 0:
         return start
     left = start  # the end of the left part; what is exchanged in vain costs less than a branch that nobody foresees
@@ -302,7 +309,7 @@ def _split(items: Items, halves: Halves, node: int, bins: Bins, parts: int) -> i
         items.order[left], items.order[item] = items.order[item], items.order[left]
         left += int(is_left)
     for side in range(2):
-        _clear(halves, parts + side)
+        _set_empty(halves, parts + side)
     for index in range(n_bins):
         _include(halves, parts + (index >= cut), bins, index)
     return left
@@ -314,11 +321,9 @@ def _bin_of(centre: float, low: float, scale: float, n_bins: int) -> int:
 
 
 @inline
-def _best_cut(boxes: Float32Array, scratch: int, bins: Bins, n_bins: int) -> int:
-    """Return the number of bins to the left of the cheapest cut, 0 where no cut has a finite cost.
-
-    boxes: of which the row `scratch` may be used.
-    """
+def _cheapest_cut(boxes: Float32Array, scratch: int, bins: Bins, n_bins: int) -> int:
+    """Return the number of bins left of the cheapest cut, 0 if no cut has a finite cost. Overwrites the row `scratch`
+    of boxes."""
     fill(boxes, scratch, _NO_BOX)
     number = 0
     for index in range(n_bins - 1, 0, -1):

@@ -1,15 +1,15 @@
-"""The corners of an intersection of half-spaces, exact: the double description method in integers.
+"""Vertices of an intersection of half-spaces by the double description method, in integers.
 
 The half-spaces ``row . (p, 1) >= 0`` are constraints on a cone one dimension higher; points (p, 1) of the solid are its
-generators with a positive last number, directions in which it has no end those with 0. Starting from all of space (its
-axes as lines), one constraint after the other is added: a line that is not parallel to the constraint becomes a ray;
-otherwise rays behind it go and each pair of neighbouring rays, one before and one behind, leaves a ray on it.
+generators with a positive last number, unbounded directions have a 0 there. Starting from all of space (its axes as
+lines), one constraint after the other is added: a line that is not parallel to the constraint becomes a ray; otherwise
+rays behind it are dropped, and each pair of adjacent rays, one on either side, adds a ray on it.
 
-Two rays are neighbours if no other ray lies on all constraints they have in common. Numbers stay as small as the
+Two rays are adjacent if no other ray lies on all constraints they have in common. Numbers stay as small as the
 determinants they are, since common factors are taken out.
 
 Source: T. S. Motzkin et al., "The double description method", 1953; K. Fukuda, A. Prodon, "Double description method
-revisited", 1996 (lines kept apart, combinatorial neighbours).
+revisited", 1996 (lines apart from rays, combinatorial neighbours).
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from engine.running.budget import Budget
 
 Vector = tuple[int, ...]
 MAX_RAYS = 20_000
-"""Most corners and directions kept at a time."""
+"""Bound on the number of vertices and directions at any stage."""
 
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """What an intersection of half-spaces is spanned by."""
+    """Vertices and unbounded directions of an intersection of half-spaces."""
 
-    points: list[tuple[Fraction, ...]]  # its corners; none if it is empty or holds a whole line
+    points: list[tuple[Fraction, ...]]  # its corners; none if it is empty or contains a line
     is_empty: bool  # no point at all
     is_bounded: bool  # no direction leads out of it for ever; True when empty
 
@@ -74,7 +74,7 @@ def corners_of_half_spaces(rows: Sequence[Sequence[float]], budget: Budget | Non
 def _add(
     constraint: Vector, number: int, lines: list[Vector], rays: list[_Ray], budget: Budget
 ) -> tuple[list[Vector], list[_Ray]]:
-    """Return the generators of the part of their cone where the constraint is not negative."""
+    """Return the lines and rays of a cone intersected with the half-space of a constraint."""
     bit, slopes = 1 << number, [_dot(constraint, line) for line in lines]
     i_line = next((i for i, slope in enumerate(slopes) if slope != 0), None)
     if i_line is None:
@@ -82,28 +82,28 @@ def _add(
     line, slope = lines[i_line], slopes[i_line]
     if slope < 0:
         line, slope = tuple(-x for x in line), -slope
-    kept = [_onto(constraint, other, line, slope) for other in lines[:i_line] + lines[i_line + 1 :]]
-    moved = [_Ray(_onto(constraint, ray.vector, line, slope), ray.zeros | bit) for ray in rays]
-    return kept, [*moved, _Ray(line, bit - 1)]  # the line was zero on all constraints before this one
+    others = [_project_onto(constraint, other, line, slope) for other in lines[:i_line] + lines[i_line + 1 :]]
+    moved = [_Ray(_project_onto(constraint, ray.vector, line, slope), ray.zeros | bit) for ray in rays]
+    return others, [*moved, _Ray(line, bit - 1)]  # the line was zero on all constraints before this one
 
 
 def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: Budget) -> list[_Ray]:
-    """Return the rays of a cone without a line across the constraint, cut by it.
+    """Return the rays of a pointed cone intersected with the half-space of a constraint.
 
-    n_common: neighbours lie on a face of dimension 2, which at least this many constraints hold to it.
+    n_common: adjacent rays lie on a face of dimension 2, so they share at least this many constraints.
     """
     before: list[tuple[_Ray, int]] = []
     behind: list[tuple[_Ray, int]] = []
-    kept: list[_Ray] = []
+    survivors: list[_Ray] = []
     for ray in rays:
         value = _dot(constraint, ray.vector)
         if value > 0:
             before.append((ray, value))
-            kept.append(ray)
+            survivors.append(ray)
         elif value < 0:
             behind.append((ray, value))
         else:
-            kept.append(_Ray(ray.vector, ray.zeros | bit))
+            survivors.append(_Ray(ray.vector, ray.zeros | bit))
     zeros = [ray.zeros for ray in rays]
     for first, up in before:
         budget.check()
@@ -113,12 +113,12 @@ def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: 
                 continue
             if sum(common & other == common for other in zeros) == 2:  # only these two: neighbours
                 vector = reduced([up * y - down * x for x, y in zip(first.vector, second.vector)])
-                kept.append(_Ray(vector, common | bit))
-    return kept
+                survivors.append(_Ray(vector, common | bit))
+    return survivors
 
 
-def _onto(constraint: Vector, vector: Vector, line: Vector, slope: int) -> Vector:
-    """Return `vector` moved along the line until the constraint is zero, times a positive number."""
+def _project_onto(constraint: Vector, vector: Vector, line: Vector, slope: int) -> Vector:
+    """Return `vector` moved along the line onto the plane of the constraint, times a positive number."""
     value = _dot(constraint, vector)
     return reduced([slope * x - value * y for x, y in zip(vector, line)])
 

@@ -1,22 +1,22 @@
-"""The smallest sphere around points, exact: float64 proposes the farthest point, integers decide.
+"""Smallest enclosing sphere, exact: float64 proposes the farthest point, integers decide.
 
-The walk: take the smallest ball of a few points (`smallest_ball`, exact). Find the point farthest from
-its centre. If it is outside, take the smallest ball of the support and that point, which is strictly larger, and look
-again; there are finitely many supports, so the walk ends, in practice after 5 to 20 turns. Only points within rounding
-of the sphere are looked at in integers, first thinned out by double-double arithmetic where they are many (a finely
-tessellated sphere has all of its vertices there).
+The walk: take the smallest ball of a few points (`smallest_ball`, exact). Take the point farthest from its centre. If
+it is outside, take the smallest ball of the support and that point, which is strictly larger, and repeat; there are
+finitely many supports, so the walk ends, in practice after 5 to 20 iterations. Only points within rounding of the
+sphere are tested in integers, many of them first in double-doubles (a finely tessellated sphere has all of its vertices
+there).
 
 A support set lies on the sphere and has the centre in its convex hull: of a handful of points every set is tried, in
-whole numbers. With q_i = p_i - p_0 the centre p_0 + sum lambda_i q_i is equally far from all of them when
-``2 G lambda = diag G``, G the matrix of ``q_i . q_j``; it lies in the hull when no lambda_i is negative and they add up
-to at most 1.
+whole numbers. With q_i = p_i - p_0 the centre p_0 + sum lambda_i q_i is equally far from all of them when ``2 G lambda
+= diag G``, G the matrix of ``q_i . q_j``; it lies in the hull when no lambda_i is negative and they add up to at most
+1.
 
 Centre: each coordinate the double nearest to the exact one. Radius: the smallest double whose closed ball about that
-rounded centre holds every point.
+rounded centre contains every point.
 
 Source: the active-set walk of B. Gaertner, "Fast and robust smallest enclosing balls", 1999 (farthest-point pivot);
-support sets as in E. Welzl, "Smallest enclosing disks (balls and ellipsoids)", 1991.
-Changed: the ball of the support is exact, the float distances only choose whom to ask.
+support sets as in E. Welzl, "Smallest enclosing disks (balls and ellipsoids)", 1991. Changed: the ball of the support
+is exact, float distances only choose the candidates.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ _FEW: Final = 64  # candidates that are not worth a double-double pass
 
 @dataclass(frozen=True, slots=True)
 class MinimalSphere:
-    """The smallest sphere around points and how it was found."""
+    """Smallest enclosing sphere, its support and the work it took."""
 
     center: FloatArray  # (dimension,): each coordinate the double nearest to the exact one
-    radius: float  # the smallest double whose closed ball about `center` holds every point
+    radius: float  # the smallest double whose closed ball about `center` contains every point
     exact_center: Rational  # before rounding
     exact_square: Fraction  # the squared radius of the exact ball
     support: tuple[int, ...]  # points on the exact sphere that have the exact centre in their convex hull
@@ -81,7 +81,7 @@ def minimal_sphere_of_rationals(points: list[Rational], budget: Budget | None = 
 
 
 class _Walk:
-    """State of one search: points in float64, their exact coordinates on demand, the distance between the two."""
+    """State of one search: points in float64, their exact coordinates on demand, and a bound on the difference."""
 
     def __init__(self, points: FloatArray, exact: Callable[[int], Rational], slack: float, budget: Budget) -> None:
         self.points = points
@@ -106,7 +106,8 @@ class _Walk:
         return MinimalSphere(near, radius, center, square, tuple(sorted(support)), self.n_candidates, self.n_rational)
 
     def _ball_of(self, indices: tuple[int, ...]) -> tuple[tuple[int, ...], Rational, Fraction]:
-        """Return support, centre and squared radius of the smallest ball of a few points, the first on its surface."""
+        """Return support, centre and squared radius of the smallest ball of a few points; the first lies on its
+        surface."""
         places = [self.exact(index) for index in indices]
         common = math.lcm(*(x.denominator for place in places for x in place))
         integers = [tuple(x.numerator * (common // x.denominator) for x in place) for place in places]
@@ -118,7 +119,7 @@ class _Walk:
     def _distances(self, center: FloatArray) -> tuple[FloatArray, Fraction]:
         """Return the squared distances from `center` in the square of a unit, and that unit, a power of two.
 
-        bound: a difference, a square and a sum of at most three terms: each size is within ``8 _UNIT size + _TINY`` of
+        error: a difference, a square and a sum of at most three terms: each size is within ``8 _UNIT size + _TINY`` of
         the exact one, in this unit, in which the largest component of a vector is between 1/2 and 1.
         """
         with np.errstate(over="ignore", under="ignore"):
@@ -132,12 +133,14 @@ class _Walk:
             return (vectors * vectors).sum(axis=1), unit * Fraction(2) ** exponent
 
     def _farthest_outside(self, center: Rational, square: Fraction) -> int | None:
-        """Return a point outside the exact ball, the farthest as far as float64 can tell; None if there is none."""
+        """Return a point outside the exact ball, about the farthest by float64 distances; None if there is none."""
         rounded = np.array([nearest_float(x) for x in center])
         sizes, unit = self._distances(rounded)
         shift = [(x - Fraction(y)) / unit for x, y in zip(center, rounded.tolist())]
         radius = math.sqrt(square / unit**2)
-        gap = _up(sum(map(abs, shift), Fraction(self.slack) / unit))  # what may lie between |vector| and the distance
+        gap = _round_up(
+            sum(map(abs, shift), Fraction(self.slack) / unit)
+        )  # what may lie between |vector| and the distance
         farthest = int(sizes.argmax())
         if sizes[farthest] > (radius * (1.0 + 4.0 * _UNIT) + gap) ** 2 * (1.0 + 16.0 * _UNIT) + _TINY:
             return farthest
@@ -153,10 +156,10 @@ class _Walk:
         return self._exactly_farthest(candidates.tolist(), center, square)
 
     def _exactly_farthest(self, candidates: list[int], center: Rational, square: Fraction) -> int | None:
-        """Return the farthest of the candidates that lie outside the ball, None if none does; in integers."""
+        """Return the candidate farthest outside the ball, in integers; None if none is outside."""
         common = math.lcm(*(x.denominator for x in center))
         tops = [x.numerator * (common // x.denominator) for x in center]
-        found, largest = None, square
+        farthest, largest = None, square
         for turn, index in enumerate(candidates):
             if turn % 256 == 0:
                 self.budget.check()
@@ -165,13 +168,13 @@ class _Walk:
             scaled = (x.numerator * (own // x.denominator) * common - own * top for x, top in zip(place, tops))
             distance, scale = sum(x * x for x in scaled), own * common
             if distance * largest.denominator > largest.numerator * scale * scale:
-                found, largest = index, Fraction(distance, scale * scale)
-        return found
+                farthest, largest = index, Fraction(distance, scale * scale)
+        return farthest
 
     def _radius_about(self, center: FloatArray) -> float:
-        """Return the smallest double whose closed ball about `center` holds every point.
+        """Return the smallest double whose closed ball about `center` contains every point.
 
-        bound: each turn takes the distance of a point that the last radius left outside, so radii grow strictly.
+        bound: each iteration takes the distance of a point outside the last radius, so radii grow strictly.
         """
         place = tuple(map(Fraction, center.tolist()))
         outside: int | None = int(self._distances(center)[0].argmax())
@@ -184,8 +187,8 @@ class _Walk:
         return radius
 
 
-def _up(value: Fraction) -> float:
-    """Return a double not below `value`, capped where anything larger means the same."""
+def _round_up(value: Fraction) -> float:
+    """Return a double not below `value`, capped at the largest useful one."""
     return float(min(value, Fraction(10) ** 100)) * (1.0 + 4.0 * _UNIT) + _TINY
 
 
@@ -217,7 +220,7 @@ def excess_double_double(
     target = float(square)
     target_low = float(square - Fraction(target))
     excess = (high - target) + (low - target_low)
-    return excess, 2.0**-90 + 8.0 * _up(lost)
+    return excess, 2.0**-90 + 8.0 * _round_up(lost)
 
 
 def _two_square(a: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -229,7 +232,7 @@ def _two_square(a: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def root_up(square: Fraction) -> float:
-    """Return the smallest double whose square is at least `square`, which is not negative.
+    """Return the smallest double whose square is at least `square` >= 0.
 
     Raises: NotRepresentableError if that is beyond float64.
     """
@@ -254,28 +257,28 @@ class IntBall:
     scale: int
     support: tuple[int, ...]  # positions in the sequence it was made from
 
-    def holds(self, point: IntPoint) -> bool:
-        """Tell whether the closed ball holds an integer point."""
+    def contains(self, point: IntPoint) -> bool:
+        """Return whether the closed ball contains an integer point."""
         return sum((self.scale * p - c) ** 2 for p, c in zip(point, self.center)) <= self.square
 
 
 def smallest_ball(points: Sequence[IntPoint], through: int) -> IntBall:
-    """Return the smallest ball of points, of which ``points[through]`` is known to lie on its surface.
+    """Return the smallest ball of points; ``points[through]`` is known to lie on its surface.
 
-    Support sets are tried from the smallest up, at most dimension + 1 points each; the smallest ball is unique and has
-    one, so that the first ball that holds all points is it. For at most dimension + 2 points: 15 sets.
+    Support sets of at most dimension + 1 points are tried from the smallest up; the smallest ball is unique and has
+    such a support, so the first ball that contains all points is it. For at most dimension + 2 points: 15 sets.
     """
     others = [index for index in range(len(points)) if index != through]
     for size in range(min(len(others), len(points[0])) + 1):
         for chosen in combinations(others, size):
             ball = _ball_through(points, (through, *chosen))
-            if ball is not None and all(ball.holds(points[index]) for index in others if index not in chosen):
+            if ball is not None and all(ball.contains(points[index]) for index in others if index not in chosen):
                 return ball
     raise AssertionError("no ball goes through the point that was to lie on its surface")
 
 
 def _ball_through(points: Sequence[IntPoint], support: tuple[int, ...]) -> IntBall | None:
-    """Return the smallest ball with all of `support` on it if its centre is in their hull, else None."""
+    """Return the smallest ball through all points of `support` if its centre lies in their convex hull, else None."""
     first, *others = (points[index] for index in support)
     steps = [tuple(x - x0 for x, x0 in zip(point, first)) for point in others]
     gram = [[sum(a * b for a, b in zip(u, v)) for v in steps] for u in steps]

@@ -1,7 +1,7 @@
-"""The bodies of a scene as arrays, and the kernels that decide most of many pairs: boxes, outlines, balls, convex ones.
+"""Arrays of the bodies of a scene, and kernels that relate most of many pairs: boxes, outlines, balls, convex bodies.
 
-Of a scene: which solid, where, and a box around each; no work per body beyond a few lookups. One table of pairs serves
-a scene and one body under many poses of another: rows, each a solid and a pose, and pairs of rows.
+A scene stores a solid, a pose and a box a body; preparing it takes a few lookups a body. One table of pairs serves
+scenes and many poses of one pair: rows of (solid, pose), and pairs of rows.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import TAKEN, check_pose, details_of_boxes, details_where_proven, pair_function
-from engine.collision.convex_body import ConvexBody, convex_body_of, pooled
+from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
 from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline_batch import outline_pool, relate_outline_pairs
@@ -31,32 +31,33 @@ from engine.solids.registry import own_box
 from engine.types import BoolArray, FloatArray, Int8Array, IntArray
 
 _LEAST_POSES: Final = 32
-"""What a batch of poses needs is made in the time that it spares on so many."""
+"""Number of poses from which a batch saves the time that its preparation takes."""
 _FEW: Final = 64
-"""Distinct solids that are all described for a question about some of them."""
+"""Up to this many distinct solids, all are prepared for a query about some of them."""
 
 
 class PairBatches:
-    """Distinct solids of one dimension as the batches take them; described when they are wanted."""
+    """Distinct solids of one dimension prepared for the batch kernels, on first use."""
 
     def __init__(self, distinct: Sequence[Solid]) -> None:
         self.distinct, self.is_planar = distinct, len(distinct) > 0 and distinct[0].dimension == 2
         self.are_boxes = np.array([isinstance(solid, Aabb) for solid in distinct], np.bool_)
-        self.kept: tuple[Any, IntArray] | None = None
+        self.cached_pool: tuple[Any, IntArray] | None = None
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
-        """Return the outlines or convex bodies in one pool, and the place of each solid in it, -1 for others."""
-        if self.kept is None:
-            self.kept = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
-        return self.kept
+        """Return the outlines or convex bodies in one pool, and the index of each solid in it, -1 for others."""
+        if self.cached_pool is None:
+            self.cached_pool = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
+        return self.cached_pool
 
     def task(
         self, kinds: IntArray, poses: PoseArrays, pairs: IntArray, relations: Int8Array, boolean: bool, detail: bool,
         budget: Budget,
     ) -> Callable[[int, int], None]:  # fmt: skip
-        """Return the task that relates ranges of pairs (n, 2) of rows, UNSETTLED where it does not decide.
+        """Return a task that writes the relations of a range of pairs (n, 2) of rows, UNSETTLED where a kernel cannot
+        decide.
 
-        kinds: which solid each row is. poses: of each row; row 0 is the identity, of any kind.
+        kinds: the solid of each row. poses: the pose of each row; row 0 is the identity, of any kind.
         """
         (pool, places), flag = self.pool(budget), budget.flag
         kernel = entry_of(relate_outline_pairs if self.is_planar else relate_convex_pairs)
@@ -77,11 +78,11 @@ def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray
         if body is not None:
             places[kind] = len(convex)
             convex.append(body)
-    return pooled(convex), places
+    return pool_bodies(convex), places
 
 
 class SceneBatches:
-    """Which bodies of a scene the batches take, and the arrays that they want."""
+    """Bodies of a scene with the arrays that the batch kernels read."""
 
     __slots__ = ("_is_box", "bodies", "pairs")
 
@@ -90,44 +91,45 @@ class SceneBatches:
         self._is_box = self.pairs.are_boxes[bodies.kinds] & ~bodies.is_posed
 
     def under(self, names: IntArray, poses: list[Pose | None]) -> SceneBatches:
-        """Return the batches of some bodies under poses that fit them."""
+        """Return the batches of the bodies `names` under checked poses."""
         bodies = self.bodies
-        if len(bodies.distinct) > _FEW and self.pairs.kept is None:
+        if len(bodies.distinct) > _FEW and self.pairs.cached_pool is None:
             return SceneBatches(scene_bodies([bodies.solids[body] for body in names.tolist()], poses))
         return SceneBatches(bodies.under(names, poses), self.pairs)
 
     def relations(self, pairs: IntArray, boolean: bool, detail: bool, budget: Budget, workers: int | None) -> Int8Array:
-        """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no batch decides."""
-        found, bodies = np.full(len(pairs), UNSETTLED, np.int8), self.bodies
-        relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, found)
-        if (found == UNSETTLED).any():
+        """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no kernel decides."""
+        result, bodies = np.full(len(pairs), UNSETTLED, np.int8), self.bodies
+        relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, result)
+        if (result == UNSETTLED).any():
             kinds, poses = np.append(np.int64(0), bodies.kinds), PoseArrays(bodies.rotations, bodies.translations, True)
-            task = self.pairs.task(kinds, poses, pairs + 1, found, boolean, detail, budget)
+            task = self.pairs.task(kinds, poses, pairs + 1, result, boolean, detail, budget)
             run_chunks(task, len(pairs), budget=budget, workers=workers)
-        return found
+        return result
 
     def related(
         self, kinds: IntArray, rotations: FloatArray, translations: FloatArray, n: int, boolean: bool, budget: Budget
     ) -> Int8Array:
-        """Return the relations of n pairs of rows, the second of each behind the first, from row 1 on."""
-        found = np.full(n, UNSETTLED, np.int8)
-        if n and (self.pairs.kept is not None or len(self.bodies.distinct) <= _FEW):
+        """Return the relations of n pairs of consecutive rows, the first pair being rows 1 and 2."""
+        relations = np.full(n, UNSETTLED, np.int8)
+        if n and (self.pairs.cached_pool is not None or len(self.bodies.distinct) <= _FEW):
             pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)
-            self.pairs.task(kinds[: 2 * n + 1], poses, pairs, found, boolean, False, budget)(0, n)
-        return found
+            self.pairs.task(kinds[: 2 * n + 1], poses, pairs, relations, boolean, False, budget)(0, n)
+        return relations
 
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
-        """Return the codes of `Rcc8` of pairs of bodies with interiors; NO_DETAIL where relations are UNSETTLED."""
-        found = details_where_proven(relations)
+        """Return the `Rcc8` codes of pairs of bodies with interiors; NO_DETAIL where relations are UNSETTLED."""
+        codes = details_where_proven(relations)
         boxes = np.flatnonzero(self._is_box[pairs].all(axis=1) & (relations != UNSETTLED))
-        found[boxes] = details_of_boxes(self.bodies.low, self.bodies.high, pairs[boxes], relations[boxes])
-        return found
+        codes[boxes] = details_of_boxes(self.bodies.low, self.bodies.high, pairs[boxes], relations[boxes])
+        return codes
 
 
 def posed_batch(
     first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, boolean: bool, detail: bool, budget: Budget
 ) -> Callable[[int, int], None] | None:
-    """Return the task that relates ranges of poses, UNSETTLED where they are open; None where this does not pay."""
+    """Return a task that writes the relations of a range of poses, UNSETTLED where open; None if it would be no
+    faster."""
     n, table = len(relations), PairBatches([first, second])
     if n < _LEAST_POSES or (not table.is_planar and None in (convex_body_of(first), convex_body_of(second))):
         return None
@@ -139,11 +141,17 @@ def posed_batch(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneBodies:
-    """A checked scene.
+    """Bodies of a checked scene.
 
-    solids, poses: one a body. distinct: each solid object once; kinds: (n,) which of these a body is. is_posed: (n,).
-    rotations (n + 1, d, d), translations (n + 1, d): row 0 the identity, then one row a body. low, high: (n, d) boxes
-    around the posed bodies, exact where there is no pose and the solid is a box. own: those of the distinct solids.
+    | field | shape | meaning |
+    |---|---|---|
+    | solids, poses | n | of each body |
+    | distinct | | each solid object once |
+    | kinds | (n,) | index of each body's solid in distinct |
+    | is_posed | (n,) | |
+    | rotations, translations | (n + 1, d, d), (n + 1, d) | row 0 the identity, then one row a body |
+    | low, high | (n, d) | boxes of the posed bodies; exact for an aabb without pose |
+    | own | | unposed boxes of the distinct solids |
     """
 
     solids: Sequence[Solid]
@@ -163,13 +171,13 @@ class SceneBodies:
         return self.translations.shape[1]
 
     def under(self, names: IntArray, poses: Sequence[Pose | None]) -> SceneBodies:
-        """Return some bodies under poses that fit them; the distinct solids are those of all."""
+        """Return some bodies under checked poses, with the same distinct solids."""
         solids = [self.solids[body] for body in names.tolist()]
-        return _placed(solids, poses, self.distinct, self.kinds[names], self.own)
+        return _place_bodies(solids, poses, self.distinct, self.kinds[names], self.own)
 
 
 class OwnBoxes(NamedTuple):
-    """The boxes of distinct solids where they are, as `place_boxes` takes them."""
+    """Boxes of distinct solids without poses, as `place_boxes` takes them."""
 
     boxes: FloatArray
     reaches: FloatArray
@@ -177,7 +185,7 @@ class OwnBoxes(NamedTuple):
 
 
 def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> SceneBodies:
-    """Return the bodies as arrays; raise with the index of the body that is wrong."""
+    """Return the bodies as arrays. Raises with the index of the wrong body."""
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):
             raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))
@@ -196,13 +204,13 @@ def bodies_of(
     own = [own_box(solid, check) for solid in distinct]
     boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
-    return _placed(solids, poses, distinct, kinds, OwnBoxes(boxes, np.array([box[2] for box in own]), radii))
+    return _place_bodies(solids, poses, distinct, kinds, OwnBoxes(boxes, np.array([box[2] for box in own]), radii))
 
 
-def _placed(
+def _place_bodies(
     solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: Sequence[Solid], kinds: IntArray, own: OwnBoxes
 ) -> SceneBodies:
-    """Return bodies where their poses put them."""
+    """Return the bodies with the boxes of their poses."""
     n, dimension = len(kinds), own.boxes.shape[2]
     try:
         rotations, translations = motions_of([None, *poses], dimension)
@@ -218,7 +226,8 @@ def _placed(
 
 
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
-    """Return the distinct solids and which each body is; raise unless `collide` takes all, in one dimension."""
+    """Return the distinct solids and the index of each body's; raise unless `collide` takes all and they share a
+    dimension."""
     distinct, kinds = distinct_of(bodies)
     for body in distinct:
         try:
@@ -246,7 +255,7 @@ def _first(solid: Solid, bodies: Sequence[Solid]) -> int:
 
 
 def distinct_of(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
-    """Return each solid once, in the order in which they first appear, and which of them each body is."""
+    """Return the distinct solids, in order of first appearance, and the index of each body's solid."""
     distinct = list({id(body): body for body in bodies}.values())
     numbers = {id(solid): number for number, solid in enumerate(distinct)}
     return distinct, np.fromiter((numbers[id(body)] for body in bodies), np.int64, len(bodies))

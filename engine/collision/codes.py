@@ -1,14 +1,14 @@
-"""The codes that kernels of collision write, all plain integers: relations here, others where the table says.
+"""Integer codes that the kernels of collision write: relations here, others in the modules of the table.
 
-| code | values | where |
+| code | values | module |
 |---|---|---|
 | relation of two bodies | as `engine.types.Relation`, or UNSETTLED | here |
 | class of two faces | APART, CROSSING, UNDECIDED, CONTACT, COPLANAR; CORNER + 3 k + m | triangle_triangle |
-| ... looked at | JUDGED + 3 bits of corners a face; BESIDE + a bit a face, SAME_SIDE, OPPOSITE | touching, pose_batch |
+| decided class | DECIDED + 3 bits of corners a face; NO_SHARED_AREA + bits, ... | touching, pose_batch |
 | kind of a contact | FACE_FACE ... CONTAINED, the places of names in STRENGTH, the strongest first | contact_kinds |
 | state of a face | STATE_UNKNOWN, STATE_CLEAN, STATE_CROSSED, STATE_STACKED, the worst last | mesh_arrays |
-| place of a point | OUTSIDE, 0 on a face, INSIDE, or UNDECIDED | parity |
-| what a search seeks, how it ends | SEEK_...; DONE, SETTLED, FULL, INTERRUPTED | dual_traversal |
+| location of a point | OUTSIDE, 0 on a face, INSIDE, or UNDECIDED | parity |
+| goal and outcome of a search | SEEK_...; DONE, SETTLED, FULL, INTERRUPTED | dual_traversal |
 | two edges of the plane | APART, CROSSING, UNSURE, contacts; IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST | outline_batch |
 | two forms | relation + kind << KIND_AT + face << FACE_AT + face << THEIR_FACE_AT | form_relations |
 """
@@ -16,6 +16,6 @@
 from __future__ import annotations
 
 UNSETTLED = -1
-"""In place of a relation: weak contacts, undecided signs, or components of which only some lie inside."""
+"""In place of a relation: weak contacts, undecided signs, or components of which only some are inside."""
 
 DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)  # as in engine.types.Relation

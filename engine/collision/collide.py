@@ -1,9 +1,9 @@
-"""Public: how two solids lie to each other. One table from the two types to the functions that decide.
+"""Public: the relation of two solids. One table maps the two types to the functions that decide.
 
 **Detail.** Of the eight relations of RCC-8 disjoint is DC, touching EC, inside NTPP. Only overlapping splits further:
 neither body sticks out of the other, EQ; one does, TPP or NTPP by whether the boundaries meet; both do, PO.
 
-Of calls about many pairs kernels fill what answers they can (`Answers`), the rest is settled one by one.
+For many pairs, kernels fill the answers that they can decide (`Answers`); the rest is settled one by one.
 """
 
 from __future__ import annotations
@@ -52,20 +52,20 @@ PAIRS: dict[tuple[int, str, str], _Functions] = {
     **{(d, body, "sphere"): (collide_body_sphere, body_sphere_parts) for d, body in result.BODIES},
 }
 for _d, (_function, _parts) in _BODIES.items():
-    PAIRS[_d, "box", "box"] = forms.by_forms_or(_function), _parts
-    PAIRS[_d, "box", "sphere"] = forms.by_forms_or(forms.collide_form_sphere), body_sphere_parts
+    PAIRS[_d, "box", "box"] = forms.closed_form_or(_function), _parts
+    PAIRS[_d, "box", "sphere"] = forms.closed_form_or(forms.collide_form_sphere), body_sphere_parts
     PAIRS[_d, "half_space", "half_space"] = forms.collide_half_spaces, forms.half_spaces_parts
     PAIRS[_d, "half_space", "sphere"] = forms.collide_half_space_sphere, forms.half_space_sphere_parts
-    PAIRS[_d, "sphere", "sphere"] = forms.by_forms_or(forms.collide_form_sphere), forms.sphere_sphere_parts
+    PAIRS[_d, "sphere", "sphere"] = forms.closed_form_or(forms.collide_form_sphere), forms.sphere_sphere_parts
 """Dimension and as what two solids meet (`Row.meets`), in one order or both, to the functions of that pair: how the two
 lie to each other, and of two that overlap what lies outside the other."""
 
 _BY_TYPE: dict[tuple[int, str, int, str], tuple[result.PairFunction, result.PartsFunction, bool]] = {}
-"""What `PAIRS` says of types that were asked about."""
+"""Cached rows of `PAIRS` by types."""
 
 
 def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, result.PartsFunction, bool]:
-    """Return the functions of a pair and whether they want the two in the other order."""
+    """Return the functions of a pair and whether to call them with the two bodies swapped."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:
@@ -108,7 +108,8 @@ def check_pose(pose: object, solid: Solid, name: str) -> None:
 def collide_pair(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the relation of two checked solids under checked poses, within the budget of `work`.
 
-    Two equal poses are left out: what moves together keeps its relation, though rotations of floats stretch a bit.
+    Two equal poses are dropped: bodies moved together keep their relation, although rounded rotations stretch lengths a
+    little.
     """
     if poses[0] is not None and poses[0] == poses[1]:
         poses = None, None
@@ -121,7 +122,7 @@ def collide_pair(first: Solid, second: Solid, poses: result.Poses, work: result.
 
 
 class CollideOptions(Options, total=False):
-    """What `collide` takes by name, but for `report`, which changes what it returns."""
+    """Keyword arguments of `collide`, except `report`, which changes the return type."""
 
     first_pose: Pose | None
     second_pose: Pose | None
@@ -264,10 +265,13 @@ PlacedPair = tuple[Solid, Solid, result.Poses]
 
 @dataclass(slots=True, eq=False)
 class Answers:
-    """One a pair, by its number.
+    """Answers to many pairs, by the number of the pair.
 
-    relations: (n,) int8, UNSETTLED where none is known yet. witnesses, details ((n,) int8, NO_DETAIL where none is
-    known): where asked for, else None. works: what settling counted.
+    | field | meaning |
+    |---|---|
+    | relations | (n,) int8, UNSETTLED where not known yet |
+    | witnesses, details | if requested, else None; details: (n,) int8, NO_DETAIL where not known yet |
+    | works | counts of the pairs settled one by one |
     """
 
     budget: Budget
@@ -278,7 +282,7 @@ class Answers:
     works: list[result.Work] = field(default_factory=list)
 
     def left(self, start: int = 0, stop: int | None = None) -> IntArray:
-        """Return the pairs of a range to be settled one by one: open ones, and those whose witness is asked for yet."""
+        """Return the pairs of a range still to be settled: those that are open, or lack a requested witness."""
         relations = self.relations[start:stop]
         is_left = relations == UNSETTLED
         if self.witnesses is not None:
@@ -303,7 +307,7 @@ class Answers:
 
 
 def accuracy_of(n_pairs: int, n_open: int, works: list[result.Work], method: str) -> Accuracy:
-    """Return the report on many pairs; n_open: those that batches left, all of them beyond a filter."""
+    """Return the accuracy report of many pairs; n_open: the number that the batches left, all beyond a filter."""
     beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
     return Accuracy("exact", None, n_pairs, max(beyond, n_open), rational, method)
 
@@ -321,7 +325,7 @@ _WHERE_PROVEN = np.array([UNLESS_OVERLAPPING.get(relation, Rcc8.PO) for relation
 
 
 def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boolean: bool) -> None:
-    """Raise where a body, given with where it stands in the call, can have no interior by its type."""
+    """Raise if a body, given with its path in the call, can have no interior by its type."""
     if boolean:
         raise InvalidInputError("detail needs the relation, which boolean leaves open; ask for one", ("detail",))
     for where, solid in named:
@@ -334,7 +338,8 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
-    """Return the codes for pairs that a batch decided, by crossings or points outside the other: overlapping is PO."""
+    """Return the `Rcc8` codes of pairs that a batch decided by crossings or by points outside the other: overlapping is
+    PO."""
     return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 
@@ -349,7 +354,7 @@ def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relatio
 
 
 def detail_of(first: Solid, second: Solid, poses: result.Poses, relation: Relation, work: result.Work) -> Rcc8 | None:
-    """Return the relation of RCC-8 of a checked pair whose relation is known; None where a body has no interior."""
+    """Return the RCC-8 relation of a checked pair with a known relation; None if a body has no interior."""
     if relation != Relation.OVERLAPPING:
         if not (has_interior(first, work.budget) and has_interior(second, work.budget)):
             return None
@@ -367,7 +372,7 @@ def detail_of(first: Solid, second: Solid, poses: result.Poses, relation: Relati
 
 
 def has_interior(solid: Solid, budget: Budget) -> bool:
-    """Tell whether some open set lies within a solid; asked once of each."""
+    """Return whether a solid contains an open set; cached with the solid."""
     return solid.prepared("has_interior", lambda: _has_interior(solid, budget), budget.check)
 
 

@@ -14,14 +14,14 @@ from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.meshes.contact_kinds import N_NAMED
 from engine.collision.meshes.dual_traversal import PIERCING
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, STILL, mesh_body_of
-from engine.collision.meshes.mesh_mesh import answer_of, told_by_kernel
-from engine.collision.meshes.mesh_pair import SPACE, what_to_seek
+from engine.collision.meshes.mesh_mesh import decode_row, relation_from_kernel
+from engine.collision.meshes.mesh_pair import SPACE, search_goal
 from engine.collision.meshes.parity import states_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
 from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work, has_faces
 from engine.collision.simple.against_ball import centers_in_frame, named, relate_balls
-from engine.collision.simple.closed_forms import told_by_forms
+from engine.collision.simple.closed_forms import relation_closed_form
 from engine.compiling.jit import entry_of
 from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.running.budget import Budget, Cancel
@@ -122,8 +122,8 @@ def collide_poses(
         budget.check()
         has_detail = detail and one_pair.has_interior(first, budget) and one_pair.has_interior(second, budget)
         details, relations = np.full(n_poses, one_pair.NO_DETAIL, np.int8), np.full(n_poses, UNSETTLED, np.int8)
-        found: one_pair.Witnesses | None = [None] * n_poses if witnesses else None
-        answers = one_pair.Answers(budget, bool(boolean), relations, found, details if has_detail else None)
+        witness_list: one_pair.Witnesses | None = [None] * n_poses if witnesses else None
+        answers = one_pair.Answers(budget, bool(boolean), relations, witness_list, details if has_detail else None)
         fill = batch_of(first, second, poses, answers)
 
         def pair_of(item: int) -> one_pair.PlacedPair:
@@ -137,7 +137,7 @@ def collide_poses(
             answers.settle(answers.left(start, stop), pair_of)
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
-    parts = (relations, *([] if found is None else [found]), *([details] if detail else []))
+    parts = (relations, *([] if witness_list is None else [witness_list]), *([details] if detail else []))
     result: Any = parts if len(parts) > 1 else relations
     if not report:
         return result
@@ -148,14 +148,14 @@ _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
 
 
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
-    """Return the answer to one pose; of two meshes without a `Pose`, which takes as long to make as to decide."""
+    """Return the answer to one pose; for two meshes no `Pose` is made, as that would take as long as the decision."""
     if first.type == "aabb" or first.type == second.type == "sphere":
         motion = poses.rotations[0], poses.translations[0]
-        told = told_by_forms(first, second, motion_of(None, first.dimension), motion, work)
-        if told is not None:
-            return told
+        closed_form = relation_closed_form(first, second, motion_of(None, first.dimension), motion, work)
+        if closed_form is not None:
+            return closed_form
     if first.dimension == 3 and has_faces(first) and has_faces(second):
-        answer = told_by_kernel(mesh_body_of(first), mesh_body_of(second), (STILL, poses), work)
+        answer = relation_from_kernel(mesh_body_of(first), mesh_body_of(second), (STILL, poses), work)
         if isinstance(answer, Collision):
             return answer
     pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
@@ -194,30 +194,30 @@ _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 def batch_of(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None] | None:
-    """Return the function that lets kernels answer a range of poses, UNSETTLED where they cannot; None without one."""
+    """Return a task by which kernels answer a range of poses, UNSETTLED where they cannot; None if there is none."""
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
-    is_named = witnesses is not None  # then a search for contacts has to follow, and tells all relations
+    is_named = witnesses is not None  # then a search for contacts follows, which decides all relations
     has_detail = answers.details is not None
     batch = posed_batch(first, second, poses, relations, answers.boolean or is_named, has_detail, budget)
     if first.dimension == 2 or not (has_faces(first) and has_faces(second)):
         return batch
     a, b = mesh_body_of(first), mesh_body_of(second)
-    seek = what_to_seek(a, b, Work(budget, is_named, answers.boolean))
+    seek = search_goal(a, b, Work(budget, is_named, answers.boolean))
 
     def fill(start: int, stop: int) -> None:
         if batch is not None:
             batch(start, stop)
         items: IntArray | slice = slice(start, stop)
-        if batch is not None:  # those apart are told, and without witnesses more
+        if batch is not None:  # disjoint pairs are decided, and without witnesses more
             items = start + np.flatnonzero(relations[items] != DISJOINT if is_named else relations[items] == UNSETTLED)
         some = PoseArrays(read_only(poses.rotations[items]), read_only(poses.translations[items]), True)
         rows = np.empty((len(some.rotations), N_COLUMNS), np.int64)
         if not len(rows):
             return
         entry_of(relate_poses)(
-            a.arrays, b.arrays, STILL, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.found, 0, rows,
+            a.arrays, b.arrays, STILL, some, seek, N_NAMED if is_named else 0, SPACE.descent, SPACE.contacts, 0, rows,
             budget.flag,
         )  # fmt: skip
         budget.check()
@@ -227,7 +227,7 @@ def batch_of(
         if witnesses is not None:
             numbers = range(start, stop) if isinstance(items, slice) else items.tolist()
             pierces = (rows[:, N_CONTACTS] == ONE_SETTLES) & (seek in PIERCING)
-            for item, answer in zip(numbers, map(answer_of, *rows[:, :N_CONTACTS].T.tolist(), pierces.tolist())):
+            for item, answer in zip(numbers, map(decode_row, *rows[:, :N_CONTACTS].T.tolist(), pierces.tolist())):
                 if answer is not None:
                     witnesses[item] = answer.witness
 
@@ -235,13 +235,13 @@ def batch_of(
 
 
 _SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in RELATIONS), UNSETTLED], np.int8)
-"""What a relation, or UNSETTLED as the last, is for the two bodies in the other order."""
+"""Relation of the two bodies in the other order, by relation; UNSETTLED is the last."""
 
 
 def _ball_batch(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None]:
-    """Return the kernel task for a ball and a mesh over a range of poses; what floats do not prove is UNSETTLED."""
+    """Return the kernel task for a ball and a mesh over a range of poses; UNSETTLED where floats prove nothing."""
     is_swapped = isinstance(first, Sphere)
     body, ball = (second, first) if is_swapped else (first, second)
     assert isinstance(ball, Sphere)
@@ -250,11 +250,11 @@ def _ball_batch(
     def fill(start: int, stop: int) -> None:
         moves = poses.rotations[start:stop], poses.translations[start:stop]
         centers = centers_in_frame(ball, *((moves, None) if is_swapped else (None, moves)))
-        found = np.empty((stop - start, 2), np.int64)
+        results = np.empty((stop - start, 2), np.int64)
         is_named = answers.witnesses is not None
-        entry_of(relate_balls)(mesh.arrays, centers, float(ball.radius), is_named, found, answers.budget.flag)
+        entry_of(relate_balls)(mesh.arrays, centers, float(ball.radius), is_named, results, answers.budget.flag)
         answers.budget.check()
-        relations, triangles = found.T
+        relations, triangles = results.T
         overlapping = np.flatnonzero(relations == OVERLAPPING)
         # That a face enters says nothing of the detail, and nothing at all where even-odd cancels it.
         is_open = answers.details is not None or states_of(mesh.arrays, triangles[overlapping]) == STATE_STACKED
@@ -263,7 +263,7 @@ def _ball_batch(
         if is_named:
             assert answers.witnesses is not None
             for row in np.flatnonzero(relations > DISJOINT).tolist():
-                answer = named(mesh, *found[row].tolist())
+                answer = named(mesh, *results[row].tolist())
                 answers.witnesses[start + row] = (answer.swapped() if is_swapped else answer).witness
 
     return fill

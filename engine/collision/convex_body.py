@@ -1,7 +1,7 @@
-"""What the short path for convex bodies sees of a solid: a few vertices, and what starts and ends its searches.
+"""Convex bodies as the portal filter (`convex_pair.py`) reads them: few vertices, and starting points for its searches.
 
 A polyhedron certified convex (`engine.solids.convexity`) and a box are the hull of their vertices; a ball is one vertex
-with a radius around it. Bodies without interior (flat boxes, balls of radius 0) have no place here.
+with a radius. Bodies without interior (flat boxes, balls of radius 0) are not included.
 """
 
 from __future__ import annotations
@@ -23,25 +23,38 @@ from engine.solids.primitives import Aabb, Sphere
 from engine.types import FloatArray, IntArray, Point3
 
 MOST_FACES = 1 << 16
-"""Beyond this many triangles the question whether a polyhedron is convex is not asked: milliseconds, mostly for no."""
+"""Polyhedra with more triangles are not tested for convexity: it takes milliseconds and mostly fails."""
 
 CENTER, ASIDE = 0, 3
 RADIUS, REACH, ROUND = 6, 7, 8
 N_NUMBERS = 9
-"""Places in the numbers of a body: two points inside, the second off the symmetric middle (three places each); how far
-the farthest vertex is from either, rounded up; the largest magnitude of a coordinate, radius added; that radius."""
+"""Columns of the numbers of a body.
+
+| column | meaning |
+|---|---|
+| CENTER ..., ASIDE ... | two interior points, the second off the symmetric middle |
+| RADIUS | distance of the farthest vertex from either, rounded up |
+| REACH | largest magnitude of a coordinate, plus the radius |
+| ROUND | radius of a ball |
+"""
 
 WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
-"""How far the second point inside is drawn to the farthest vertices on the diagonals: differently on every axis."""
+"""Weights by which the second interior point is pulled to the farthest vertices on the diagonals, different on each
+axis."""
 
 _NO_CLAIM = np.inf
 
 
 ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers")
-"""Several convex bodies, one after another; few arrays, because kernels count references to each.
+"""Several convex bodies, concatenated; few arrays, because kernels count references to each.
 
-points: (3, n) their vertices. normals: (4, n_faces) about unit, outward; last how far off, relative to lengths.
-anchors: (n_faces,) a vertex of each. firsts: (2, n_bodies + 1) of vertices and faces. numbers: (n_bodies, N_NUMBERS).
+| field | shape | meaning |
+|---|---|---|
+| points | (3, n) | vertices |
+| normals | (4, n_faces) | about unit, outward; row 3: relative error |
+| anchors | (n_faces,) | a vertex of each face |
+| firsts | (2, n_bodies + 1) | offsets of vertices and faces |
+| numbers | (n_bodies, N_NUMBERS) | |
 """
 
 
@@ -56,11 +69,11 @@ class ConvexBody:
 
 
 def convex_body_of(solid: Solid) -> ConvexBody | None:
-    """Return what the short path takes of a solid of space, None where the solid is not convex, or not surely."""
-    return solid.prepared("convex_body", lambda: _described(solid))
+    """Return the convex body of a solid of space; None if it is not convex, or not provably."""
+    return solid.prepared("convex_body", lambda: _build_body(solid))
 
 
-def _described(solid: Solid) -> ConvexBody | None:
+def _build_body(solid: Solid) -> ConvexBody | None:
     if isinstance(solid, Sphere) and solid.dimension == 3 and solid.radius > 0.0:
         return _ball(solid)
     if isinstance(solid, Aabb) and solid.dimension == 3 and bool((solid.min < solid.max).all()):
@@ -88,12 +101,12 @@ def _ball(ball: Sphere) -> ConvexBody:
 
 
 def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> ConvexBody:
-    """Return the body of checked arrays: all vertices used, triangles outward."""
+    """Return the body of checked arrays: every vertex is used, triangles face outward."""
     normals, numbers = np.empty((4, len(triangles))), np.zeros(N_NUMBERS)
     numbers[CENTER:ASIDE] = center
     points, triangles = np.ascontiguousarray(vertices.T), np.ascontiguousarray(triangles)
     with np.errstate(all="ignore"):  # an overflow makes a claim impossible, not wrong
-        _describe(points, triangles, normals, numbers)
+        _fill_arrays(points, triangles, normals, numbers)
     return ConvexBody(points, normals, triangles[:, 0].copy(), numbers)
 
 
@@ -104,11 +117,11 @@ def point_of(points: FloatArray, point: int) -> Point3:
 
 
 @kernel
-def _describe(points: FloatArray, triangles: IntArray, normals: FloatArray, numbers: FloatArray) -> None:
-    """Fill everything but points and the centre.
+def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, numbers: FloatArray) -> None:
+    """Fill all arrays but points and the centre.
 
-    A normal from rounded differences and products is off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v| |w|
-    covers making it a unit too, so long as that is small against its length.
+    error of a normal: rounded differences and products are off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v|
+    |w| also covers the scaling to unit length, as long as it is small against the length.
     """
     n_points = points.shape[1]
     for item in range(triangles.shape[0]):
@@ -146,10 +159,10 @@ def _describe(points: FloatArray, triangles: IntArray, normals: FloatArray, numb
     numbers[REACH] = reach
 
 
-def pooled(bodies: Sequence[ConvexBody]) -> ConvexArrays:
-    """Return several bodies as the arrays that kernels take."""
-    first_point = _starts([body.points.shape[1] for body in bodies])
-    first_face = _starts([len(body.anchors) for body in bodies])
+def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
+    """Return several bodies concatenated into the arrays that kernels take."""
+    first_point = _offsets([body.points.shape[1] for body in bodies])
+    first_face = _offsets([len(body.anchors) for body in bodies])
     return ConvexArrays(
         np.ascontiguousarray(np.concatenate([np.empty((3, 0)), *(body.points for body in bodies)], axis=1)),
         np.ascontiguousarray(np.concatenate([np.empty((4, 0)), *(body.normals for body in bodies)], axis=1)),
@@ -159,5 +172,5 @@ def pooled(bodies: Sequence[ConvexBody]) -> ConvexArrays:
     )
 
 
-def _starts(counts: list[int]) -> IntArray:
+def _offsets(counts: list[int]) -> IntArray:
     return np.append(np.int64(0), np.cumsum(np.array(counts, np.int64)))

@@ -1,28 +1,31 @@
-"""Pairs of convex bodies of space in batches: balls around them, then the portal, then faces for one in the other.
+"""Narrow phase of convex pairs in batches: bounding balls, then Minkowski portal refinement, then face planes for
+inside.
 
-Everything is float64 with a proven margin; what none proves, contact above all, stays UNSETTLED for the exact path.
+Everything is float64 with a proven margin; pairs that no margin proves, contacts above all, stay UNSETTLED for the
+exact path.
 
-**Inside.** The first lies within the open interior of the second when every vertex is strictly below each face of the
-second. With n the unit normal of a face as computed, and p one of its corners, n . (a - p) differs from the value for
-the exact image of the face by the error of the posed coordinates and by the error of the normal times |a - p|: its
-`slack`, and 3e-12 because a pose turns normals by the inverse transposed, of which a rotation of floats is off by
+**Inside.** The first lies in the open interior of the second if every vertex is strictly below each face of the second.
+With n the unit normal of a face as computed, and p one of its corners, n . (a - p) differs from the value for the exact
+image of the face by the error of the posed coordinates and by the error of the normal times |a - p|: its `slack`, and
+3e-12 because a pose turns normals by the inverse transposed, of which a rotation of floats is off by
 `engine.solids.pose.TOLERANCE`; 1e-11 covers both and the rounding.
 
-**Meet or apart?** Proposed in float64, believed only when proven. The bodies have a common point exactly if the set of
-differences M = {a - b} holds the origin, and common interior points exactly if the origin is in the open interior of M.
-From a point of M a triangle of points farthest in some direction, the portal, moves outward to the origin.
+**Meeting or apart** is proposed in float64 and accepted only if proven. The bodies have a common point exactly if the
+set of differences M = {a - b} contains the origin, and common interior points exactly if the origin is in the open
+interior of M. From a point of M a triangle of points farthest in some direction, the portal, moves outward to the
+origin.
 
 **Apart** is proven by a direction d in which all of M is below 0: largest d . a < least d . b. The values are those of
 all vertices, with d turned into each body's own coordinates: turning d is off by 3u |d|_1 an entry (u = 2^-53, entries
-of R at most 1.01), the product with a vertex by 3u more, d . t by 3u |d|_1 |t|, the sums by 3u of the whole: below
-16 u |d|_1 (3.1 reach + |t|) for each body, which is less than 1.1 |d|_1 `error`.
+of R at most 1.01), the product with a vertex by 3u more, d . t by 3u |d|_1 |t|, the sums by 3u of the whole: below 16 u
+|d|_1 (3.1 reach + |t|) for each body, which is less than 1.1 |d|_1 `error`.
 
 **Meeting** is proven by four points of M with the origin strictly inside of their tetrahedron. Each is the difference
 of two rounded posed points, of which a coordinate is off by at most `error` = e together, so a determinant |p q r| by
 less than e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3 where no coordinate exceeds m, and by 2^-50 of six
 products at most m^3 for rounding. Bodies with an interior then share an interior point.
 
-Exponents: the caller keeps coordinates below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a
+Exponents: caller guarantees coordinates below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a
 direction or a determinant of at most 2^-900 proves nothing, so what underflow loses is below the margins.
 
 Source: G. Snethen, XenoCollide: complex collision made simple, Game Programming Gems 7, 2008; both answers certified.
@@ -36,7 +39,7 @@ import numpy as np
 
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, UNSETTLED
 from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, ConvexArrays, point_of
-from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, turned, turned_back
+from engine.collision.meshes.placement import Placement, PoseArrays, as_placement, placed, rotate, rotate_back
 from engine.compiling.jit import inline, kernel, merged
 from engine.predicates.vectors import as_point3, cross, dot, largest_of, length, minus, negative
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point3
@@ -44,43 +47,51 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, 
 _OUT, _WITHIN = 0, 1
 _POLL_EVERY = 256
 LARGEST_ERROR = 2.0**250
-"""Reached where coordinates are about 2^299: products of four lengths stay finite below it."""
+"""Error bound reached where coordinates are about 2^299; products of four lengths stay finite below it."""
 
 
 @inline
 def relate_convex(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool, may_be_equal: bool
 ) -> int:
-    """Return the relation or UNSETTLED; OVERLAPPING for all that meet if is_boolean, for equal ones if may_be_equal."""
+    """Return the relation of two convex bodies, or UNSETTLED.
+
+    is_boolean: every intersecting pair is OVERLAPPING. may_be_equal: equal balls are OVERLAPPING.
+    """
     error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:
         return UNSETTLED
-    start = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
+    start = minus(interior_point(pool.numbers, first, a, CENTER), interior_point(pool.numbers, second, b, ASIDE))
     square = dot(start, start)
     first_radius, second_radius = pool.numbers[first, RADIUS], pool.numbers[second, RADIUS]
-    if is_farther(square, first_radius + second_radius, error):
+    if exceeds_distance(square, first_radius + second_radius, error):
         return DISJOINT
     if a.round > 0.0 and b.round > 0.0:
         return _relate_balls(np.sqrt(square), a.round, b.round, error, may_be_equal)
-    found = meet_or_apart(pool.points, a, b, start)
-    if found == APART:
+    outcome = refine_portal(pool.points, a, b, start)
+    if outcome == APART:
         return DISJOINT
-    if found != MEETING:
+    if outcome != MEETING:
         return UNSETTLED
-    return OVERLAPPING if is_boolean else relate_meeting(pool, first, second, a, b, square)
+    return OVERLAPPING if is_boolean else relation_of_intersecting(pool, first, second, a, b, square)
 
 
 @inline
-def relate_meeting(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
-    """Return the relation of two bodies whose open interiors meet, or UNSETTLED; square: of how far they are."""
+def relation_of_intersecting(
+    pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, square: float
+) -> int:
+    """Return the relation of two bodies whose open interiors intersect, or UNSETTLED.
+
+    square: squared distance of an interior point of each.
+    """
     error = a.place.error + b.place.error
     first_lies = second_lies = _OUT
-    if not is_farther(square, pool.numbers[second, RADIUS], error):
-        first_lies = _lies(pool, first, second, a, b, square)
+    if not exceeds_distance(square, pool.numbers[second, RADIUS], error):
+        first_lies = _classify_in_hull(pool, first, second, a, b, square)
     if first_lies == _WITHIN:
         return FIRST_INSIDE_SECOND
-    if not is_farther(square, pool.numbers[first, RADIUS], error):
-        second_lies = _lies(pool, second, first, b, a, square)
+    if not exceeds_distance(square, pool.numbers[first, RADIUS], error):
+        second_lies = _classify_in_hull(pool, second, first, b, a, square)
     if second_lies == _WITHIN:
         return SECOND_INSIDE_FIRST
     return OVERLAPPING if first_lies == _OUT and second_lies == _OUT else UNSETTLED
@@ -103,30 +114,30 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
 
 
 @merged
-def inner_point(numbers: FloatArray, body: int, f: PlacedBody, which: int) -> Point3:
-    """Return one of the two points inside a body, posed: CENTER or ASIDE."""
+def interior_point(numbers: FloatArray, body: int, f: PlacedBody, which: int) -> Point3:
+    """Return one of the two posed interior points of a body: CENTER or ASIDE."""
     return placed(Point3(numbers[body, which], numbers[body, which + 1], numbers[body, which + 2]), f.place)
 
 
 @merged
-def is_farther(square: float, distance: float, error: float) -> bool:
-    """Tell whether a distance, given by its square, surely is larger than one that a pose may have stretched."""
+def exceeds_distance(square: float, distance: float, error: float) -> bool:
+    """Return whether the square of a distance proves that it exceeds another one, which a pose may have stretched."""
     limit = distance * (1.0 + 2.0**-30) + 8.0 * error
     return square > limit * limit + 2.0**-900
 
 
 @inline
-def _lies(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
-    """Return whether a body lies within the open interior of another: _WITHIN, _OUT (some of it not) or UNDECIDED."""
+def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
+    """Return whether a body lies in the open interior of another: _WITHIN, _OUT (some of it does not) or UNDECIDED."""
     error = 8.0 * (a.place.error + b.place.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
-        return _lies_in_ball(pool.points, a, inner_point(pool.numbers, outer, b, CENTER), b.round, error)
+        return _classify_in_ball(pool.points, a, interior_point(pool.numbers, outer, b, CENTER), b.round, error)
     extent, result = np.sqrt(square) + pool.numbers[inner, RADIUS] + pool.numbers[outer, RADIUS], _WITHIN
     for face in range(first, stop):
-        n = turned(b.place, point_of(pool.normals, face))
+        n = rotate(b.place, point_of(pool.normals, face))
         level = dot(n, placed(point_of(pool.points, pool.anchors[face]), b.place))
-        height, slack = largest(pool.points, a, n) - level, extent * (1e-11 + pool.normals[3, face]) + error
+        height, slack = support_value(pool.points, a, n) - level, extent * (1e-11 + pool.normals[3, face]) + error
         if height > slack:
             return _OUT
         if not height < -slack:
@@ -135,8 +146,8 @@ def _lies(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBo
 
 
 @inline
-def _lies_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
-    """Return the same for a ball: its centre and the farthest point of the other body."""
+def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
+    """Return the same for a ball, by its centre and the farthest point of the other body."""
     most = 0.0
     for point in range(a.first, a.stop):
         v = minus(placed(point_of(points, point), a.place), center)
@@ -148,7 +159,7 @@ def _lies_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: flo
 
 @merged
 def _has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
-    """Tell whether rows i and j hold one pose: then the two bodies count as unposed."""
+    """Return whether rows i and j are the same pose; then the two bodies count as unposed."""
     for k in range(3):
         for m in range(3):
             if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
@@ -161,9 +172,9 @@ def relate_convex_pairs(
     pool: ConvexArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, is_boolean: bool, may_be_equal: bool,
     relations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
+    """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows.
 
-    poses: n_rows; row 0 holds the identity, also for no pose. Returns early when the flag is raised.
+    bodies: body of each row, or -1. poses: n_rows, row 0 the identity. Returns early when the flag is set.
     """
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
@@ -188,10 +199,13 @@ _GUARD = 2.0**-900
 
 
 class PlacedBody(NamedTuple):
-    """One body of a pool and where it stands, and what of the pool concerns it.
+    """One body of a pool under a pose.
 
-    place: its error is twice the bound of `placement.py`, so that it covers the rounding of a difference of two such
-    coordinates and of a ball's. round: radius of a ball, 0.0 for others. first, stop: its vertices.
+    | field | meaning |
+    |---|---|
+    | place | placement, its error twice that of `placement.py`: for a difference of two coordinates, and a ball's |
+    | round | radius of a ball, 0.0 for others |
+    | first, stop | range of its vertices |
     """
 
     place: Placement
@@ -210,20 +224,20 @@ def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> 
 
 
 @merged
-def farthest(points: FloatArray, f: PlacedBody, local: Point3) -> int:
-    """Return a vertex about farthest along a local direction."""
-    best, found = -np.inf, f.first
+def support_vertex(points: FloatArray, f: PlacedBody, local: Point3) -> int:
+    """Support mapping: return a vertex (about) farthest along a direction in the body's own coordinates."""
+    best, support = -np.inf, f.first
     for point in range(f.first, f.stop):
         value = dot(point_of(points, point), local)
         if value > best:
-            best, found = value, point
-    return found
+            best, support = value, point
+    return support
 
 
 @inline
-def largest(points: FloatArray, f: PlacedBody, d: Point3) -> float:
-    """Return the largest d . p of all points p of a posed body."""
-    local = turned_back(f.place, d)
+def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
+    """Return max dot(d, p) over all points p of a posed body."""
+    local = rotate_back(f.place, d)
     best, other = -np.inf, -np.inf
     for point in range(f.first, f.stop - 1, 2):  # two chains: a maximum waits for the one before
         value, second = dot(point_of(points, point), local), dot(point_of(points, point + 1), local)
@@ -235,15 +249,15 @@ def largest(points: FloatArray, f: PlacedBody, d: Point3) -> float:
 
 
 @inline
-def is_apart_along(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
-    """Tell whether all of the first body surely lies below all of the second one along d."""
-    size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(largest(points, a, d) + largest(points, b, negative(d)))
+def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
+    """Return whether the first body provably lies below the second one along d."""
+    size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(support_value(points, a, d) + support_value(points, b, negative(d)))
     return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
 
 
 @inline
-def is_around_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
-    """Tell whether the origin is strictly inside of the tetrahedron of exact points within `error` of these."""
+def tetrahedron_contains_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
+    """Return whether the origin is strictly inside the tetrahedron of exact points within `error` of these."""
     m = max(largest_of(a), largest_of(b), largest_of(c), largest_of(d))
     bc, ad = cross(b, c), cross(a, d)
     size_ab, size_ac, size_ad = _size(cross(a, b)), _size(cross(a, c)), _size(ad)
@@ -259,29 +273,30 @@ def is_around_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -
 
 @merged
 def _size(a: Point3) -> float:
-    """Return |a|_1."""
+    """Return the 1-norm of a."""
     return abs(a.x) + abs(a.y) + abs(a.z)
 
 
 @inline
-def meet_or_apart(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
-    """Return APART, MEETING (the open interiors) or UNSETTLED. v0: a point of M, better not one of its symmetry.
+def refine_portal(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
+    """Minkowski portal refinement: return APART, MEETING (the open interiors intersect) or UNSETTLED.
 
-    Stages: 0 and 1 find two corners, 2 a third so that the half-line from v0 to the origin passes between, 3 moves out.
+    v0: a point of M, preferably off its symmetry. Stages 0 and 1 choose two corners, 2 a third so that the ray from v0
+    to the origin passes between them, 3 moves the portal outward.
     """
     error, rounding = a.place.error + b.place.error, a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0
     stage = 0
     for _ in range(_TURNS):
-        i = farthest(points, a, turned_back(a.place, d))
-        j = farthest(points, b, turned_back(b.place, negative(d)))
+        i = support_vertex(points, a, rotate_back(a.place, d))
+        j = support_vertex(points, b, rotate_back(b.place, negative(d)))
         v = minus(placed(point_of(points, i), a.place), placed(point_of(points, j), b.place))
         if rounding > 0.0:
             scale = rounding / length(d)
             v = Point3(v.x + scale * d.x, v.y + scale * d.y, v.z + scale * d.z)
         height = dot(v, d)
         if not height > 0.0:
-            return APART if is_apart_along(points, a, b, d) else UNSETTLED
+            return APART if is_separating_axis(points, a, b, d) else UNSETTLED
         if stage == 0:
             v1, d, stage = v, cross(v0, v), 1
             continue
@@ -316,5 +331,5 @@ def meet_or_apart(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) 
                 v1 = v
         d = cross(minus(v2, v1), minus(v3, v1))
         if dot(d, v1) >= 0.0:
-            return MEETING if is_around_origin(v0, v1, v2, v3, error) else UNSETTLED
+            return MEETING if tetrahedron_contains_origin(v0, v1, v2, v3, error) else UNSETTLED
     return UNSETTLED

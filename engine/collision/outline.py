@@ -1,11 +1,11 @@
-"""Planar bodies as exact edges: polygons, triangles and boxes of the plane, posed or not, and how two of them lie.
+"""Planar bodies as exact edges: polygons, triangles and boxes of the plane, posed or not, and their exact relation.
 
 Edge k runs from vertex k to the next vertex of its ring, so that an edge's number is that of the vertex it starts from
 (aabb: 0..3 = ymin, xmax, ymax, xmin, counter-clockwise from the lower left corner). A body of even-odd rings may have
 edges, or all of them, cancelled; single points remain where a ring has one position only.
 
-One exact arrangement of two bodies answers everything: its faces say whether the open interiors meet, its nodes and
-edges whether the boundaries do, and where they do not, the face at an edge of one body whether it lies in the other.
+One exact arrangement of two bodies decides everything: its faces whether the open interiors meet, its nodes and edges
+whether the boundaries do, and if not, the face at an edge of one body whether it lies in the other.
 """
 
 from __future__ import annotations
@@ -37,11 +37,15 @@ _CHECK_EVERY = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """The edges of one planar body.
+    """Edges of one planar body.
 
-    points: exact positions of the vertices. ends: (n, 2) the vertices of each edge. low, high: (n, 2) float64 boxes of
-    the edges, by correctly rounded coordinates (rounding is monotone: boxes apart have edges apart).
-    floats: (n_vertices, 2) the rounded positions; is_posed: False where these are the positions as given.
+    | field | shape | meaning |
+    |---|---|---|
+    | points | n_vertices | exact positions of the vertices |
+    | ends | (n, 2) | the vertices of each edge |
+    | low, high | (n, 2) | boxes of the edges, by correctly rounded, so monotone, coordinates |
+    | floats | (n_vertices, 2) | rounded positions |
+    | is_posed | | False if floats are the positions as given |
     """
 
     points: list[Point]
@@ -92,7 +96,7 @@ def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangeme
 
 def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
     if any(outline.is_posed for outline in outlines):
-        points, down = [point for outline in outlines for point in outline.points], _down(outlines)
+        points, down = [point for outline in outlines for point in outline.points], _scale_divisor(outlines)
         nodes, flat = rational_nodes(points if down == 1 else [(x / down, y / down) for x, y in points], budget)
     else:
         nodes, flat = float_nodes(np.concatenate([outline.floats for outline in outlines]), budget)
@@ -103,24 +107,24 @@ def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[
     return nodes, numbers
 
 
-def _down(outlines: list[Outline]) -> int:
-    """Return a divisor of coordinates that keeps posed ones, below four times the largest double, in range."""
+def _scale_divisor(outlines: list[Outline]) -> int:
+    """Return a divisor that brings posed coordinates, below four times the largest double, into range."""
     return 1 if all(np.isfinite(outline.floats).all() for outline in outlines) else 4
 
 
 def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
-    """Return the pieces of edges that even-odd does not cancel: exactly these have the open interior on one side."""
+    """Return the pieces of edges that even-odd does not cancel: those with the open interior on exactly one side."""
     arrangement, _ = arrange_outlines([outline], budget)
-    kept, down = [edge for edge, mask in enumerate(arrangement.masks) if mask], _down([outline])
+    live, down = [edge for edge, mask in enumerate(arrangement.masks) if mask], _scale_divisor([outline])
 
     def exact(node: int) -> Point:
         return tuple(x * down for x in arrangement.nodes.exact(node))
 
-    return [(exact(arrangement.tails[edge]), exact(arrangement.heads[edge])) for edge in kept]
+    return [(exact(arrangement.tails[edge]), exact(arrangement.heads[edge])) for edge in live]
 
 
 def is_clean(outline: Outline, number: int) -> bool:
-    """Tell whether edge `number` has a length and no other edge lies along a part of it: then none of it cancels."""
+    """Return whether edge `number` has a length and no other edge overlaps it: then none of it cancels."""
     a, b = outline.edge(number)
     if a == b:
         return False
@@ -137,30 +141,33 @@ def is_clean(outline: Outline, number: int) -> bool:
 
 
 def single_points(outline: Outline) -> list[int]:
-    """Return one vertex of each ring that has one position only."""
+    """Return one vertex of each ring that consists of one position only."""
     starts = np.flatnonzero(outline.ends[:, 1] != outline.ends[:, 0] + 1)  # the last edge of each ring
-    found, first = [], 0
+    vertices, first = [], 0
     for last in starts.tolist():
         if all(outline.points[k] == outline.points[first] for k in range(first, last + 1)):
-            found.append(first)
+            vertices.append(first)
         first = last + 1
-    return found
+    return vertices
 
 
 def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
-    """Return what `relate_placed` does; UNSETTLED for large bodies, and for those that meet and are not simple."""
+    """Return the result of `relate_placed`; UNSETTLED for large bodies, and for intersecting ones not simple."""
     one, other = batch.outline_arrays(first), batch.outline_arrays(second)
     if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
         return UNSETTLED, 0, -1, -1, batch.APART
     own, their = motion_of(poses[0], 2), motion_of(poses[1], 2)
-    found: tuple[int, int, int, int, int] = entry_of(batch.relate_two)(*one, *own, *other, *their)
-    if found[0] == DISJOINT or (found[0] != UNSETTLED and batch.is_simple_body(first) and batch.is_simple_body(second)):
-        return found
+    answer: tuple[int, int, int, int, int] = entry_of(batch.relate_two)(*one, *own, *other, *their)
+    if answer[0] == DISJOINT or (
+        answer[0] != UNSETTLED and batch.is_simple_body(first) and batch.is_simple_body(second)
+    ):
+        return answer
     return UNSETTLED, 0, -1, -1, batch.APART
 
 
 def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return what `collide_outline_outline` does, which decides what is not sure here."""
+    """Return the relation of two planar bodies; the exact `collide_outline_outline` decides what the kernel leaves
+    open."""
     relation, _, i, j, kind = _related(first, second, poses)
     if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
         return collide_outline_outline(first, second, poses, work)
@@ -172,26 +179,26 @@ def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: res
 
 
 def outline_parts(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return what of each of two overlapping bodies lies outside the other."""
-    relation, found, _, _, kind = _related(first, second, poses)
+    """Return which of two overlapping bodies has a part outside the other."""
+    relation, bits, _, _, kind = _related(first, second, poses)
     if relation == UNSETTLED:
         return parts_by_arrangement(first, second, poses, work)
-    return result.Parts(found & batch.OUT_OF_SECOND != 0, found & batch.OUT_OF_FIRST != 0, kind != batch.APART)
+    return result.Parts(bits & batch.OUT_OF_SECOND != 0, bits & batch.OUT_OF_FIRST != 0, kind != batch.APART)
 
 
 FIRST, SECOND, BOTH = 1, 2, 3
 
 
 def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the relation of two bodies of the plane, each a polygon, a triangle or a box; exact.
+    """Return the exact relation of two bodies of the plane, each a polygon, a triangle or a box.
 
-    Bodies are closed sets under even-odd; an edge that cancels is boundary still, but no interior lies beside it. Where
-    nothing is left of the interior (zero area, doubled rings) a body never overlaps.
+    Bodies are closed sets under even-odd; an edge that cancels is still boundary, without interior next to it. A body
+    without interior (zero area, doubled rings) never overlaps.
     """
     a, b = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
         return result.NO_CONTACT
-    labels, meets, first_parts, second_parts = _lying(a, b, (first, second), poses, work.budget)
+    labels, meets, first_parts, second_parts = _mutual_locations(a, b, (first, second), poses, work.budget)
     if not meets:
         if not any(first_parts) and not any(second_parts):
             return result.NO_CONTACT
@@ -207,8 +214,8 @@ def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, wo
     return result.Collision(Relation.OVERLAPPING if overlapping else Relation.TOUCHING, witness)
 
 
-class _Lying(NamedTuple):
-    """Labels of faces; do boundaries meet; of each body, which pieces and points lie in the other's open interior."""
+class _MutualLocations(NamedTuple):
+    """Labels of faces; whether boundaries meet; for each body, the pieces and points in the other's open interior."""
 
     labels: list[int]
     meet: bool
@@ -216,7 +223,9 @@ class _Lying(NamedTuple):
     second: list[bool]
 
 
-def _lying(a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: result.Poses, budget: Budget) -> _Lying:
+def _mutual_locations(
+    a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: result.Poses, budget: Budget
+) -> _MutualLocations:
     arrangement, _ = arrange_outlines([a, b], budget)
     subdivision = subdivide(arrangement)
     labels, meet = label_faces(subdivision), _boundaries_meet(arrangement)
@@ -228,18 +237,18 @@ def _lying(a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: result.Po
         meet |= Location.BOUNDARY in points
         parts.append([bool(side & other) for cover, side in zip(arrangement.cover, sides) if cover == own])
         parts[-1] += [location == Location.INSIDE for location in points]
-    return _Lying(labels, meet, *parts)
+    return _MutualLocations(labels, meet, *parts)
 
 
 def parts_by_arrangement(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return what of each of two overlapping bodies lies outside the other; exact."""
+    """Return which of two overlapping bodies has a part outside the other; exact."""
     outlines = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
-    labels, meet, _, _ = _lying(*outlines, (first, second), poses, work.budget)
+    labels, meet, _, _ = _mutual_locations(*outlines, (first, second), poses, work.budget)
     return result.Parts(FIRST in labels, SECOND in labels, meet)
 
 
 def _boundaries_meet(arrangement: Arrangement) -> bool:
-    """Tell whether some edge belongs to both bodies, or some node has edges of both."""
+    """Return whether some edge belongs to both bodies, or some node has edges of both."""
     if BOTH in arrangement.cover:
         return True
     at_node = [0] * len(arrangement.nodes.points)
@@ -250,7 +259,7 @@ def _boundaries_meet(arrangement: Arrangement) -> bool:
 
 
 def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Budget) -> result.Witness:
-    """Return the first pair of edges, by their numbers, that meet; a containment where no two edges do."""
+    """Return the first pair of edges, by number, that meet; a containment if no two edges do."""
     for i in range(a.n_edges):
         budget.check()
         near = (b.low <= a.high[i]).all(axis=1) & (b.high >= a.low[i]).all(axis=1)
@@ -262,7 +271,7 @@ def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Bud
 
 
 def _meeting(p: Point, q: Point, r: Point, s: Point) -> result.Kind | None:
-    """Return how the closed segments p q and r s meet, None if they do not."""
+    """Return the kind of the contact of the closed segments p q and r s, None if they are disjoint."""
     if p in (r, s) or q in (r, s):
         return "vertex_vertex"
     if _is_on(r, p, q) or _is_on(s, p, q) or _is_on(p, r, s) or _is_on(q, r, s):
@@ -272,6 +281,6 @@ def _meeting(p: Point, q: Point, r: Point, s: Point) -> result.Kind | None:
 
 
 def _is_on(point: Point, a: Point, b: Point) -> bool:
-    """Tell whether `point` lies on the closed segment a b."""
+    """Return whether `point` lies on the closed segment a b."""
     within = all(min(a[k], b[k]) <= point[k] <= max(a[k], b[k]) for k in range(2))
     return within and orient2d_rational(a, b, point) == 0

@@ -1,10 +1,10 @@
-"""Pairs of polygons, triangles and boxes of the plane whose edges meet only where they follow each other, compiled.
+"""Relations of many pairs of polygons, triangles and boxes of the plane with simple boundaries; compiled.
 
-One strict crossing of two edges, by signs with a bound, proves overlapping: about it lie all combinations of inside and
-outside, for no other edge comes near. Where edges meet and none cross, every such place has a vertex: about it either
-interior is a sector, and three comparisons of sectors say whether the interiors meet there, and which of them sticks
-out of the other. A ring that meets nothing lies where a vertex of it does. Together that is all: an edge that enters
-the other's interior does so at a contact, or its whole ring lies there. What rounded poses leave open stays UNSETTLED.
+One strict crossing of two edges, by signs with a bound, proves overlapping: all combinations of inside and outside
+occur around it, since no other edge comes near. If edges meet and none cross, every such place has a vertex: each
+interior is a sector there, and three comparisons of sectors decide whether the interiors meet, and which body has a
+part outside the other. A ring that meets nothing is located by one vertex. This is complete: an edge enters the other's
+interior only at a contact, or its whole ring lies there. Pairs that rounded poses leave open stay UNSETTLED.
 """
 
 from __future__ import annotations
@@ -32,30 +32,37 @@ from engine.solids.ragged import next_in_rings
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point2, read_only
 
 MOST_EDGES = 1024
-"""Beyond, pairs of edges are too many to look at all of them."""
+"""Above this number of edges, testing all pairs of edges takes too long."""
 
 _NONE = np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int8)
 APART, CROSSING, UNSURE, _VERTEX_EDGE, _VERTEX_VERTEX = range(5)
-"""How two edges lie, of which the last two are contacts, and CROSSING a strict one."""
+"""Classes of a pair of edges; CROSSING is strict, the last two are contacts."""
 KINDS: dict[int, Kind] = {CROSSING: "edge_edge", _VERTEX_EDGE: "vertex_edge", _VERTEX_VERTEX: "vertex_vertex"}
 ON_EDGE = 3
-"""Of a point: neither inside, 1, nor outside, 0."""
+"""Location of a point on an edge; others: 1 inside, 0 outside."""
 _IN, _OUT, _MAYBE = 1, 2, 4
-"""Bits: of the rings of a body some inside another, some outside, some maybe."""
+"""Bits: some rings of a body are inside another, some outside, some undecided."""
 _SMALLEST, _LARGEST = 2.0**-480, 2.0**480
-"""Of coordinates other than 0 for which orient2d always tells."""
+"""Range of nonzero coordinates for which orient2d always decides."""
 BLOCK: Final = 8
-"""Edges that follow each other in number, in one box: what that box misses, they miss."""
+"""Number of consecutive edges in one box: what misses the box misses them."""
 _POLL_EVERY = 64
 
 
 OutlineArrays = namedtuple("OutlineArrays", "vertices following sides firsts")
-"""Several bodies, one after another. vertices (n, 2); following (n,): the vertex at the end of each edge, counted
-within its body; sides (n,): as `find_sides` does; firsts (n_bodies + 1,): of each body."""
+"""Several bodies, concatenated.
+
+| field | shape | meaning |
+|---|---|---|
+| vertices | (n, 2) | |
+| following | (n,) | the vertex at the end of each edge, counted within its body |
+| sides | (n,) | of `find_sides` |
+| firsts | (n_bodies + 1,) | offset of each body |
+"""
 
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
-    """Return the bodies as arrays, and for each its number there, -1 for one that the batches do not take."""
+    """Return the bodies as arrays, and the index of each there, -1 for one that the batches do not take."""
     outlines = [outline_arrays(body) if has_faces(body) else _NONE for body in bodies]
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _, _ in outlines]))
     vertices, following, sides = map(np.concatenate, zip(_NONE, *outlines))
@@ -90,10 +97,11 @@ def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArr
 
 @kernel
 def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> None:
-    """Fill sides (n,) int8 of edges that meet only in vertices: 1 where the interior is on the left, -1 on the right,
-    0 where some coordinate is too large or too small to tell.
+    """Fill sides (n,) int8 of edges that meet only in vertices: 1 interior on the left, -1 on the right, 0 out of
+    range.
 
-    At the lowest of the leftmost vertices of a ring the outside of that ring is on the left; other rings turn it over.
+    At the lowest of the leftmost vertices of a ring the outside of that ring is on the left; each enclosing ring flips
+    it.
     """
     for vertex in range(len(vertices)):
         for k in range(2):
@@ -122,8 +130,8 @@ def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> N
 
 
 @inline
-def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
-    """Return CROSSING if two open edges surely cross in one point, APART, a contact, or UNSURE."""
+def _classify_edges(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
+    """Return CROSSING if two open edges provably cross in one point, APART, a contact, or UNSURE."""
     slack = 2.0 * error
     if max(a.x, b.x) + slack < min(c.x, d.x) or max(c.x, d.x) + slack < min(a.x, b.x):
         return APART
@@ -148,7 +156,7 @@ def _crossing(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
 
 @kernel
 def has_simple_edges(vertices: FloatArray, following: IntArray) -> bool:
-    """Tell whether no two edges of these rings meet but in the vertex between them, and none has length 0."""
+    """Return whether the edges of these rings meet only in the vertices between them, and none has length 0."""
     for i in range(len(vertices)):
         a, b = as_point2(vertices, i), as_point2(vertices, following[i])
         c = as_point2(vertices, following[following[i]])
@@ -160,14 +168,14 @@ def has_simple_edges(vertices: FloatArray, following: IntArray) -> bool:
         for j in range(i):
             if following[i] == j or following[j] == i:
                 continue
-            if _crossing(a, b, as_point2(vertices, j), as_point2(vertices, following[j]), 0.0) != APART:
+            if _classify_edges(a, b, as_point2(vertices, j), as_point2(vertices, following[j]), 0.0) != APART:
                 return False
     return True
 
 
 @inline
 def _place(vertices: FloatArray, turn: FloatArray, move: FloatArray, placed: FloatArray) -> float:
-    """Write the rounded posed vertices of a body; return a bound on the error of each coordinate (`placement.py`)."""
+    """Write the rounded posed vertices of a body; return an error bound of each coordinate (`placement.py`)."""
     reach, is_exact = 0.0, True
     for axis in range(2):  # a turn by the lattice
         x, y = turn[axis, 0], turn[axis, 1]
@@ -186,7 +194,7 @@ def _place(vertices: FloatArray, turn: FloatArray, move: FloatArray, placed: Flo
 
 @inline
 def n_blocks(n_edges: int) -> int:
-    """Return how many blocks so many edges have."""
+    """Return the number of blocks of n_edges edges."""
     return (n_edges + BLOCK - 1) // BLOCK
 
 
@@ -203,8 +211,8 @@ def box_blocks(points: FloatArray, following: IntArray, boxes: FloatArray) -> No
 
 
 @inline
-def _misses(boxes: FloatArray, block: int, a: Point2, b: Point2, slack: float) -> bool:
-    """Tell whether an edge a b is further than a slack from the box of a block."""
+def _is_clear_of_block(boxes: FloatArray, block: int, a: Point2, b: Point2, slack: float) -> bool:
+    """Return whether an edge a b is farther than a slack from the box of a block."""
     if max(a.x, b.x) + slack < boxes[block, 0] or boxes[block, 2] + slack < min(a.x, b.x):
         return True
     return max(a.y, b.y) + slack < boxes[block, 1] or boxes[block, 3] + slack < min(a.y, b.y)
@@ -212,7 +220,7 @@ def _misses(boxes: FloatArray, block: int, a: Point2, b: Point2, slack: float) -
 
 @inline
 def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -> int:
-    """Return 1 for a point inside the rings, 0 outside, ON_EDGE, or UNSURE where a bound does not tell."""
+    """Return 1 for a point inside the rings, 0 outside, ON_EDGE, or UNSURE where the bound does not decide."""
     is_inside = 0
     for edge in range(len(following)):
         a, b = as_point2(vertices, edge), as_point2(vertices, following[edge])
@@ -234,15 +242,15 @@ def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -
 
 @inline
 def _rings_inside(points: FloatArray, following: IntArray, vertices: FloatArray, theirs: IntArray, error: float) -> int:
-    """Return where the rings of a body lie that do not meet another one, as bits; others add nothing that is wrong."""
-    found = 0
+    """Return the locations of the rings of a body that do not meet another one, as bits; other rings add no bit."""
+    bits = 0
     for vertex in range(len(following)):
         if following[vertex] > vertex:  # not the last of its ring
             continue
         where = inside(as_point2(points, vertex), vertices, theirs, error)
         if where != ON_EDGE:
-            found |= _IN if where == 1 else (_OUT if where == 0 else _MAYBE)
-    return found
+            bits |= _IN if where == 1 else (_OUT if where == 0 else _MAYBE)
+    return bits
 
 
 @inline
@@ -250,20 +258,21 @@ def relate_placed(
     points: FloatArray, following: IntArray, sides: Any, vertices: FloatArray, theirs: IntArray, their_sides: Any,
     boxes: FloatArray, error: float,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1; how.
+    """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1;
+    their class.
 
-    Of bodies that are not simple a relation says no more than whether they meet. sides: none where that is enough.
-    boxes: of the second's blocks. error: of each coordinate.
+    For bodies that are not simple the relation only says whether they meet. sides: empty if that suffices. boxes: of
+    the second's blocks. error: of each coordinate.
     """
-    is_unsure, found, first, second, kind = False, 0, -1, -1, APART
+    is_unsure, bits, first, second, kind = False, 0, -1, -1, APART
     for edge in range(len(following)):
         a, b = as_point2(points, edge), as_point2(points, following[edge])
         for block in range(n_blocks(len(theirs))):
-            if _misses(boxes, block, a, b, 2.0 * error):
+            if _is_clear_of_block(boxes, block, a, b, 2.0 * error):
                 continue
             for other in range(BLOCK * block, min(BLOCK * (block + 1), len(theirs))):
                 c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
-                how = _crossing(a, b, c, d, error)
+                how = _classify_edges(a, b, c, d, error)
                 if how == APART:
                     continue
                 if how == UNSURE:
@@ -276,7 +285,7 @@ def relate_placed(
                     if len(sides) == 0 or len(their_sides) == 0 or sides[edge] == 0 or their_sides[other] == 0:
                         return UNSETTLED, 0, -1, -1, kind
                     side, their_side = sides[edge], their_sides[other]
-                    found |= at_contact(points, following, edge, side, vertices, theirs, other, their_side)
+                    bits |= contact_bits(points, following, edge, side, vertices, theirs, other, their_side)
     if is_unsure:
         return UNSETTLED, 0, -1, -1, kind
     own = _rings_inside(points, following, vertices, theirs, error)
@@ -287,11 +296,11 @@ def relate_placed(
         return FIRST_INSIDE_SECOND, IN_BOTH | OUT_OF_FIRST, -1, -1, kind
     if kind == APART and own == _OUT and their == _IN:
         return SECOND_INSIDE_FIRST, IN_BOTH | OUT_OF_SECOND, -1, -1, kind
-    found |= (IN_BOTH | OUT_OF_FIRST if own & _IN else 0) | (OUT_OF_SECOND if own & _OUT else 0)
-    found |= (IN_BOTH | OUT_OF_SECOND if their & _IN else 0) | (OUT_OF_FIRST if their & _OUT else 0)
-    if found & IN_BOTH:
-        return OVERLAPPING, found, first, second, kind
-    return (DISJOINT if kind == APART else TOUCHING), found, first, second, kind
+    bits |= (IN_BOTH | OUT_OF_FIRST if own & _IN else 0) | (OUT_OF_SECOND if own & _OUT else 0)
+    bits |= (IN_BOTH | OUT_OF_SECOND if their & _IN else 0) | (OUT_OF_FIRST if their & _OUT else 0)
+    if bits & IN_BOTH:
+        return OVERLAPPING, bits, first, second, kind
+    return (DISJOINT if kind == APART else TOUCHING), bits, first, second, kind
 
 
 @allocating_kernel
@@ -299,9 +308,10 @@ def relate_outline_pairs(
     pool: OutlineArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, has_detail: bool, relations: Int8Array,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill what is UNSETTLED in relations (n,) int8 for pairs (n, 2) of rows; bodies: of each row its body, or -1.
+    """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows.
 
-    has_detail: overlaps that are no PO stay UNSETTLED. Returns early when the flag is raised.
+    bodies: body of each row, or -1. has_detail: overlaps other than PO stay UNSETTLED. Returns early when the flag is
+    set.
     """
     placed, others = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2))
     boxes = np.empty((n_blocks(MOST_EDGES), 4))
@@ -318,8 +328,8 @@ def relate_outline_pairs(
         error = max(_place(vertices[own], r[i], t[i], placed), _place(vertices[their], r[j], t[j], others))
         box_blocks(others, theirs, boxes)
         sides, their_sides = pool.sides[own], pool.sides[their]
-        relation, found, _, _, _ = relate_placed(placed, following, sides, others, theirs, their_sides, boxes, error)
-        if not has_detail or relation != OVERLAPPING or found == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
+        relation, bits, _, _, _ = relate_placed(placed, following, sides, others, theirs, their_sides, boxes, error)
+        if not has_detail or relation != OVERLAPPING or bits == IN_BOTH | OUT_OF_FIRST | OUT_OF_SECOND:
             relations[item] = relation
 
 
@@ -328,7 +338,7 @@ def relate_two(
     vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
     theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return what `relate_placed` does, of two bodies under poses."""
+    """Return the result of `relate_placed` for two bodies under poses."""
     placed, others, boxes = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
     error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
     box_blocks(others, theirs, boxes)
@@ -340,18 +350,19 @@ def is_simple_body(solid: Solid) -> bool:
 
 
 IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
-"""Bits: the open interiors meet; some of the first is outside the second; some of the second outside the first."""
+"""Bits: the open interiors intersect; a part of the first is outside the second; a part of the second outside the
+first."""
 
 
 @inline
 def is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
-    """Tell whether a point lies in the box of an edge."""
+    """Return whether a point lies in the box of an edge."""
     return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
 
 
 @inline
-def _is_from(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
-    """Tell whether the direction from p to x is that to s, or lies strictly between s and e, counter-clockwise."""
+def _is_in_sector(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
+    """Return whether the direction from p to x is that to s, or lies strictly between s and e, counter-clockwise."""
     by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
     if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
         if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
@@ -362,34 +373,34 @@ def _is_from(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
 
 
 @called
-def _have_common(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
-    """Tell whether the open sectors about p from s to e, and from t to f, counter-clockwise, have common points."""
-    return _is_from(p, s, e, t) or _is_from(p, t, f, s)
+def _sectors_intersect(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
+    """Return whether the open sectors about p from s to e, and from t to f, counter-clockwise, intersect."""
+    return _is_in_sector(p, s, e, t) or _is_in_sector(p, t, f, s)
 
 
 @inline
-def _of_sectors(p: Point2, before: Point2, after: Point2, side: int, c: Point2, d: Point2, their_side: int) -> int:
-    """Return what holds about a vertex of one boundary on another, as bits; c, d: before and after it on that."""
+def _sector_bits(p: Point2, before: Point2, after: Point2, side: int, c: Point2, d: Point2, their_side: int) -> int:
+    """Return the bits at a vertex of one boundary on another; c, d: before and after it on that."""
     s, e = (after, before) if side > 0 else (before, after)
     t, f = (d, c) if their_side > 0 else (c, d)
-    found = IN_BOTH if _have_common(p, s, e, t, f) else 0
-    found |= OUT_OF_SECOND if _have_common(p, s, e, f, t) else 0
-    return found | (OUT_OF_FIRST if _have_common(p, t, f, e, s) else 0)
+    bits = IN_BOTH if _sectors_intersect(p, s, e, t, f) else 0
+    bits |= OUT_OF_SECOND if _sectors_intersect(p, s, e, f, t) else 0
+    return bits | (OUT_OF_FIRST if _sectors_intersect(p, t, f, e, s) else 0)
 
 
 @called
-def at_contact(
+def contact_bits(
     points: FloatArray, following: IntArray, edge: int, side: int, vertices: FloatArray, theirs: IntArray, other: int,
     their_side: int,
 ) -> int:  # fmt: skip
-    """Return what holds where two edges meet, as bits; of the start of an edge the one before it says that."""
+    """Return the bits where two edges meet; the start of an edge counts with the edge before it."""
     a, b = as_point2(points, edge), as_point2(points, following[edge])
     c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
-    found = 0
+    bits = 0
     if b != c and is_in_box(b, c, d) and orient2d(c, d, b) == 0:
         after = as_point2(points, following[following[edge]])
         their_after = as_point2(vertices, theirs[theirs[other]]) if b == d else d
-        found = _of_sectors(b, a, after, side, c, their_after, their_side)
+        bits = _sector_bits(b, a, after, side, c, their_after, their_side)
     if d != a and d != b and is_in_box(d, a, b) and orient2d(a, b, d) == 0:
-        found |= _of_sectors(d, a, b, side, c, as_point2(vertices, theirs[theirs[other]]), their_side)
-    return found
+        bits |= _sector_bits(d, a, b, side, c, as_point2(vertices, theirs[theirs[other]]), their_side)
+    return bits

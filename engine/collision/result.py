@@ -1,7 +1,7 @@
-"""What calls of collision and clearance answer, and what one pair of solids is asked with.
+"""Answers of collision and clearance, and the options of one pair.
 
-Every pair of types has one function ``(first, second, poses, work) -> Collision``; the table in
-`collide.py` finds it. `Work` carries what such a function may spend and what it should report.
+Every pair of types has one function ``(first, second, poses, work) -> Collision``, listed in `collide.py`. `Work`
+carries its budget, its options and its counts.
 """
 
 from __future__ import annotations
@@ -91,17 +91,17 @@ class Collision:
 
 
 FACES = {3: ("mesh", "box"), 2: ("outline", "box")}
-"""By dimension, as what bodies with faces or edges meet others (`Row.meets`)."""
+"""Kinds of `Row.meets` with faces or edges, by dimension."""
 BODIES = [(d, kind) for d, kinds in FACES.items() for kind in kinds]
 
 
 def meets_as(solid: Solid) -> str:
-    """Return as what a solid meets others, nothing where it is not taken."""
+    """Return the kind by which a solid is looked up in the table of pairs, empty if it is not supported."""
     return row_of(solid).meets.get(solid.dimension, "")
 
 
 def has_faces(solid: Solid) -> bool:
-    """Tell whether a solid is met by its faces, or its edges in the plane."""
+    """Return whether contacts name a face of the solid, or an edge in the plane."""
     return meets_as(solid) in FACES[solid.dimension]
 
 
@@ -112,13 +112,14 @@ NO_CONTACT = UNNAMED[Relation.DISJOINT]
 FIRST_WITHIN = Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
 SECOND_WITHIN = Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
 OVERLAP, TOUCH = Collision(Relation.OVERLAPPING, Witness("surface")), Collision(Relation.TOUCHING, Witness("surface"))
-"""What bodies without faces are answered with."""
+"""Answers for bodies without faces."""
 
 
 class Parts(NamedTuple):
-    """What of two bodies lies outside the other, for bodies whose open interiors meet.
+    """Which of two bodies with intersecting open interiors has a part outside the other.
 
-    first, second: does some of that body's open interior lie outside the other. meet: do the boundaries meet.
+    first, second: whether a part of that body's open interior lies outside the other. meet: whether the boundaries
+    meet.
     """
 
     first: bool
@@ -132,12 +133,14 @@ class Parts(NamedTuple):
 
 @dataclass(slots=True)
 class Work:
-    """What one pair may spend, what it must find out, and what it counts.
+    """Budget, options and counts of one pair.
 
-    budget: poll `budget.check()` in slow loops; kernels poll `budget.flag`. witness: False where only the relation is
-    wanted. boolean: True where disjoint or not is all that is wanted: any relation but disjoint may then be answered as
-    touching. n_beyond_filter, n_rational: decisions (pairs of faces, points) that the filter, the compiled exact stage,
-    left open.
+    | field | meaning |
+    |---|---|
+    | budget | poll `budget.check()` in slow loops; kernels poll `budget.flag` |
+    | witness | False if only the relation is wanted |
+    | boolean | True if only disjoint or not is wanted: any other relation may be reported as touching |
+    | n_beyond_filter, n_rational | decisions (pairs of faces, points) left open by the filter, by the kernel |
     """
 
     budget: Budget = field(default_factory=Budget)
@@ -148,11 +151,11 @@ class Work:
 
 
 UNCOUNTED = {(named, boolean): Work(UNLIMITED, named, boolean) for named in (False, True) for boolean in (False, True)}
-"""By `witness` and `boolean`: of calls without deadline and report, whose counts nobody reads."""
+"""By `witness` and `boolean`: work of calls without deadline and report, whose counts nobody reads."""
 
 PairFunction = Callable[[Any, Any, Poses, Work], Collision]
 PartsFunction = Callable[[Any, Any, Poses, Work], Parts]
-"""The two solids are of the types that the table in `collide.py` names."""
+"""The types of the two solids are those of the table in `collide.py`."""
 
 
 class Feature(NamedTuple):

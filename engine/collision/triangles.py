@@ -4,7 +4,7 @@ In the plane orient2d alone decides. Two convex polygons without a common point 
 the other strictly outside (the normals of their Minkowski difference are those of their edges). So nine signs for each
 triangle decide: an edge with the other strictly outside: disjoint; all nine positive: the other is inside; an edge with
 the other outside or on it: the interiors are apart, the triangles touch; else they overlap. A triangle without area is
-a segment or a point without interior. Its edges go along its line both ways, so either side of the line may be the
+a segment or a point without interior. Its edges run along its line both ways, so either side of the line may be the
 outside; two on one line have a common point if their boxes have.
 
 Source: the textbook's exercise 22.4-5; separating axes after S. Gottschalk et al., OBBTree, 1996, in exact signs.
@@ -40,13 +40,13 @@ def as_facet2(t: FloatArray) -> Facet:
 
 @inline
 def are_apart_on_axis(p: float, q: float, r: float, s: float, t: float, u: float) -> bool:
-    """Tell whether the intervals around three numbers each have no common point."""
+    """Return whether the intervals around three numbers each are disjoint."""
     return max(p, q, r) < min(s, t, u) or max(s, t, u) < min(p, q, r)
 
 
 @inline
 def are_boxes_apart(t: Facet, u: Facet) -> bool:
-    """Tell whether the boxes around two triangles have no common point on the first two axes."""
+    """Return whether the boxes around two triangles are disjoint on the first two axes."""
     if are_apart_on_axis(t.p.x, t.q.x, t.r.x, u.p.x, u.q.x, u.r.x):
         return True
     return are_apart_on_axis(t.p.y, t.q.y, t.r.y, u.p.y, u.q.y, u.r.y)
@@ -54,7 +54,8 @@ def are_boxes_apart(t: Facet, u: Facet) -> bool:
 
 @merged
 def against_edge(p: Point2, q: Point2, u: Facet) -> int:
-    """Return how u lies to the line p q: apart from its left, within that, touching it from the right, or over it."""
+    """Return the relation of u to the left of the line p q: apart from it, inside, touching it from the right, or
+    overlapping."""
     a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
     if max(a, b, c) == UNDECIDED:
         return UNSETTLED
@@ -67,7 +68,8 @@ def against_edge(p: Point2, q: Point2, u: Facet) -> int:
 
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
-    """Return how u lies to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors apart."""
+    """Return the relation of u to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors
+    apart."""
     first = against_edge(t.p, t.q, u)
     if first in (UNSETTLED, DISJOINT):
         return first
@@ -204,7 +206,7 @@ def collide_triangles(
             n_open.append(len(still_open))
             for item in still_open.tolist():
                 budget.check()
-                relations[item] = _settled(a[item], b[item], budget)
+                relations[item] = _relate_exactly(a[item], b[item], budget)
 
         run_chunks(task, len(a), budget=budget, workers=workers, progress=progress)
     if not report:
@@ -213,7 +215,7 @@ def collide_triangles(
     return relations, Accuracy("exact", None, len(a), sum(n_open), sum(n_open), method)
 
 
-def _settled(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
+def _relate_exactly(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
     """Return the relation of one pair by integer or rational arithmetic."""
     if t.shape[1] == 2:
         return collide_outline_outline(Triangle(t), Triangle(u), (None, None), Work(budget, witness=False)).relation

@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import Axis, cell_of, make_axis
-from engine.bounding.bvh import WIDTH, build_bvh, on_lines
+from engine.bounding.bvh import WIDTH, build_bvh, cache_aligned
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
@@ -275,7 +275,9 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     x, y, z, u, v, w = boxes.T
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
     origin = tuple(tree.origin.tolist())
-    return TriangleTree(solid.vertices, triangles, tree.boxes, child, on_lines(blocks), origin, tree.scale, low, high)
+    return TriangleTree(
+        solid.vertices, triangles, tree.boxes, child, cache_aligned(blocks), origin, tree.scale, low, high
+    )
 
 
 def tree_line(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:

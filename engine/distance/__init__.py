@@ -1,1 +1,1 @@
-"""How far apart two bodies are: a traversal in floats with proven bounds, and an exact stage for what it leaves."""
+"""Distance of two bodies: a tree traversal in floats with proven bounds, and an exact stage for what it leaves open."""

@@ -25,7 +25,7 @@ from engine.types import Accuracy, BoolArray, FloatArray, Relation, read_only
 
 
 class ClearanceOptions(Options, total=False):
-    """What `clearance` takes by name, but for `report`, which changes what it returns."""
+    """Keyword arguments of `clearance`, except `report`, which changes the return type."""
 
     at_least: float | None
     first_pose: Pose | None
@@ -154,13 +154,13 @@ def checked_distance(value: float, name: str = "at_least") -> float:
 
 
 def do_meet(first: Solid, second: Solid, poses: Poses, budget: Budget) -> bool:
-    """Tell whether two bodies have a common point."""
+    """Return whether two bodies have a common point."""
     work = Work(budget, witness=False, boolean=True)
     return collide_pair(first, second, poses, work).relation != Relation.DISJOINT
 
 
 def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
-    """Return how far apart two bodies are, or whether at least so far: by closed forms, by planes, by a search."""
+    """Return the clearance of two bodies, or whether it is at least `least`: by closed forms, planes, or a search."""
     if least == 0.0:
         return True
     planes = has_plane(first, second)
@@ -180,7 +180,7 @@ def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budg
 
 
 def has_plane(first: Solid, second: Solid) -> bool:
-    """Tell whether one of two solids is a half-space."""
+    """Return whether one of two solids is a half-space."""
     return first.type == "half_space" or second.type == "half_space"
 
 
@@ -281,7 +281,7 @@ class _Batch:
         if self.is_small:
             turns, moves = read_only(self.poses.rotations[start:stop]), read_only(self.poses.translations[start:stop])
             motions = *forms.STILL2, turns, moves
-            answers[start:stop] = forms.told_under_poses(self.first, self.second, motions, least, self.budget)
+            answers[start:stop] = forms.distances_under_poses(self.first, self.second, motions, least, self.budget)
         left = start + np.flatnonzero(np.isnan(answers[start:stop]))
         for item in left.tolist():
             self.budget.check()

@@ -1,12 +1,12 @@
-"""Double-doubles as one value (`error_free.py` has bounds); clearance of boxes along the axes, balls, half-spaces.
+"""Double-double values (`error_free.py` has bounds); clearance of axis-aligned boxes, balls and half-spaces.
 
-A box is an interval on each axis, a ball one without length and a radius about it. On each axis two of them are apart,
-or share an interval: the distance is the root of the squares of what parts them, less the radii. Where they share
-intervals every point of those is as near, and `_ends_of_shared` chooses.
+A box is an interval on each axis, a ball one without length and a radius. On each axis two of them have a gap or share
+an interval: distance = sqrt(sum(gap^2)) - radii. On shared intervals every point is as near, and `_choose_shared_ends`
+selects one.
 
-**Bound.** A coordinate of a body that is not turned, shifted or not, is a double-double without error; a turned centre
-is off by `error`. A difference of two is off by 3 u^2 of itself (and by `error`), not at all where both are doubles;
-squares, their sum and its root together are below 32 u^2 of the root. What bounds leave open is left to the search.
+**Bound.** A coordinate of a body without rotation, translated or not, is an exact double-double; a rotated centre is
+off by `error`. A difference of two is off by 3 u^2 of itself (and by `error`), exact if both are doubles; squares,
+their sum and its root together are below 32 u^2 of the root. Cases that the bounds leave open go to the search.
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ def product(a: float, b: float) -> Wide:
 
 @inline
 def root(a: Wide) -> Wide:
-    """Return the root of a positive number, within 4 u^2 of itself but for half of the relative error of a.
+    """Return the root of a positive number, within 4 u^2 of itself plus half the relative error of a.
 
-    With h the rounded root, sqrt(a) = h + (a - h^2) / 2h but for (u h)^2 / 2h; it is < 2.1 u h^2, rounded twice.
+    With h the rounded root, sqrt(a) = h + (a - h^2) / 2h + O((u h)^2 / 2h); a - h^2 is < 2.1 u h^2, rounded twice.
     """
     h = np.sqrt(a.h)
     p, e = two_prod(h, h)
@@ -107,20 +107,21 @@ def along3(a: Wide3, t: Wide, u: Wide3) -> Wide3:
 
 
 UNSURE: Final = -1.0
-"""In place of a distance."""
+"""In place of a distance that is not proven."""
 _LARGEST: Final = 2.0**1021
 _TINY: Final = 2.0**-1060
 _PLANE_TINY: Final = 2.0**-600
 _EDGES: Final = (2, 1, 3, 0, 0, 0)
-"""The edges of a box of the plane, in the order of its outline, as 2 axis + side; in space faces are numbered so."""
+"""Edges of a box of the plane in the order of its outline, as 2 axis + side; faces in space are numbered so."""
 _GAPS, _ROOM = 24, 30
 
 
 @inline
-def _touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
-    """Return on which sides of an axis each of two boxes has nearest points, low 1, high 2.
+def _nearest_sides(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
+    """Return the sides of an axis on which each of two boxes has nearest points, bits low 1, high 2.
 
-    up, down: signs of the second's low less the first's high, and so on; lows, highs: of bounds less theirs.
+    up, down: signs of the second's low less the first's high, and vice versa; lows, highs: signs of the differences of
+    bounds.
     """
     if up > 0:
         return 2, 1
@@ -130,11 +131,11 @@ def _touched(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
 
 
 @inline
-def _ends_of_shared(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
-    """Return on which faces of two boxes the nearest points lie that are chosen: a bit each, 2 axis + side.
+def _choose_shared_ends(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
+    """Return the faces of two boxes that the chosen nearest points lie on: a bit each, 2 axis + side.
 
-    faces, theirs: those with nearest points; free: the axes on which there are several. The smallest face of the first
-    is taken, then the smallest of the second that is left, then the end nearest to where the first's face begins.
+    faces, theirs: those with nearest points; free: the axes with several. Order of choice: the smallest face of the
+    first, then the smallest remaining of the second, then the end nearest to the start of the first's face.
     """
     is_high = False
     for turn in range(2):
@@ -156,7 +157,7 @@ def _ends_of_shared(faces: int, theirs: int, free: int, d: int) -> tuple[int, in
 
 @inline
 def _sign(x: Wide, error: float) -> int:
-    """Return the sign of a number known within an error, 2 where that is not sure."""
+    """Return the sign of a number known within an error, 2 if unproven."""
     if error > 0.0 and abs(x.h) <= error:
         return 2
     return (1 if x.h > 0.0 else 0) - (1 if x.h < 0.0 else 0)
@@ -169,10 +170,10 @@ def _wide(w: Any, at: int) -> Wide:
 
 @inline
 def _place(form: FloatArray, turn: FloatArray, move: FloatArray, w: Any, first: int) -> float:
-    """Write the bounds of a placed form to w, low and high of each axis; return a bound on their error, infinite for a
-    box that is turned and beyond the range of the bounds.
+    """Write the bounds of a placed form to w, low and high of each axis; return their error bound, infinite for a
+    rotated box and out of range.
 
-    A turned coordinate takes three exact products and three sums, each off by 4 u^2 of all terms.
+    A rotated coordinate takes three exact products and three sums, each off by 4 u^2 of all terms.
     """
     d, is_turned, size = move.shape[0], False, 0.0
     for k in range(d):
@@ -200,24 +201,25 @@ def gap_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, w: Any,
 ) -> tuple[float, int, int, Wide, float]:  # fmt: skip
-    """Return the distance, 0.0 where they surely meet, or UNSURE; faces with nearest points; the root; the error.
+    """Return the distance (0.0 if they provably meet, or UNSURE), the faces with nearest points, the root, and the
+    error.
 
-    w (30,): work space, of the bounds of both forms, then of the gap on each axis.
+    w (30,): work space for the bounds of both forms, then the gap on each axis.
     """
     d, error = move.shape[0], _place(form, turn, move, w, 0) + _place(other, their_turn, their_move, w, 12)
     faces = theirs = free = n_apart = 0
     square, rest = Wide(0.0, 0.0), Wide(0.0, 0.0)
     if not error < float("inf"):
         return UNSURE, 0, 0, rest, error
-    is_sure, bound = True, 0.0
+    is_proven, bound = True, 0.0
     for k in range(d):
         low, high = _wide(w, 4 * k), _wide(w, 4 * k + 2)
         their_low, their_high = _wide(w, 4 * k + 12), _wide(w, 4 * k + 14)
         up, down = less(their_low, high), less(low, their_high)
         above, below = _sign(up, error), _sign(down, error)
         lows, highs = _sign(less(low, their_low), error), _sign(less(high, their_high), error)
-        is_sure = is_sure and max(above, below, lows, highs) < 2
-        here, there = _touched(above, below, lows, highs)
+        is_proven = is_proven and max(above, below, lows, highs) < 2
+        here, there = _nearest_sides(above, below, lows, highs)
         faces, theirs = faces | here << 2 * k, theirs | there << 2 * k
         gap = up if above > 0 else (Wide(-down.h, -down.low) if below > 0 else Wide(0.0, 0.0))
         w[_GAPS + 2 * k], w[_GAPS + 2 * k + 1] = gap.h, gap.low
@@ -229,20 +231,20 @@ def gap_of_forms(
             bound = 0.0 if is_exact else 4.0 * U2 * rest.h
         elif above < 0 and below < 0 and form[IS_BALL] + other[IS_BALL] == 0.0:
             free |= 1 << k
-    faces, theirs = _ends_of_shared(faces, theirs, free, d)
+    faces, theirs = _choose_shared_ends(faces, theirs, free, d)
     if n_apart > 1:
-        is_sure = is_sure and 2.0**-900 < square.h < 2.0**1000
+        is_proven = is_proven and 2.0**-900 < square.h < 2.0**1000
         rest = root(square)
         bound = 32.0 * U2 * rest.h
     radii = Wide(*two_sum(form[RADIUS], other[RADIUS]))
     distance = less(rest, radii)
     bound += 2.0 * error + (4.0 * U2 * abs(distance.h) if radii.h > 0.0 else 0.0)
-    if not is_sure:
+    if not is_proven:
         return UNSURE, faces, theirs, rest, error
     if distance.h < -bound or (distance.h == 0.0 and bound == 0.0):
         return 0.0, faces, theirs, rest, error
-    is_sure = distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)
-    return distance.h if is_sure else UNSURE, faces, theirs, rest, error
+    is_proven = distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)
+    return distance.h if is_proven else UNSURE, faces, theirs, rest, error
 
 
 @kernel
@@ -250,12 +252,12 @@ def nearest_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, points: FloatArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Return what `gap_of_forms` does, and fill points (2, d); UNSURE points are told by -1 in place of the faces."""
+    """Return the result of `gap_of_forms` and fill points (2, d); -1 in place of the faces if the points are UNSURE."""
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:
         return distance, -1, -1
-    d, is_sure = move.shape[0], True
+    d, is_proven = move.shape[0], True
     for end in range(2):
         radius, own, across = (form[RADIUS], faces, theirs) if end == 0 else (other[RADIUS], theirs, faces)
         for k in range(d):
@@ -274,17 +276,18 @@ def nearest_of_forms(
                     bound += 96.0 * U2 * abs(step.h) + _TINY * (1.0 + radius + radius / size.h)
                 bound += error * (1.0 + 4.0 * radius / size.h)
             points[end, k] = x.h + 0.0
-            is_sure = is_sure and is_correctly_rounded(x.h, x.low, bound)
-    return distance, faces if is_sure else -1, theirs
+            is_proven = is_proven and is_correctly_rounded(x.h, x.low, bound)
+    return distance, faces if is_proven else -1, theirs
 
 
 @kernel
 def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> tuple[float, int, int]:
-    """Return the distance of a form from the half-space row (d + 1,), 0.0 where they meet, or UNSURE; 0, or -1 where
-    the points (2, d) are not sure; and the faces on which the form's nearest point lies, of several the low ones.
+    """Return the distance of a form from the half-space row (d + 1,), a status, and the faces of the form's nearest
+    point.
 
-    With v = n . x + d at the form's furthest point, off by `slack`, the distance is -v / |n| less the radius, and
-    the foot x - v n / n . n. Eight operations of at most 16 u^2 each are below 128 u^2.
+    Distance: 0.0 if they meet, or UNSURE. Status: 0, or -1 if the points (2, d) are not proven. Of several faces the
+    low ones. With v = dot(n, x) + d at the form's extreme point, off by `slack`, distance = -v / |n| - radius, and foot
+    = x - v n / dot(n, n). Eight operations of at most 16 u^2 each are below 128 u^2.
     """
     w, d = workspace(_ROOM), move.shape[0]
     error = _place(form, turn, move, w, 0)
@@ -306,7 +309,7 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
         return 0.0, -1, faces
     if not (distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)):
         return UNSURE, -1, faces
-    is_sure = True
+    is_proven = True
     for k in range(d):
         x, n = _wide(w, 4 * k + (2 if row[k] > 0.0 else 0)), Wide(row[k], 0.0)
         step, outward = over(times(n, value), square), over(times(n, Wide(form[RADIUS], 0.0)), norm)
@@ -315,7 +318,7 @@ def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> 
         bound = 0.0
         if row[k] != 0.0:
             bound = 128.0 * U2 * abs(step.h) + 2.0 * slack * abs(row[k]) / square.h + 4.0 * U2 * abs(foot.h)
-            is_sure = is_sure and is_correctly_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
+            is_proven = is_proven and is_correctly_rounded(foot.h, foot.low, bound + error + _PLANE_TINY)
             bound = 128.0 * U2 * abs(outward.h) + 4.0 * U2 * abs(p.h) + _PLANE_TINY if form[RADIUS] > 0.0 else 0.0
-        is_sure = is_sure and is_correctly_rounded(p.h, p.low, bound + error)
-    return distance.h, 0 if is_sure else -1, faces
+        is_proven = is_proven and is_correctly_rounded(p.h, p.low, bound + error)
+    return distance.h, 0 if is_proven else -1, faces

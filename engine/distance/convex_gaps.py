@@ -1,12 +1,12 @@
-"""How far apart many pairs of convex bodies are: a walk to the nearest points in float64, proven in double-doubles.
+"""GJK distance of many pairs of convex bodies: float64 iterations, proven in double-doubles.
 
-Of the differences M = {a - b} of two bodies the point nearest to the origin is sought: by turns the corner of M
-furthest toward the origin is added to a simplex of at most three corners, of which those stay that the nearest point
-of all needs. Whatever direction that gives, the slab across it parts the bodies: all vertices are looked at.
+The nearest point to the origin of the differences M = {a - b} is approached: in each step the corner of M farthest
+toward the origin joins a simplex of at most three corners, reduced to those that its nearest point needs. Whatever
+direction results, the slab across it separates the bodies: all vertices are tested.
 
 **Clear** is proven as *apart* is in `convex_pair.py`, by a slab wider than the gap; **near** by two points, each off by
 the error of a placed point and 2^-48 of the largest corner of M, which covers their weights. The distance itself is
-that of the nearest points of the two features that the last simplex names, bounded as in `refined.py`.
+that of the nearest points of the two features of the last simplex, bounded as in `refined.py`.
 
 Source: E. Gilbert, D. Johnson, S. Keerthi, A fast procedure for computing the distance between complex objects in
 three-dimensional space, 1988; C. Ericson, Real-Time Collision Detection, 2005, 5.1.5 (triangle), 9.5 (this walk).
@@ -19,9 +19,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.collision.convex_body import ASIDE, CENTER, REACH, ConvexArrays, point_of
-from engine.collision.convex_pair import PlacedBody, farthest, inner_point, largest, placed_body
+from engine.collision.convex_pair import PlacedBody, interior_point, placed_body, support_value, support_vertex
 from engine.collision.meshes.near_triangles import FACE
-from engine.collision.meshes.placement import PoseArrays, placed, turned_back
+from engine.collision.meshes.placement import PoseArrays, placed, rotate_back
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.distance.closed_forms import Wide, Wide3, dot3, gap_of_forms, less, less3, root
@@ -32,12 +32,12 @@ from engine.types import FlagArray, FloatArray, IntArray, Point3
 
 _TURNS: Final = 40
 _SMALLEST, _LARGEST = 2.0**-140, 2.0**200
-"""Of lengths that the bounds hold for."""
+"""Range of lengths in which the bounds are valid."""
 _POLL_EVERY: Final = 64
 
 
 class Corner(NamedTuple):
-    """A corner of M, and the vertices of both bodies that it is the difference of."""
+    """A corner of M, and the vertices of both bodies whose difference it is."""
 
     at: Point3
     i: int
@@ -45,7 +45,7 @@ class Corner(NamedTuple):
 
 
 class Simplex(NamedTuple):
-    """At most three corners, the unused ones equal to one that is used, and their number."""
+    """At most three corners, unused ones equal to a used one, and their number."""
 
     a: Corner
     b: Corner
@@ -55,7 +55,7 @@ class Simplex(NamedTuple):
 
 @inline
 def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
-    """Return the weights of the point of a triangle that is nearest to the origin; it may be a segment or point."""
+    """Return the barycentric weights of the point of a triangle nearest to the origin; it may be degenerate."""
     u, v = minus(b, a), minus(c, a)
     ua, va, ub, vb, uc, vc = -dot(u, a), -dot(v, a), -dot(u, b), -dot(v, b), -dot(u, c), -dot(v, c)
     if ua <= 0.0 and va <= 0.0:
@@ -81,9 +81,10 @@ def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
 
 
 @inline
-def _with(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
-    """Return the corners of a simplex and a new one that the point nearest to the origin needs, and that point."""
-    best, kept, nearest = np.inf, s, new.at
+def _add_corner(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
+    """Return the sub-simplex of a simplex and a new corner that contains its point nearest to the origin, and that
+    point."""
+    best, reduced, nearest = np.inf, s, new.at
     for turn in range(3):
         p, q = (s.b if turn == 2 else s.a), (s.b if turn == 0 else s.c)
         x, y, z = _weights(new.at, p.at, q.at)
@@ -93,17 +94,17 @@ def _with(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
             best, nearest = dot(v, v), v
             first = new if x > 0.0 else (p if y > 0.0 else q)
             last = q if z > 0.0 else (p if y > 0.0 else new)
-            kept = Simplex(first, p if x > 0.0 and y > 0.0 else last, last, (x > 0.0) + (y > 0.0) + (z > 0.0))
+            reduced = Simplex(first, p if x > 0.0 and y > 0.0 else last, last, (x > 0.0) + (y > 0.0) + (z > 0.0))
         if s.n < 3:
             break
-    return kept, nearest
+    return reduced, nearest
 
 
 @merged
-def _start(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple[Corner, float]:
-    """Return the corner of M furthest against v, and its v . at."""
-    i = farthest(pool.points, a, turned_back(a.place, negative(v)))
-    j = farthest(pool.points, b, turned_back(b.place, v))
+def _support_corner(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple[Corner, float]:
+    """Support mapping: return the corner of M farthest against v, and dot(v, corner)."""
+    i = support_vertex(pool.points, a, rotate_back(a.place, negative(v)))
+    j = support_vertex(pool.points, b, rotate_back(b.place, v))
     at = minus(placed(point_of(pool.points, i), a.place), placed(point_of(pool.points, j), b.place))
     return Corner(at, i, j), dot(v, at)
 
@@ -113,17 +114,18 @@ def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: fl
     """Return a lower bound on the distance of two bodies: the slab between them across v."""
     d = negative(v)
     size = abs(d.x) + abs(d.y) + abs(d.z)
-    gap = -(largest(pool.points, a, d) + largest(pool.points, b, v)) - 2.25 * error * size
+    gap = -(support_value(pool.points, a, d) + support_value(pool.points, b, v)) - 2.25 * error * size
     return gap / (length(d) * (1.0 + 2.0**-50))
 
 
 @merged
 def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, gap: float,
                   is_measured: bool) -> float:  # fmt: skip
-    """Return the distance, infinity if at least the gap, NaN if unsure; if not is_measured, 0.0 if nearer than it."""
+    """Return the distance, infinity if at least the gap, NaN if unproven; if not is_measured, 0.0 if nearer than the
+    gap."""
     error = a.place.error + b.place.error
-    v = minus(inner_point(pool.numbers, first, a, CENTER), inner_point(pool.numbers, second, b, ASIDE))
-    corner, along = _start(pool, a, b, v)
+    v = minus(interior_point(pool.numbers, first, a, CENTER), interior_point(pool.numbers, second, b, ASIDE))
+    corner, along = _support_corner(pool, a, b, v)
     if along > (gap + a.round + b.round) * length(v) and _slab(pool, a, b, v, error) > gap:
         return np.inf
     simplex, v, reach = Simplex(corner, corner, corner, 1), corner.at, largest_of(corner.at)
@@ -136,17 +138,17 @@ def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b:
         most = np.sqrt(square) - a.round - b.round + error + 2.0**-46 * (reach + a.round + b.round)
         if not is_measured and most < gap:
             return 0.0
-        corner, along = _start(pool, a, b, v)
+        corner, along = _support_corner(pool, a, b, v)
         reach = max(reach, largest_of(corner.at))
         if along > (gap + a.round + b.round) * np.sqrt(square) and _slab(pool, a, b, v, error) > gap:
             return np.inf
         if square - along <= 2.0**-44 * square:
             break
-        grown, nearest = _with(simplex, corner)
+        grown, nearest = _add_corner(simplex, corner)
         if not dot(nearest, nearest) < square:
             break
         simplex, v = grown, nearest
-    distance = _proven(pool, simplex, a, b, pool.numbers[first, REACH] + pool.numbers[second, REACH])
+    distance = _certified_distance(pool, simplex, a, b, pool.numbers[first, REACH] + pool.numbers[second, REACH])
     return np.inf if distance > gap else (np.nan if not distance < gap else distance)
 
 
@@ -156,8 +158,8 @@ def _dual(pool: ConvexArrays, f: PlacedBody, vertex: int, shift: Wide3) -> Wide3
 
 
 @called
-def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach: float) -> float:
-    """Return the double nearest to the distance, NaN where the features of a simplex do not prove it."""
+def _certified_distance(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach: float) -> float:
+    """Return the double nearest to the distance, NaN if the features of a simplex do not prove it."""
     origin, p, q = Wide(0.0, 0.0), a.place.shift, b.place.shift
     here = Wide3(origin, origin, origin)
     there = Wide3(Wide(*two_diff(q.x, p.x)), Wide(*two_diff(q.y, p.y)), Wide(*two_diff(q.z, p.z)))
@@ -170,11 +172,13 @@ def _proven(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach:
     whole = reach + max(abs(there.x.h), abs(there.y.h), abs(there.z.h))
     if not (square.h > _SMALLEST and square.h > 2.0**-80 * whole * whole):
         return np.nan
-    beyond = max(_beyond(pool, a, n, p_end, here, whole), _beyond(pool, b, less3(here, n), q_end, there, whole))
+    beyond = max(
+        _excess_beyond(pool, a, n, p_end, here, whole), _excess_beyond(pool, b, less3(here, n), q_end, there, whole)
+    )
     size, radii = root(square), Wide(*two_sum(a.round, b.round))
     distance, bound = less(size, radii), 2.0 * beyond / size.h + ROUNDING * (whole + radii.h)
-    is_sure = distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)
-    return distance.h if is_sure else np.nan
+    is_proven = distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)
+    return distance.h if is_proven else np.nan
 
 
 @inline
@@ -188,13 +192,10 @@ def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
 
 
 @merged
-def _beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wide3, reach: float) -> float:
-    """Return how far the vertices of a body reach beyond the plane through `base` across n, times |n|.
-
-    Those that do not in doubles, by more than their rounding, are left out.
-    """
+def _excess_beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wide3, reach: float) -> float:
+    """Return max(0, dot(n, x - base)) over the vertices x of a body, skipping those within rounding of the plane."""
     d, most = Point3(n.x.h, n.y.h, n.z.h), 0.0
-    local = turned_back(f.place, d)
+    local = rotate_back(f.place, d)
     level = d.x * (base.x.h - shift.x.h) + d.y * (base.y.h - shift.y.h) + d.z * (base.z.h - shift.z.h)
     slack = 2.0**-44 * reach * (abs(d.x) + abs(d.y) + abs(d.z))
     for vertex in range(f.first, f.stop):
@@ -208,10 +209,10 @@ def gaps_of_pairs(
     forms: FloatArray, pool: ConvexArrays, bodies: IntArray, kinds: IntArray, poses: PoseArrays, places: IntArray,
     gap: float, is_measured: bool, distances: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill distances (n,) of pairs without a common point: as `gap_of_convex` says, NaN where this is not sure.
+    """Fill distances (n,) of disjoint pairs as `gap_of_convex`, NaN if unproven.
 
-    kinds (n, 2): the solids; forms (n_solids, 8): NaN for those that are none; bodies (n_solids,): their place in the
-    pool, or -1. places (n, 2): rows of the poses, 0 for none. Returns early when the flag is raised.
+    kinds (n, 2): the solids; forms (n_solids, 8): NaN for other solids; bodies (n_solids,): their index in the pool, or
+    -1. places (n, 2): rows of the poses, 0 for none. Returns early when the flag is set.
     """
     w = workspace(30)
     for item in range(places.shape[0]):

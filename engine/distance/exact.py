@@ -1,9 +1,9 @@
-"""The distance of two triangles in integers, the points of them that are nearest, and the doubles nearest to those.
+"""Exact distance of two triangles in integers, their nearest points, and the nearest doubles to those.
 
-Corners are integers on the lattice of the pair (exact_body.py). Of the two features that floats suggest the nearest
-points of their lines or planes are found, as integers over a denominator. They are the nearest of the triangles exactly
-if they lie on them and both triangles lie beyond the planes across their connection (both are convex); else all pairs
-of features are tried.
+Corners are integers on the lattice of the pair (exact_body.py). Floats suggest two features; the nearest points of
+their lines or planes are integers over a denominator. They are the nearest of the triangles exactly if they lie on them
+and both triangles lie beyond the planes across their connection (both are convex); else all pairs of features are
+tried.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Rational(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Two points, the features they lie on, and the square of their distance, top / bottom."""
+    """Two points, the features they lie on, and their squared distance top / bottom."""
 
     p: Rational
     q: Rational
@@ -42,19 +42,19 @@ class Gap(NamedTuple):
     bottom: int
 
     def is_less(self, other: Gap) -> bool:
-        """Tell whether this is the shorter one."""
+        """Return whether this gap is shorter."""
         return self.top * other.bottom < other.top * self.bottom
 
 
 class ScaledGap(NamedTuple):
-    """A gap between bodies that have no common point, and the radii about its ends, all times `scale`."""
+    """A gap between disjoint bodies, and the radii about its ends, all times `scale`."""
 
     gap: Gap
     radii: tuple[int, int]
     scale: int
 
     def clearance(self, features: tuple[Feature, Feature], dimension: int) -> Clearance:
-        """Return distance, points and features, of `dimension` coordinates."""
+        """Return distance, points and features, with `dimension` coordinates."""
         p, q, distance = self.gap.p, self.gap.q, self.distance()
         try:
             ends = self._toward(p, q, self.radii[0]), self._toward(q, p, self.radii[1])
@@ -81,7 +81,7 @@ class ScaledGap(NamedTuple):
             ) from None
 
     def is_at_least(self, least: Fraction) -> bool:
-        """Tell whether the distance is so much or more: top / bottom >= (radii + least scale)^2."""
+        """Return whether the distance is at least `least`: top / bottom >= (radii + least scale)^2."""
         reach = sum(self.radii) * least.denominator + least.numerator * self.scale
         return self.gap.top * least.denominator**2 >= reach * reach * self.gap.bottom
 
@@ -95,7 +95,7 @@ class ScaledGap(NamedTuple):
 
 
 def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap:
-    """Return the gap between two triangles that are apart; first, second: the features that are probably nearest."""
+    """Return the gap between two disjoint triangles; first, second: the features that are probably nearest."""
     suggested = _gap(s, t, first, second)
     if suggested is not None:
         wall, other = walls(suggested)
@@ -103,9 +103,9 @@ def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap
             return suggested
     best = None
     for i, j in _PAIRS:
-        found = _gap(s, t, i, j)
-        if found is not None and (best is None or found.is_less(best)):
-            best = found
+        candidate = _gap(s, t, i, j)
+        if candidate is not None and (best is None or candidate.is_less(best)):
+            best = candidate
     assert best is not None
     return best
 
@@ -123,29 +123,29 @@ def walls(gap: Gap) -> tuple[Wall, Wall]:
 
 
 def is_beyond(wall: Wall, point: Vector) -> bool:
-    """Tell whether a point lies on or beyond a plane across a gap."""
+    """Return whether a point lies on or beyond a plane across a gap."""
     n, at, size = wall
     return dot(n, point) * size <= at
 
 
 def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:
-    """Return the gap of two features, None where the nearest points of their lines or planes lie off them."""
+    """Return the gap of two features, None if the nearest points of their lines or planes lie off them."""
     if first < 3:
-        foot = _foot(s[first], t, second)
+        foot = _project(s[first], t, second)
         return None if foot is None else _between(Rational(s[first], 1), foot[0], first, foot[1])
     if second < 3:
-        foot = _foot(t[second], s, first)
+        foot = _project(t[second], s, first)
         return None if foot is None else _between(foot[0], Rational(t[second], 1), foot[1], second)
     return None if FACE in (first, second) else _edges(s, first - 3, t, second - 3)
 
 
 def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
-    """Return the gap of two points on some features."""
+    """Return the gap of two points on given features."""
     n = tuple(y * p.denominator - x * q.denominator for x, y in zip(p.numerators, q.numerators))
     return Gap(p, q, first, second, squared_length(n), (p.denominator * q.denominator) ** 2)
 
 
-def _foot(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
+def _project(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
     """Return the foot of a point on a feature of a triangle, and the feature it lies on; None if it is off."""
     if feature < 3:
         return Rational(t[feature], 1), feature
@@ -163,13 +163,13 @@ def _foot(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | Non
         if side < 0:
             return None
         if side == 0:
-            return _foot(point, t, 3 + k)
+            return _project(point, t, 3 + k)
     height = dot(n, minus(point, t[0]))
     return Rational(tuple(x * size - height * y for x, y in zip(point, n)), size), FACE
 
 
 def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] | None:
-    """Return the point at part / whole of an edge, and the feature it lies on; None where it is beyond the ends."""
+    """Return the point at part / whole of an edge, and the feature it lies on; None if it is beyond the ends."""
     a, b = t[k], t[(k + 1) % 3]
     if part == 0 or part == whole:
         return Rational(b if part else a, 1), ((k + 1) % 3 if part else k)
@@ -179,7 +179,7 @@ def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] 
 
 
 def _edges(s: Corners, i: int, t: Corners, j: int) -> Gap | None:
-    """Return the gap of two edges across both, None for parallel ones: that of an end is as small."""
+    """Return the gap of two edges across both, None if parallel: then the gap of an end is as small."""
     u, v, w = minus(s[(i + 1) % 3], s[i]), minus(t[(j + 1) % 3], t[j]), minus(s[i], t[j])
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     size = uu * vv - uv * uv

@@ -1,6 +1,7 @@
-"""Clearance of boxes along the axes, balls, half-spaces (`closed_forms.py`), small bodies of the plane (`outlines.py`).
+"""Clearance by closed forms: boxes, balls, half-spaces (`closed_forms.py`), small planar bodies (`outlines.py`).
 
-A linear function over a body is largest at a vertex: against a half-space floats leave some, rationals decide.
+A linear function over a body attains its maximum at a vertex: against a half-space floats select candidates, rationals
+decide.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from engine.solids.primitives import HalfSpace, Sphere
 from engine.types import FloatArray
 
 _MOST_PAIRS: Final = 1 << 18
-"""Of edges of two outlines: to look at all of them takes some milliseconds, where boxes part none."""
+"""Number of pairs of edges of two outlines up to which all are tested: some milliseconds if no boxes separate them."""
 _NONE: Final = np.empty(0)
 PLANE: Final = Feature("plane")
 MEETING: Final = Clearance(0.0)
@@ -37,7 +38,7 @@ MEETING: Final = Clearance(0.0)
 
 
 def _feature(faces: int, d: int) -> Feature:
-    """Return what of a box lies on all of some faces, a bit each, 2 axis + side."""
+    """Return the feature of a box that lies on all of some faces, a bit each, 2 axis + side."""
     numbers = [0]
     for axis in range(d):
         is_within = not faces >> 2 * axis & 3
@@ -52,26 +53,26 @@ FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 
 """By dimension and faces."""
 
 
-def _told(distance: float, least: float | None) -> Clearance | bool | None:
-    """Return what a distance tells by itself, as the distance rounded to nearest does; None for no answer yet."""
+def _gap_from_closed_form(distance: float, least: float | None) -> Clearance | bool | None:
+    """Return the answer if the rounded distance decides it, else None."""
     if least is not None and distance not in (UNSURE, least):
         return bool(distance > least)
     return MEETING if distance == 0.0 else None
 
 
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of two forms or small bodies of the plane, or whether it is at least `least`; or None."""
+    """Return the clearance of two forms or small planar bodies, or whether it is at least `least`; None if unproven."""
     d, (pose, their_pose) = first.dimension, poses
     if first.type in FORMS and second.type in FORMS:
         form, other = form_of(first), form_of(second)
         if form is not None and other is not None:
             points, motions = np.empty((2, d)), (motion_of(pose, d), motion_of(their_pose, d))
             distance, faces, theirs = entry_of(nearest_of_forms)(form, *motions[0], other, *motions[1], points)
-            told = _told(distance, least)
-            if told is None and distance > 0.0 and faces >= 0 and least is None:
+            answer = _gap_from_closed_form(distance, least)
+            if answer is None and distance > 0.0 and faces >= 0 and least is None:
                 return _answer(distance, points, _named(first, faces), _named(second, theirs))
-            if told is not None:
-                return told
+            if answer is not None:
+                return answer
     if d == 3:
         return None
     (at, after, radius, names), (there, next_there, their_radius, their_names) = outline_of(first), outline_of(second)
@@ -84,21 +85,21 @@ def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None
         at, after, radius, *own, there, next_there, their_radius, *their, _NONE, points, UNLIMITED.flag
     )
     if faces < 0 or least is not None:
-        return _told(distance, least)
+        return _gap_from_closed_form(distance, least)
     return _answer(distance, points, names[faces], their_names[theirs])
 
 
 def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return what `between_forms` does, one of the two a half-space without a pose; None where that is not sure."""
+    """Return the result of `between_forms` where one of the two is an unposed half-space; None if unproven."""
     is_second = isinstance(second, HalfSpace)
     plane, body = (second, first) if is_second else (first, second)
     form = form_of(body)
     if form is None or not isinstance(plane, HalfSpace) or poses[is_second] is not None:
         return None
     points, motion = np.empty((2, body.dimension)), motion_of(poses[not is_second], body.dimension)
-    distance, told, faces = entry_of(nearest_of_plane)(plane.row, form, *motion, points)
-    answer = _told(distance, least)
-    if answer is not None or not distance > 0.0 or told < 0 or least is not None:
+    distance, status, faces = entry_of(nearest_of_plane)(plane.row, form, *motion, points)
+    answer = _gap_from_closed_form(distance, least)
+    if answer is not None or not distance > 0.0 or status < 0 or least is not None:
         return answer
     if is_second:
         return _answer(distance, points[::-1].copy(), _named(body, faces), PLANE)
@@ -106,30 +107,32 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
 
 
 STILL2: Final = tuple(array[None] for array in motion_of(None, 2))
-"""The rotation and translation of a body of the plane without a pose, as one of many."""
+"""Rotation and translation of an unposed body of the plane, as one of many poses."""
 
 
-def told_under_poses(
+def distances_under_poses(
     first: Solid, second: Solid, motions: Sequence[FloatArray], least: Fraction | None, budget: Budget
 ) -> FloatArray:
-    """Return the distances under poses, NaN where they are not sure; with a distance 0.0 for bodies that are nearer
-    than that, infinity for others; motions: rotations and translations of each body, read-only."""
+    """Return the distances under poses, NaN if unproven; with `least`, 0.0 for nearer bodies and infinity for others.
+
+    motions: rotations and translations of each body, read-only.
+    """
     turns, moves, their_turns, their_moves = motions
-    found = np.empty(len(their_turns))
+    distances = np.empty(len(their_turns))
     entry_of(nearest_under_poses)(
-        *outline_of(first)[:3], turns, moves, *outline_of(second)[:3], their_turns, their_moves, found,
+        *outline_of(first)[:3], turns, moves, *outline_of(second)[:3], their_turns, their_moves, distances,
         np.empty((2, 2)), budget.flag,
     )  # fmt: skip
     budget.check()
-    told = np.where(found == UNSURE, np.nan, found)
+    answers = np.where(distances == UNSURE, np.nan, distances)
     if least is not None:
         bound = float(least)
-        told = np.where(told > bound, np.inf, np.where(told < bound, 0.0, np.nan))
-    return told
+        answers = np.where(answers > bound, np.inf, np.where(answers < bound, 0.0, np.nan))
+    return answers
 
 
 def are_small(first: Solid, second: Solid) -> bool:
-    """Tell whether two bodies are outlines of the plane that `nearest_under_poses` takes."""
+    """Return whether two bodies are planar outlines that `nearest_under_poses` takes."""
     if first.dimension == 3:
         return False
     return len(outline_of(first)[0]) * len(outline_of(second)[0]) <= _MOST_PAIRS
@@ -145,7 +148,7 @@ def _named(solid: Solid, faces: int) -> Feature:
 
 
 def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
-    """Return the gap between two points, and radii about them."""
+    """Return the gap between two points with radii about them."""
     numbers = [*p, *q, *map(Fraction, radii)]
     scale = lcm(*(x.denominator for x in numbers))
     whole = [int(x * scale) for x in numbers]
@@ -156,7 +159,7 @@ def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
 
 
 def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tuple[ScaledGap, tuple[Feature, Feature]]:
-    """Return the gap of two bodies without a common point, one of them a half-space or both, and what it ends on."""
+    """Return the gap of two disjoint bodies, one or both a half-space, and the features at its ends."""
     if isinstance(one, HalfSpace) and isinstance(other, HalfSpace):
         # their planes are parallel; of all lines across, that through the origin
         planes = image_half_space(one, poses[0]), image_half_space(other, poses[1])
@@ -171,7 +174,7 @@ def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tup
 
 
 def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget) -> tuple[Vector, Vector, Feature]:
-    """Return the point of a plane and the point of a body that are nearest, and the vertex the latter is."""
+    """Return the nearest points of a plane and a body, and the vertex that the latter is."""
     mesh, d = spread_of(body), body.dimension
     plane = image_half_space(space, poses[0])
     best: tuple[Fraction, Vector, Feature] | None = None

@@ -1,7 +1,7 @@
-"""How far apart two small bodies of the plane are, polygons, triangles, boxes and balls: every vertex and every edge.
+"""Distance of two small planar bodies, polygons, triangles, boxes and balls, by all vertices and edges.
 
-Outlines that do not cross are nearest at a vertex of one and an edge of the other, or its end. Doubles leave the pairs
-that may be it; double-doubles (`vertex_edge.py`) rank those and say what is sure; ties of parallel edges are proven.
+Outlines that do not cross are nearest at a vertex of one and an edge of the other, or its end. Doubles select
+candidates; double-doubles (`vertex_edge.py`) rank them and prove the result; ties of parallel edges are proven.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.outline_batch import BLOCK, inside, n_blocks, relate_placed
 from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
-from engine.distance.vertex_edge import LARGEST, Found, Placed, Wide2, foot_of, measure, minus2, place, point
+from engine.distance.vertex_edge import LARGEST, Placed, VertexEdge, Wide2, foot_of, measure, minus2, place, point
 from engine.predicates.error_free import U2, is_correctly_rounded, two_sum, workspace
 from engine.predicates.orientation import smaller_nonzero
 from engine.predicates.parameters import compare_differences
@@ -22,17 +22,17 @@ from engine.predicates.vectors import as_point2
 from engine.types import FlagArray, FloatArray, IntArray, Point2
 
 MOST_NEAR: Final = 64
-"""Vertices and edges that may be the nearest; where there are more, their tie is not settled here."""
+"""Number of candidate pairs of vertex and edge; a tie of more is not settled here."""
 ROOM: Final = 4 * MOST_NEAR
 _LEAST_SQUARE: Final = 2.0**-1000
-"""Of lengths; below, an edge is looked at as its start."""
+"""Squared length below which an edge is replaced by its start."""
 _LEAST_FACTOR: Final = 2.0**-300
-"""Of coordinates whose differences are factors of exact products."""
+"""Least coordinate whose differences are factors of exact products."""
 
 
 class Look(NamedTuple):
-    """The vertices and edges that may be nearest, as doubles tell: rows of `near` that are kept, the least square among
-    them, the most that is kept, and by how much distances may be off."""
+    """Candidate pairs of vertex and edge in doubles: number of rows of `near`, the least square among them, the largest
+    one retained, and the error of distances."""
 
     n: int
     least: float
@@ -41,7 +41,7 @@ class Look(NamedTuple):
 
 
 class Line(NamedTuple):
-    """An edge for looks at it: where it starts, where it leads, and the inverse of its squared length, 0.0 for none."""
+    """An edge prepared for distances: start, direction, and inverse squared length, 0.0 if it has none."""
 
     a: Point2
     u: Point2
@@ -58,10 +58,11 @@ def line_of(other: Placed, edge: int) -> Line:
 
 @inline
 def way_to(p: Point2, line: Line) -> Point2:
-    """Return about the way to a point from the nearest of an edge.
+    """Return about the vector to a point from its nearest point on an edge.
 
-    Off by less than 2^-47 of all coordinates: the foot is some point of the edge, moved along it by some part of the
-    distance that is 2^-50 of all coordinates over the length, or by the length: the less of both moves it away less.
+    error: less than 2^-47 of all coordinates. The foot is a point of the edge, displaced along it by 2^-50 of all
+    coordinates over the length times the distance, or by at most the length; the lesser displacement is below the
+    bound.
     """
     wx, wy = p.x - line.a.x, p.y - line.a.y
     share = min(max((line.u.x * wx + line.u.y * wy) * line.share, 0.0), 1.0)
@@ -70,8 +71,10 @@ def way_to(p: Point2, line: Line) -> Point2:
 
 @inline
 def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bool, near: Any, look: Look) -> Look:
-    """Look at the vertices of a block and the edges of another body's; write those that may be nearest to near, four
-    numbers a row: about how far, squared, whether the vertex is the first body's, the vertex, the edge."""
+    """Write the candidate pairs of the vertices of a block and the edges of another body's block to near.
+
+    Row: about the squared distance, whether the vertex is the first body's, the vertex, the edge.
+    """
     n, least, most, slack = look
     for edge in range(BLOCK * blocks[1], min(BLOCK * (blocks[1] + 1), len(other.following))):
         line = line_of(other, edge)
@@ -83,7 +86,7 @@ def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bo
                 most = (np.sqrt(square) + slack) ** 2
             if square <= most:
                 if n == MOST_NEAR:
-                    n = _kept(near, n, most)
+                    n = _retain_near(near, n, most)
                 if n < MOST_NEAR:
                     near[4 * n], near[4 * n + 1], near[4 * n + 2], near[4 * n + 3] = square, is_first, vertex, edge
                 n += 1
@@ -92,25 +95,25 @@ def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bo
 
 @inline
 def row_of(near: Any, row: int) -> tuple[bool, int, int]:
-    """Return the last three of a row."""
+    """Return the last three numbers of a row."""
     return near[4 * row + 1] != 0.0, int(near[4 * row + 2]), int(near[4 * row + 3])
 
 
 @inline
-def _kept(near: Any, n: int, most: float) -> int:
-    """Move the rows that may be nearest to the front; return how many these are."""
-    kept = 0
+def _retain_near(near: Any, n: int, most: float) -> int:
+    """Move the rows of at most a squared distance to the front; return their number."""
+    n_retained = 0
     for row in range(n):
         if near[4 * row] <= most:
             for k in range(4):
-                near[4 * kept + k] = near[4 * row + k]
-            kept += 1
-    return kept
+                near[4 * n_retained + k] = near[4 * row + k]
+            n_retained += 1
+    return n_retained
 
 
 @inline
 def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float:
-    """Return about how far two boxes are apart, squared."""
+    """Return about the squared distance of two boxes."""
     x = max(boxes[block, 0] - others[other, 2], others[other, 0] - boxes[block, 2], 0.0)
     y = max(boxes[block, 1] - others[other, 3], others[other, 1] - boxes[block, 3], 0.0)
     return float(x * x + y * y)
@@ -118,7 +121,7 @@ def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float
 
 @inline
 def look_for(a: Placed, b: Placed, near: Any) -> Look:
-    """Return what may be nearest; the blocks that are nearest first. More rows than there is room for: too many."""
+    """Return the candidates, scanning the nearest blocks first. A number of rows beyond the room means too many."""
     least, first, second = np.inf, 0, 0
     for i in range(len(a.boxes)):
         for j in range(len(b.boxes)):
@@ -134,7 +137,7 @@ def look_for(a: Placed, b: Placed, near: Any) -> Look:
                 look = _of_blocks(a, b, (i, j), True, near, look)
                 look = _of_blocks(b, a, (j, i), False, near, look)
     if look.n <= MOST_NEAR:
-        look = Look(_kept(near, look.n, look.most), look.least, look.most, look.slack)
+        look = Look(_retain_near(near, look.n, look.most), look.least, look.most, look.slack)
     return look
 
 
@@ -148,8 +151,8 @@ def _least_face(following: IntArray, vertex: int) -> int:
 
 
 @inline
-def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tuple[Found, bool]:
-    """Return the distance of a vertex of `a` from an edge of `b`, and whether the place of its foot is sure."""
+def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tuple[VertexEdge, bool]:
+    """Return the distance of a vertex of `a` from an edge of `b`, and whether the position of its foot is proven."""
     end = b.following[edge]
     p, c, d = point(a.points, vertex), point(b.points, edge), point(b.points, end)
     distance, bound, where = measure(p, c, d, a.error + b.error)
@@ -159,24 +162,26 @@ def _found(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tupl
         face = _least_face(b.following, feature)
     own = _least_face(a.following, vertex)
     first, second, face, theirs = (vertex, feature, own, face) if is_first else (feature, vertex, face, own)
-    return Found(distance, bound, is_first, first, second, face, theirs), where >= 0
+    return VertexEdge(distance, bound, is_first, first, second, face, theirs), where >= 0
 
 
 @inline
-def _way(a: Placed, b: Placed, found: Found) -> Wide2:
-    return minus2(point(a.points, found.first), point(b.points, found.second))
+def _offset_between(a: Placed, b: Placed, pair: VertexEdge) -> Wide2:
+    return minus2(point(a.points, pair.first), point(b.points, pair.second))
 
 
 @called
-def _are_tied(a: Placed, b: Placed, one: Found, two: Found) -> bool:
-    """Tell whether two feet are surely as far from their vertices: all are vertices, as far along each axis; or both
-    are feet within one edge, of vertices on a parallel of that; or within two parallel edges that end in the vertices.
+def _are_tied(a: Placed, b: Placed, one: VertexEdge, two: VertexEdge) -> bool:
+    """Return whether two feet are provably at equal distances from their vertices.
+
+    True if all are vertices with equal offsets on each axis; or both are feet within one edge, of vertices on a
+    parallel of it; or within two parallel edges that end in the vertices.
     """
     n, m = len(a.following), len(b.following)
     if a.error + b.error > 0.0:
         return False
     if max(one.first, two.first) < n and max(one.second, two.second) < m:
-        return _way(a, b, one) == _way(a, b, two)
+        return _offset_between(a, b, one) == _offset_between(a, b, two)
     if one.is_first == two.is_first:
         own, other, p, q = (a, b, one.first, two.first) if one.is_first else (b, a, one.second, two.second)
         edge, same = (one.second - m, two.second - m) if one.is_first else (one.first - n, two.first - n)
@@ -199,51 +204,55 @@ def _are_tied(a: Placed, b: Placed, one: Found, two: Found) -> bool:
 
 
 @inline
-def _rank(found: Found) -> tuple[int, int, int, int]:
-    return found.face, found.their_face, found.first, found.second
+def _rank(pair: VertexEdge) -> tuple[int, int, int, int]:
+    return pair.face, pair.their_face, pair.first, pair.second
 
 
 @inline
-def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[Found, float, bool]:
-    """Return the nearest of n pairs, the least faces of equal ones; the error below; and whether it is unique."""
-    none, is_sure = Wide(np.inf, 0.0), True
-    best, rival = Found(none, 0.0, True, -1, -1, 0, 0), none
+def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, bool]:
+    """Return the nearest of n pairs, ties by the least faces; its error; and whether it is unique."""
+    none, is_proven = Wide(np.inf, 0.0), True
+    best, rival = VertexEdge(none, 0.0, True, -1, -1, 0, 0), none
     for row in range(n):
         is_first, vertex, edge = row_of(near, row)
         other = b if is_first else a
         if point(other.points, edge) == point(other.points, other.following[edge]):
-            continue  # case: no length; the edges beside it end there
-        found, is_placed = _found(a, b, vertex, edge, True) if is_first else _found(b, a, vertex, edge, False)
-        more = less(found.distance, best.distance).h if best.first >= 0 else -np.inf
-        bound = 1.001 * (found.bound + best.bound)
-        if more > bound or (is_placed and is_sure and found.first == best.first and found.second == best.second):
+            continue  # case: no length; the edges next to it end there
+        candidate, is_placed = (
+            _measure_pair(a, b, vertex, edge, True) if is_first else _measure_pair(b, a, vertex, edge, False)
+        )
+        more = less(candidate.distance, best.distance).h if best.first >= 0 else -np.inf
+        bound = 1.001 * (candidate.bound + best.bound)
+        if more > bound or (
+            is_placed and is_proven and candidate.first == best.first and candidate.second == best.second
+        ):
             continue
-        if abs(more) <= bound and (bound == 0.0 or (is_placed and is_sure and _are_tied(a, b, found, best))):
-            if _rank(found) < _rank(best):
-                best, is_sure = found, is_placed
+        if abs(more) <= bound and (bound == 0.0 or (is_placed and is_proven and _are_tied(a, b, candidate, best))):
+            if _rank(candidate) < _rank(best):
+                best, is_proven = candidate, is_placed
             continue
         if abs(more) <= bound:
-            further = best if more < 0.0 else found
+            further = best if more < 0.0 else candidate
             low = less(further.distance, Wide(further.bound, 0.0))
             rival = low if low.h < rival.h or (low.h == rival.h and low.low < rival.low) else rival
         if more < 0.0:
-            best, is_sure = found, is_placed
+            best, is_proven = candidate, is_placed
     if rival.h == np.inf:
-        return best, 0.0, is_sure
+        return best, 0.0, is_proven
     behind = less(rival, best.distance).h
-    return best, max(-behind, 0.0) + 2.0**-98 * best.distance.h, is_sure and behind > 1.001 * best.bound
+    return best, max(-behind, 0.0) + 2.0**-98 * best.distance.h, is_proven and behind > 1.001 * best.bound
 
 
 _SMALLEST: Final = 2.0**-140
-"""Of distances that the bounds hold for."""
+"""Least distance for which the bounds are valid."""
 _POLL_EVERY: Final = 16
 
 
 @inline
-def _are_parted(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
-    """Tell whether bodies surely lie on two sides of a line across the way from an edge to a vertex.
+def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
+    """Return whether the line across the connection of a vertex and an edge provably separates the bodies.
 
-    Of a way n a product n . x is off by less than 8 u |n| of the largest coordinate.
+    error: for a direction n a product dot(n, x) is off by less than 8 u |n| of the largest coordinate.
     """
     way, low, high = way_to(as_point2(own.points, vertex), line_of(other, edge)), np.inf, -np.inf
     for vertex in range(len(own.following)):
@@ -262,7 +271,7 @@ def _related(a: Placed, b: Placed, error: float) -> int:
 
 @inline
 def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
-    """Return 1 for bodies without a common point, 0 for others, -1 where this is not sure, or distances may not be."""
+    """Return 1 for disjoint bodies, 0 for others, -1 if unproven or distances may be."""
     error = 2.0**-51 * max(a.reach if a.error > 0.0 else 0.0, b.reach if b.error > 0.0 else 0.0)
     error += 2.0**-1000 if error > 0.0 else 0.0
     if not (a.reach + b.reach < np.inf and look.least < np.inf):
@@ -270,7 +279,7 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
     for row in range(min(look.n, MOST_NEAR)):
         if near[4 * row] == look.least:
             is_first, vertex, edge = row_of(near, row)
-            if _are_parted(a, b, vertex, edge) if is_first else _are_parted(b, a, vertex, edge):
+            if _has_separating_line(a, b, vertex, edge) if is_first else _has_separating_line(b, a, vertex, edge):
                 return 1
             break
     if len(a.following) == 1 or len(b.following) == 1:
@@ -281,37 +290,37 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
 
 
 @inline
-def _write(
-    at: Wide2, error: float, errors: float, found: Found, way: Wide2, radius: float, points: FloatArray, end: int
+def _write_offset_point(
+    at: Wide2, error: float, errors: float, pair: VertexEdge, way: Wide2, radius: float, points: FloatArray, end: int
 ) -> bool:
-    """Write the point at a radius from another along a way that is as long as is found; tell whether it is sure.
+    """Offset a point by radius toward the other end of a connection; return whether the result is correctly rounded.
 
-    error, errors: of that point, and of both ends of the way together.
+    error, errors: of that point, and of both ends of the connection together.
     """
-    is_sure = True
+    is_proven = True
     for k in range(2):
         x, bound = (at.x if k == 0 else at.y), error
         if radius > 0.0:
-            x = plus(x, times(over(way.x if k == 0 else way.y, found.distance), Wide(radius, 0.0)))
-            bound += radius * (4.0 * errors / found.distance.h + 2.0**-98) + 2.0**-100 * abs(x.h)
-        is_sure = is_sure and is_correctly_rounded(x.h, x.low, bound) and (bound == 0.0 or abs(x.h) > 2.0**-800)
+            x = plus(x, times(over(way.x if k == 0 else way.y, pair.distance), Wide(radius, 0.0)))
+            bound += radius * (4.0 * errors / pair.distance.h + 2.0**-98) + 2.0**-100 * abs(x.h)
+        is_proven = is_proven and is_correctly_rounded(x.h, x.low, bound) and (bound == 0.0 or abs(x.h) > 2.0**-800)
         points[end, k] = x.h + 0.0
-    return is_sure
+    return is_proven
 
 
 @inline
 def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray) -> tuple[float, int, int]:
-    """Return the distance of two bodies, 0.0 where they surely meet, or UNSURE; of each body the vertex, or the number
-    of vertices + the edge, that the points (2, 2) written lie on; -1 where these are not sure.
+    """Return the distance of two bodies and the features of their nearest points, which are written to points (2, 2).
 
-    A ball is one vertex and a radius.
+    Distance: 0.0 if they provably meet, or UNSURE. Feature: the vertex, or the number of vertices + the edge; -1 if
+    unproven. A ball is one vertex and a radius.
     """
     near = workspace(ROOM)
     look = look_for(a, b, near)
     are_apart = _are_apart(a, b, near, look)
     if are_apart != 1 or look.n > MOST_NEAR:
         return 0.0 if are_apart == 0 else UNSURE, -1, -1
-    best, nearer, is_sure = search(a, b, near, look.n)
+    best, nearer, is_proven = search(a, b, near, look.n)
     if not _SMALLEST < best.distance.h < LARGEST:
         return UNSURE, -1, -1
     both = Wide(*two_sum(radius, their_radius))
@@ -321,34 +330,34 @@ def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: F
         return 0.0, -1, -1
     if not (distance.h > bound and is_correctly_rounded(distance.h, distance.low, bound)):
         return UNSURE, -1, -1
-    if not is_sure:
+    if not is_proven:
         return distance.h, -1, -1
     if best.is_first:
         (p, error), (q, their_error) = (point(a.points, best.first), a.error), foot_of(a, b, best.first, best.second)
     else:
         (p, error), (q, their_error) = foot_of(b, a, best.second, best.first), (point(b.points, best.second), b.error)
     errors = error + their_error
-    is_sure = _write(p, error, errors, best, minus2(q, p), radius, points, 0)
-    is_sure = _write(q, their_error, errors, best, minus2(p, q), their_radius, points, 1) and is_sure
-    return distance.h, best.first if is_sure else -1, best.second
+    is_proven = _write_offset_point(p, error, errors, best, minus2(q, p), radius, points, 0)
+    is_proven = _write_offset_point(q, their_error, errors, best, minus2(p, q), their_radius, points, 1) and is_proven
+    return distance.h, best.first if is_proven else -1, best.second
 
 
 @inline
 def _n_rows(following: IntArray) -> int:
-    """Return how many rows the points and boxes of an outline take."""
+    """Return the number of rows for the points and boxes of an outline."""
     return len(following) + n_blocks(len(following))
 
 
 @allocating_kernel
 def nearest_under_poses(
     vertices: FloatArray, following: IntArray, radius: float, turns: FloatArray, moves: FloatArray, other: FloatArray,
-    their_following: IntArray, their_radius: float, their_turns: FloatArray, their_moves: FloatArray, found: FloatArray,
-    points: FloatArray, flag: FlagArray,
+    their_following: IntArray, their_radius: float, their_turns: FloatArray, their_moves: FloatArray,
+    distances: FloatArray, points: FloatArray, flag: FlagArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Return what `_nearest` does under the last pose of the second, whose points are written too, and fill found with
-    the distance under each, where it is not empty; the first has as many poses, or one.
+    """Fill distances with the distance under each pose, unless empty; return `_nearest` of the last pose with its
+    points.
 
-    Stops early when the flag is raised.
+    The first body has as many poses as the second, or one. Stops early when the flag is set.
     """
     n, m, k = len(following), len(their_following), _n_rows(following)
     room = np.empty((k + _n_rows(their_following), 4))
@@ -364,6 +373,6 @@ def nearest_under_poses(
         a = Placed(at, following, boxes, error, reach)
         b = Placed(their_at, their_following, their_boxes, their_error, their_reach)
         nearest = _nearest(a, b, radius, their_radius, points)
-        if len(found) > 0:
-            found[item] = nearest[0]
+        if len(distances) > 0:
+            distances[item] = nearest[0]
     return nearest

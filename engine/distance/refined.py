@@ -1,23 +1,29 @@
-"""The candidates of a search again, in double-doubles: mostly that tells the double nearest to the distance, and where
-one pair of features without a tie is left, the nearest points.
+"""Second stage: re-evaluates the candidate pairs in double-doubles; usually enough to round the distance correctly, and
+to certify the nearest points if one pair of features without a tie is left.
 
-Of each pair of triangles the nearest points of its two features are found as convex combinations of corners, so they
-lie on the triangles but for rounding: their distance bounds that of the pair from above, the slab between from below.
+For each pair of triangles the nearest points of its two features are convex combinations of corners, so they lie on the
+triangles up to rounding: their distance bounds that of the pair from above, the slab between from below.
 
-**Bound.** Coordinates are products of two doubles, exact, and sums of seven such, each sum off by 4 u^2 of all terms; a
-point takes six operations more, a slab eight, each on numbers below twice `size`, which bounds all coordinates. All
-together is below 2^-98 size; 2^-94 size is allowed.
+**Bound.** Coordinates are exact products of two doubles and seven sums, each sum off by 4 u^2 of all terms; a point
+takes six operations more, a slab eight, each on numbers below twice `size`, which bounds all coordinates. In total
+`error <= 2^-98 size`; 2^-94 size is allowed.
 
-**Proof of the points** (`certify`). All candidates that are left name the same two features, vertex, edge or triangle.
-The nearest points of their lines or planes have weights, quotients of differences of products of two scalar products.
-Vectors are off by e = 2^-97 in each coordinate (none is above 2); with L the longest coordinate of edges, M that of the
-vector between their starts, a scalar product is off by 3 e (L + L) or 3 e (L + M), and a difference of products by 72 e
-L^2 (L + M), below 2^-90 L^2 (L + M); on one edge a scalar product itself by 2^-90 (L + M). `ends_of` counts in these:
-it tells by how much all weights times their denominators are above 0, so that the exact points lie within both
-features, and what an error of the weights brings to a point, times the lengths of the edges over the denominator
-(`steepness`): `error`, with room for the errors of denominators and for sums of three. Where all other corners of both
-triangles lie strictly beyond the planes across the exact connection, no other points of the triangles are as near. A
-direction off by 2 `error` brings a height, of lengths below 4, off by less than 16 of it.
+**Proof of the points** (`certify`). All remaining candidates name the same two features, vertex, edge or triangle. The
+nearest points of their lines or planes have weights that are quotients of differences of products of two scalar
+products. Vectors are off by e = 2^-97 in each coordinate (none is above 2). With L the longest coordinate of edges, M
+that of the vector between their starts:
+
+| quantity | error |
+|---|---|
+| scalar product | 3 e (L + L) or 3 e (L + M) |
+| difference of products | 72 e L^2 (L + M) < 2^-90 L^2 (L + M) |
+| scalar product on one edge | 2^-90 (L + M) |
+
+`ends_of` counts in these units: the margin of all weights times their denominators above 0, so that the exact points
+lie within both features, and the amplification of weight errors to the point, times the lengths of the edges over the
+denominator (`steepness`): `error`, with room for the errors of denominators and for sums of three. If all other corners
+of both triangles lie strictly beyond the planes across the exact connection, no other points of the triangles are as
+near. A direction off by 2 `error` changes a height, of lengths below 4, by less than 16 `error`.
 """
 
 from __future__ import annotations
@@ -44,7 +50,7 @@ ROOT: Final = -1
 
 
 class View(NamedTuple):
-    """A body as the search sees it: its mesh, where it is, and the power of two that its numbers are taken times."""
+    """A body in a search: its mesh, its placement, and the power of two that scales its numbers."""
 
     mesh: MeshArrays
     place: Placement
@@ -52,12 +58,12 @@ class View(NamedTuple):
 
 
 Heap = namedtuple("Heap", "bounds lanes")
-"""Pairs of boxes that wait, the least bound first: bounds (room,), lanes (room, 2) int64, eight a node, or ROOT."""
+"""Priority queue of pairs of boxes, least bound first: bounds (room,), lanes (room, 2) int64, eight a node, or ROOT."""
 
 Candidates = namedtuple("Candidates", "pairs bounds")
-"""Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64 from below."""
+"""Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64, lower bounds."""
 
-Room = namedtuple("Room", "heap found limits points frames work fixed")
+Room = namedtuple("Room", "heap candidates limits points frames work fixed")
 """Work space of searches, one at a time.
 
 limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, work, fixed: of `lanes/faces.py`.
@@ -65,17 +71,17 @@ limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, wor
 
 
 def new_room(room: int) -> Room:
-    """Return work space for so many pairs."""
-    heap, found = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
+    """Return work space for `room` pairs."""
+    heap, pairs = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
-        heap, Candidates(found, np.empty(room)), np.empty(2),
+        heap, Candidates(pairs, np.empty(room)), np.empty(2),
         np.empty((2, 3)), np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((GAP_ROWS, LANES), np.float32),
         np.empty((FIXED_ROWS, LANES), np.float32),
     )  # fmt: skip
 
 
 class Search(NamedTuple):
-    """One question: both bodies, a bound on the rounding of points of both together, and work space."""
+    """One query: both bodies, a rounding bound of points of both together, and work space."""
 
     a: View
     b: View
@@ -85,29 +91,29 @@ class Search(NamedTuple):
 
 @merged
 def scaled(p: Point3, unit: float) -> Point3:
-    """Return a point times the unit; order: before any product, which would be lost where coordinates are denormal."""
+    """Return a point times the unit; before any product, which would lose denormal coordinates."""
     return Point3(p.x * unit, p.y * unit, p.z * unit)
 
 
 @inline
-def keep_below(found: Candidates, n: int, most: float) -> int:
-    """Leave out the candidates above the bound; return how many there are."""
-    n_kept = 0
+def retain_below(candidates: Candidates, n: int, most: float) -> int:
+    """Remove the candidates above the bound; return the number of others."""
+    n_left = 0
     for item in range(n):
-        if found.bounds[item] <= most:
-            found.bounds[n_kept] = found.bounds[item]
+        if candidates.bounds[item] <= most:
+            candidates.bounds[n_left] = candidates.bounds[item]
             for column in range(4):
-                found.pairs[n_kept, column] = found.pairs[item, column]
-            n_kept += 1
-    return n_kept
+                candidates.pairs[n_left, column] = candidates.pairs[item, column]
+            n_left += 1
+    return n_left
 
 
 ROUNDING: Final = 2.0**-94
 
 
 @inline
-def _share(top: Wide, bottom: Wide) -> Wide:
-    """Return top / bottom, but from 0 to 1."""
+def _clamped_quotient(top: Wide, bottom: Wide) -> Wide:
+    """Return top / bottom, clamped to [0, 1]."""
     if not (bottom.h > 0.0 and top.h > 0.0):
         return Wide(0.0, 0.0)
     share = over(top, bottom)
@@ -116,7 +122,7 @@ def _share(top: Wide, bottom: Wide) -> Wide:
 
 @inline
 def _row(a: Point3, p: Point3, shift: Wide) -> Wide:
-    """Return a . p + shift."""
+    """Return dot(a, p) + shift."""
     return plus(plus(plus(shift, product(a.x, p.x)), product(a.y, p.y)), product(a.z, p.z))
 
 
@@ -135,7 +141,7 @@ def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
 
 @inline
 def _edge(t: Facet, k: int) -> tuple[Wide3, Wide3]:
-    """Return the start of an edge, and the vector to its end."""
+    """Return the start of an edge and the vector to its end."""
     a = corner(t, k)
     return a, less3(corner(t, k + 1), a)
 
@@ -146,10 +152,13 @@ def _reach(u: Wide3) -> float:
 
 
 @called
-def _foot(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
-    """Return the point of a vertex, edge or triangle that is nearest to a point, or some other of it; by how much its
-    weights times their denominator are above 0, and the lengths of the edges over the denominator: the former over,
-    the latter times what errors of the weights are to be counted in (see above)."""
+def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
+    """Return the closest point of a vertex, edge or triangle to a point, with the margin of its weights and an error
+    amplification.
+
+    If the foot is off the feature, some other point of it. Margin: of the weights times their denominator above 0.
+    Amplification: lengths of the edges over the denominator. Both in the units of the module's table.
+    """
     if feature < 3:
         return corner(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
@@ -157,14 +166,14 @@ def _foot(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
     uw = dot3(u, w)
     if feature < FACE:
         scale = _reach(u) + _reach(w)
-        return along3(a, _share(uw, uu), u), min(uw.h, uu.h - uw.h) / scale, np.sqrt(uu.h) / uu.h * scale
+        return along3(a, _clamped_quotient(uw, uu), u), min(uw.h, uu.h - uw.h) / scale, np.sqrt(uu.h) / uu.h * scale
     v = less3(t.r, a)
     length = max(_reach(u), _reach(v))
     scale = length * length * (length + _reach(w))
     uv, vv, vw = dot3(u, v), dot3(v, v), dot3(v, w)
     size = less(times(uu, vv), times(uv, uv))
     top, their_top = less(times(vv, uw), times(uv, vw)), less(times(uu, vw), times(uv, uw))
-    x, y = _share(top, size), _share(their_top, size)
+    x, y = _clamped_quotient(top, size), _clamped_quotient(their_top, size)
     rest = less(Wide(1.0, 0.0), x)
     foot = along3(along3(a, x, u), y if less(y, rest).h <= 0.0 else rest, v)
     inside = min(top.h, their_top.h, size.h - top.h - their_top.h) / scale
@@ -173,10 +182,11 @@ def _foot(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
 
 @called
 def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
-    """Return the nearest points of two features, or some others of them, and of both together what `_foot` tells."""
+    """Return the closest points of two features, or other points of them, with margin and amplification as in
+    `_closest_on_feature`."""
     if second < 3:
         q = corner(t, second)
-        p, inside, steepness = _foot(q, s, first)
+        p, inside, steepness = _closest_on_feature(q, s, first)
         return p, q, inside, steepness
     p, inside, steepness = corner(s, first % 3), np.inf, 0.0
     if 3 <= first < FACE and second < FACE:
@@ -186,9 +196,9 @@ def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, 
         size, top = less(times(uu, vv), times(uv, uv)), less(times(uv, vw), times(vv, uw))
         length = max(_reach(u), _reach(v))
         scale = length * length * (length + _reach(w))
-        p, inside = along3(a, _share(top, size), u), min(top.h, size.h - top.h) / scale
+        p, inside = along3(a, _clamped_quotient(top, size), u), min(top.h, size.h - top.h) / scale
         steepness = np.sqrt(uu.h) / size.h * scale
-    q, their_inside, their_steepness = _foot(p, t, second)
+    q, their_inside, their_steepness = _closest_on_feature(p, t, second)
     return p, q, min(inside, their_inside), steepness + their_steepness
 
 
@@ -200,7 +210,7 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 @called
 def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
-    """Return the distance of two nearly nearest points, and by how much the triangles may be nearer."""
+    """Return the distance of two nearly nearest points, and the most by which the triangles may be nearer."""
     p, q, _, _ = ends_of(s, t, first, second)
     n = less3(q, p)
     square = dot3(n, n)
@@ -225,7 +235,7 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
 
 @inline
 def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
-    """Return the translation of the second body less that of the first, times the unit."""
+    """Return the difference of the translations, second less first, times the unit."""
     unit = s.a.unit
     x, y = Wide(*two_diff(other[0] * unit, start[0] * unit)), Wide(*two_diff(other[1] * unit, start[1] * unit))
     return Wide3(x, y, Wide(*two_diff(other[2] * unit, start[2] * unit)))
@@ -233,27 +243,28 @@ def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
 
 @called
 def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int) -> tuple[float, int]:
-    """Bound n candidates again and leave out those that are none; return the rounded distance, -1.0 if unsure, and n.
+    """Bound n candidates in double-doubles and remove non-candidates; return the rounded distance, -1.0 if unproven,
+    and n.
 
     start, other: the translations of both bodies (3,). radii: about either, times the unit.
     """
-    found, unit = s.room.found, s.a.unit
+    candidates, unit = s.room.candidates, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
     shift = shift_of(s, start, other)
     for k in range(n):
-        i, j, first, second = found.pairs[k]
+        i, j, first, second = candidates.pairs[k]
         t, u = corners_of(s.a, i, Wide3(origin, origin, origin)), corners_of(s.b, j, shift)
         size, beyond = _bounds(t, u, first, second)
         low = less(size, Wide(beyond, 0.0))
-        found.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
+        candidates.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
         least = size if less(size, least).h < 0.0 or k == 0 else least
         lowest = low if less(low, lowest).h < 0.0 or k == 0 else lowest
-    n = keep_below(found, n, least.h * (1.0 + 2.0**-50) + ROUNDING)
+    n = retain_below(candidates, n, least.h * (1.0 + 2.0**-50) + ROUNDING)
     distance = less(less(least, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
     value = distance.h / unit
-    is_sure = 2.0**-1000 < value < 2.0**1000
-    is_sure = is_sure and is_correctly_rounded(distance.h, distance.low, less(least, lowest).h + ROUNDING)
-    return value if is_sure else -1.0, n
+    is_proven = 2.0**-1000 < value < 2.0**1000
+    is_proven = is_proven and is_correctly_rounded(distance.h, distance.low, less(least, lowest).h + ROUNDING)
+    return value if is_proven else -1.0, n
 
 
 _SLACK: Final = 2.0**-86
@@ -262,7 +273,7 @@ _SLACK: Final = 2.0**-86
 @inline
 def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3,
                slack: float) -> bool:  # fmt: skip
-    """Tell whether the corners of a triangle that are none of a feature lie strictly beyond the plane across n."""
+    """Return whether the corners of a triangle outside a feature lie strictly beyond the plane across n."""
     for k in range(3):
         if view.mesh.triangles[triangle, k] in known:
             continue
@@ -272,10 +283,13 @@ def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int],
 
 
 @inline
-def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, error: float,
-           point: FloatArray) -> bool:  # fmt: skip
-    """Write the point (d,) at a radius from p along n, from the origin of space; tell whether it is sure."""
-    size, is_sure, v = root(dot3(n, n)), True, view.mesh.vertices
+def _write_offset_point(
+    view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, error: float,
+    point: FloatArray,
+) -> bool:  # fmt: skip
+    """Offset p by radius along n, relative to the origin of space, and write it to point (d,); return whether it is
+    correctly rounded."""
+    size, is_proven, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
     is_given = radius == 0.0 and not view.place.is_posed
     for k, at, way in ((0, p.x, n.x), (1, p.y, n.y), (2, p.z, n.z)):
@@ -287,18 +301,20 @@ def _write(view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: 
             continue
         end = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
         point[k] = end.h / view.unit
-        is_sure = is_sure and is_correctly_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
-    return is_sure
+        is_proven = is_proven and is_correctly_rounded(end.h, end.low, bound) and 2.0**-1000 < abs(point[k]) < 2.0**1000
+    return is_proven
 
 
 @called
 def certify(
     s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int, points: FloatArray
 ) -> bool:
-    """Fill points (2, d) with the nearest points of two bodies and put the candidate they are on first, of equal ones
-    that of the smallest faces; False where n candidates leave them open. Other arguments as for `refine`.
+    """Fill points (2, d) with the nearest points of two bodies and put their candidate first, ties by the smallest
+    faces.
+
+    Returns False if n candidates leave the points open. Other arguments as for `refine`.
     """
-    pairs, best = s.room.found.pairs, 0
+    pairs, best = s.room.candidates.pairs, 0
     faces, their_faces = s.a.mesh.faces, s.b.mesh.faces
     here, there = named(s.a, pairs[0, 0], pairs[0, 2]), named(s.b, pairs[0, 1], pairs[0, 3])
     for k in range(n):
@@ -321,5 +337,5 @@ def certify(
         return False
     if not _are_strictly_beyond(s.b, pairs[0, 1], there, u, back, q, slack):
         return False
-    is_sure = _write(s.a, here, p, way, radii[0], start, error, points[0])
-    return _write(s.b, there, q, back, radii[1], start, error, points[1]) and is_sure
+    is_proven = _write_offset_point(s.a, here, p, way, radii[0], start, error, points[0])
+    return _write_offset_point(s.b, there, q, back, radii[1], start, error, points[1]) and is_proven

@@ -1,6 +1,7 @@
-"""Two bodies given by triangles and radii: the search over both trees, then the exact stage for what it leaves.
+"""Distance of two bodies given by triangles and radii: the search over both trees, then the exact stage for the rest.
 
-A ball is its centre and its radius; a body of the plane is its edges, at z = 0, as triangles without area. Kept.
+A ball is its centre and a radius; a planar body is its edges, at z = 0, as triangles without area. Cached with the
+solid.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from engine.collision.result import Clearance, Feature, Poses
 from engine.compiling.jit import entry_of
 from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
 from engine.distance.refined import Room, new_room
-from engine.distance.traversal import BEYOND, DONE, TOLD, Asked, find_nearest
+from engine.distance.traversal import ANSWERED, BEYOND, DONE, Query, find_nearest
 from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
@@ -45,11 +46,11 @@ _rooms = threading.local()
 
 
 def _room() -> Room:
-    """Return the work space that this thread keeps."""
-    found: Room | None = getattr(_rooms, "room", None)
-    if found is None or len(found.heap.bounds) != _ROOM:
-        found = _rooms.room = new_room(_ROOM)
-    return found
+    """Return the cached work space of this thread."""
+    room: Room | None = getattr(_rooms, "room", None)
+    if room is None or len(room.heap.bounds) != _ROOM:
+        room = _rooms.room = new_room(_ROOM)
+    return room
 
 
 class SpreadPair:
@@ -60,18 +61,18 @@ class SpreadPair:
         self.meshes = spread_of(first), spread_of(second)
         self.poses = own, second_poses
         self.budget = budget
-        self.n_exact = 0  # poses that the exact stage was asked about
+        self.n_exact = 0  # poses decided by the exact stage
         self._radii = radius_of(first), radius_of(second)
         a, b = self.meshes
         self._room = _room()
         self._reach = 4.0 * (a.arrays.extent.reach + b.arrays.extent.reach) + sum(self._radii)
 
     def clearance(self, item: int) -> Clearance:
-        """Return distance, points and features under pose `item`; the bodies have no common point there."""
-        asked, answers = Asked(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
-        how, _, pairs = next(self._left(item, item + 1, answers, asked))
+        """Return distance, points and features of disjoint bodies under pose `item`."""
+        query, answers = Query(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
+        how, _, pairs = next(self._unanswered(item, item + 1, answers, query))
         d = self.solids[0].dimension
-        if how != TOLD:
+        if how != ANSWERED:
             gap, triangles = self._least(item, pairs)
             return gap.clearance(self._features(triangles, (gap.gap.first, gap.gap.second)), d)
         i, j, *codes = next(iter(pairs))
@@ -84,69 +85,72 @@ class SpreadPair:
         return first, second
 
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
-        """Answer for the poses of a range whose answers are NaN: how far apart the triangles are, those of bodies that
-        have no common point; where a distance is given 0.0 if they are nearer than that, else infinity."""
+        """Fill the NaN answers of a range of poses with the distances of the triangles, which have no common point.
+
+        With `least`: 0.0 if nearer, else infinity.
+        """
         limits = (np.inf, -1.0) if least is None else _around(least + sum(map(Fraction, self._radii)))
-        for _, item, pairs in self._left(start, stop, answers, Asked(*limits, *self._radii, self._reach, False)):
+        for _, item, pairs in self._unanswered(start, stop, answers, Query(*limits, *self._radii, self._reach, False)):
             gap, _ = self._least(item, pairs)
             answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
 
-    def _left(
-        self, start: int, stop: int, answers: FloatArray, asked: Asked
+    def _unanswered(
+        self, start: int, stop: int, answers: FloatArray, query: Query
     ) -> Iterator[tuple[int, int, Iterable[Sequence[int]]]]:
-        """Yield how it ended, the pose, and the candidates, two triangles and two features each, for those it leaves.
+        """Yield outcome, pose and candidates (two triangles and two features each) of each pose that the search leaves
+        open.
 
-        Whoever takes them fills the answer.
+        The consumer fills the answer.
         """
         (a, b), (own, poses) = self.meshes, self.poses
         while True:  # bound: an answer is filled, or the room doubles
             start, how, n = entry_of(find_nearest)(
-                a.arrays, own, b.arrays, poses, (start, stop), asked, answers, self._room, self.budget.flag
+                a.arrays, own, b.arrays, poses, (start, stop), query, answers, self._room, self.budget.flag
             )
             self.budget.check()
             if start == stop:
                 return
-            if how in (DONE, TOLD):
-                yield how, start, self._room.found.pairs[:n].tolist()
+            if how in (DONE, ANSWERED):
+                yield how, start, self._room.candidates.pairs[:n].tolist()
             elif how == BEYOND:
-                every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never held all at once
+                every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never in memory together
                 yield how, start, every
             else:
-                self._room = new_room(2 * len(self._room.found.bounds))
+                self._room = new_room(2 * len(self._room.candidates.bounds))
 
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
-        """Return the least gap of the candidates, of equal ones that of the smallest faces, and its triangles."""
+        """Return the least gap of the candidates, ties by the smallest faces, and its triangles."""
         self.n_exact += 1
         (a, b), (own, poses) = self.meshes, self.poses
         placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
         exact = _ExactPair(a, b, placed, self._radii)
 
         def rank(i: int, j: int) -> tuple[Any, ...]:
-            """Order by faces, of one face by corners: the order of the tree is nobody's."""
+            """Rank by faces, then by corners, not by the order of the tree."""
             corners = (body.arrays.vertices[body.arrays.triangles[k]].ravel().tolist() for body, k in ((a, i), (b, j)))
             return int(a.faces[i]), int(b.faces[j]), *corners
 
         best: ScaledGap | None = None
-        kept = (-1, -1)
+        best_pair = (-1, -1)
         if isinstance(pairs, list) and len(pairs) > 1:
             pairs.sort(key=lambda row: rank(row[0], row[1]))  # ties fall to the first
         for count, (i, j, first, second) in enumerate(pairs):
             if count % 16 == 0:
                 self.budget.check()
-            is_later = best is not None and rank(i, j) >= rank(*kept)
+            is_later = best is not None and rank(i, j) >= rank(*best_pair)
             if is_later and exact.are_beyond(i, j):
                 continue
-            found = exact.gap(i, j, first, second)
-            is_less = best is None or found.gap.is_less(best.gap)
-            if is_less or (not is_later and best is not None and not best.gap.is_less(found.gap)):
-                best, kept = found, (i, j)
-                exact.hold(found.gap)
+            candidate = exact.gap(i, j, first, second)
+            is_less = best is None or candidate.gap.is_less(best.gap)
+            if is_less or (not is_later and best is not None and not best.gap.is_less(candidate.gap)):
+                best, best_pair = candidate, (i, j)
+                exact.set_reference(candidate.gap)
         assert best is not None
-        return best, kept
+        return best, best_pair
 
 
 class _ExactPair:
-    """Both bodies on one lattice, their radii too."""
+    """Two bodies and their radii on one lattice."""
 
     def __init__(self, a: MeshBody, b: MeshBody, poses: Poses, radii: tuple[float, float]) -> None:
         self._bodies = exact_pair(a, b, poses, lattice_shift(np.array(radii)))
@@ -156,12 +160,12 @@ class _ExactPair:
         self._walls: tuple[Wall, ...] = ()
         self._beyond: tuple[dict[int, bool], ...] = ()
 
-    def hold(self, gap: Gap) -> None:
-        """Hold triangles against this gap from now on."""
+    def set_reference(self, gap: Gap) -> None:
+        """Set the gap that triangles are compared with."""
         self._walls, self._beyond = walls(gap), ({}, {})
 
     def are_beyond(self, i: int, j: int) -> bool:
-        """Tell whether two triangles are surely no nearer than the gap held; each vertex is looked at once."""
+        """Return whether two triangles are provably no nearer than the reference gap; caches each vertex test."""
         for body, wall, known, triangle in zip(self._bodies, self._walls, self._beyond, (i, j)):
             for vertex in body.mesh.arrays.triangles[triangle].tolist():
                 if vertex not in known:
@@ -197,11 +201,11 @@ def spread_pair(first: Solid, second: Solid, poses: Poses, budget: Budget) -> Sp
 
 BALL: Final = Feature("ball")
 _AROUND: Final = (0, 1, 3, 2)
-"""Corners of a box of the plane, counted as of one of space, in the order of its outline."""
+"""Corners of a box of the plane in the order of its outline, numbered as those of one in space."""
 
 
 def spread_of(solid: Solid) -> MeshBody:
-    """Return the triangles of a body that is no half-space; of a ball its centre."""
+    """Return the triangles of a body other than a half-space; for a ball its centre."""
     if solid.dimension == 3 and not isinstance(solid, Sphere):
         return mesh_body_of(solid)
     return solid.prepared("spread", lambda: _built(solid))
@@ -220,8 +224,8 @@ Outline = tuple[FloatArray, IntArray, float, "_Names"]
 
 def outline_of(solid: Solid) -> Outline:
     """Return vertices (n, d), the end vertex of each edge, the radius, and names of vertices, then edges."""
-    kept: Outline | None = solid.kept("outline and names")
-    return solid.prepared("outline and names", lambda: _outline(solid)) if kept is None else kept
+    cached: Outline | None = solid.kept("outline and names")
+    return solid.prepared("outline and names", lambda: _outline(solid)) if cached is None else cached
 
 
 def _outline(solid: Solid) -> Outline:
@@ -232,7 +236,7 @@ def _outline(solid: Solid) -> Outline:
 
 
 class _Names(dict[int, Feature]):
-    """Of the vertices and edges of an outline; each is named when it is asked for first."""
+    """Names of the vertices and edges of an outline, created on first use."""
 
     def __init__(self, solid: Solid, following: Sequence[int]) -> None:
         self._is_box, self._following = solid.type == "aabb", following
@@ -253,7 +257,7 @@ def radius_of(solid: Solid) -> float:
 
 
 def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
-    """Return poses (n, d, d), (n, d) as poses of space; those of the plane turn about z."""
+    """Return poses (n, d, d), (n, d) as poses of space; planar rotations are about z."""
     n, d = translations.shape
     if d == 3:
         return PoseArrays(read_only(rotations), read_only(translations), True)
@@ -263,7 +267,7 @@ def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
 
 
 def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Feature:
-    """Return the feature `code` of a triangle (near_triangles.py) as the caller knows it."""
+    """Return the feature `code` of a triangle (near_triangles.py) in the caller's numbering."""
     if isinstance(solid, Sphere):
         return BALL
     face = int(mesh.faces[triangle])
@@ -285,7 +289,7 @@ def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Featur
 
 
 def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
-    """Return the numbers and the points of the vertices of a face or edge, in order."""
+    """Return the numbers and points of the vertices of a face or edge, in order."""
     if isinstance(solid, Mesh):
         indices = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]]
         return indices.tolist(), solid.vertices[indices].tolist()
@@ -299,5 +303,5 @@ def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
 
 
 def named(solid: Solid, number: int) -> int:
-    """Return the vertex's number as the caller knows it: a box of the plane counts its corners as one of space."""
+    """Return the vertex's number in the caller's numbering: a box of the plane counts its corners as one of space."""
     return _AROUND[number] if solid.type == "aabb" and solid.dimension == 2 else number

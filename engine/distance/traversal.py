@@ -1,12 +1,13 @@
-"""The pairs of triangles of two placed bodies that may be the nearest, by a best-first descent of both trees.
+"""Best-first distance join: the pairs of triangles of two placed bodies that may be the nearest.
 
-A pair of boxes, each with the disc of what it holds, is bounded from below by `lanes/faces.py`. Pairs wait in a heap,
-the least bound first; the larger box of a pair is opened, its eight children are bounded at once. Of two blocks the
-pairs of triangles that may be near are told eight at once and bounded from both sides (near_triangles.py); the least
-upper bound so far ends the search once no pair that waits is below it. What is returned are all pairs of triangles
-whose lower bound does not exceed the least upper bound: the distance of the bodies is that of one of them.
+A pair of boxes, each with the disc of its content, is bounded from below by `lanes/faces.py`. Pairs wait in a heap, the
+least bound first; the larger box of a pair is expanded, and its eight children are bounded in one pass. The near pairs
+of triangles of two blocks are selected eight at a time and bounded from both sides (near_triangles.py); the search ends
+once no waiting pair is below the least upper bound. The result is all pairs of triangles whose lower bound does not
+exceed the least upper bound: the distance of the bodies is that of one of them.
 
-limits (2,): pairs above the first, which falls to the least upper bound, are not wanted; one below the second: CLOSER.
+limits (2,): pairs above the first, which falls to the least upper bound, are dropped; one below the second ends the
+search: CLOSER.
 
 Source: G. Hjaltason, H. Samet, Incremental distance join algorithms for spatial databases, 1998 (the order); E. Larsen,
 S. Gottschalk, M. Lin, D. Manocha, Fast distance queries with rectangular swept sphere volumes, 2000 (the descent).
@@ -20,11 +21,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
-from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
+from engine.collision.meshes.near_triangles import nearest_points, relative_to, rounding_bound
 from engine.collision.meshes.placement import PoseArrays, defect_of, place_pair, placed, set_frame
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import inline, kernel, merged
-from engine.distance.refined import ROOT, Heap, Room, Search, View, certify, keep_below, refine, scaled
+from engine.distance.refined import ROOT, Heap, Room, Search, View, certify, refine, retain_below, scaled
 from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, EMPTY, FRAME_ROWS, inverse_ratio
 from engine.lanes.faces import FIXED_ROWS, child_bounds, near_triangle, place_triangles
 from engine.lanes.lanes import lowest_bit
@@ -33,8 +34,8 @@ from engine.types import FlagArray, Float32Array, FloatArray
 
 
 @inline
-def fix(view: View, at: int, fixed: Float32Array) -> None:
-    """Write box and disc of a lane, or what holds the whole tree, to the first column of `fixed`."""
+def load_lane(view: View, at: int, fixed: Float32Array) -> None:
+    """Write box and disc of a lane, or of the whole tree, to the first column of `fixed`."""
     if at == ROOT:
         for row in range(FIXED_ROWS):
             fixed[row, 0] = 4.0 if row > 11 else (2.0 if 3 <= row < 6 else (1.0 if row == 9 else 0.0))
@@ -55,7 +56,8 @@ DONE: Final = 0
 FULL: Final = 1
 CLOSER: Final = 2
 INTERRUPTED: Final = 3
-"""How a search ended: with all pairs; without room for more; with two points nearer than asked; by the flag."""
+"""Outcomes of a search, in order: all pairs seen; no room for more; two points nearer than queried; the flag was set.
+"""
 _ABOVE_ONE: Final = 1.0 + 2.0**-22
 
 
@@ -68,25 +70,25 @@ def _triangle(view: View, item: int) -> Facet:
 
 @inline
 def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, tuple[int, int]]:
-    """Return bounds on the distance of two triangles, from below and above, and the features of nearly nearest
-    points; of any where the lower bound is above `most`.
+    """Return a lower and an upper bound on the distance of two triangles, and the features of nearly nearest points.
 
-    error: bound on the distance of a point from its rounded one, both bodies together.
+    error: bound on the distance of a point from its rounded one, both bodies together. If the lower bound is above
+    `most` the features are arbitrary.
     """
     origin = s.p
-    s, t = seen_from(origin, s), seen_from(origin, t)
-    slack = rounding_of(s, t) + error
+    s, t = relative_to(origin, s), relative_to(origin, t)
+    slack = rounding_bound(s, t) + error
     best, across = nearest_points(s, t, most + slack)
     return max(across.low - slack, 0.0), across.size + slack, (best.first, best.second)
 
 
 @merged
-def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: FloatArray) -> tuple[int, int]:
-    """Add the pairs of triangles of two blocks that may be the nearest; return how that ended, and their number.
+def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatArray) -> tuple[int, int]:
+    """Append the candidate pairs of triangles of two blocks; return the outcome and the number of candidates.
 
     limits: as in `find_nearest`; the first falls.
     """
-    frames, work, found, per_size = s.room.frames, s.room.work, s.room.found, _ABOVE_ONE / size_of(s.a)
+    frames, work, candidates, per_size = s.room.frames, s.room.work, s.room.candidates, _ABOVE_ONE / size_of(s.a)
     place_triangles(s.b.mesh.blocks, j, frames, work)
     for k in range(LANES):
         own = int(s.a.mesh.child[i, k])
@@ -106,34 +108,34 @@ def measure_blocks(s: Search, i: int, j: int, n_found: int, limits: FloatArray) 
                 limits[0] = high
             if low > limits[0]:
                 continue
-            if n_found == len(found.bounds):
-                n_found = keep_below(found, n_found, limits[0])
-                if 2 * n_found > len(found.bounds):
+            if n_candidates == len(candidates.bounds):
+                n_candidates = retain_below(candidates, n_candidates, limits[0])
+                if 2 * n_candidates > len(candidates.bounds):
                     return FULL, 0
-            found.bounds[n_found] = low
-            found.pairs[n_found, 0], found.pairs[n_found, 1] = -1 - own, -1 - their
-            found.pairs[n_found, 2], found.pairs[n_found, 3] = features
-            n_found += 1
-    return DONE, n_found
+            candidates.bounds[n_candidates] = low
+            candidates.pairs[n_candidates, 0], candidates.pairs[n_candidates, 1] = -1 - own, -1 - their
+            candidates.pairs[n_candidates, 2], candidates.pairs[n_candidates, 3] = features
+            n_candidates += 1
+    return DONE, n_candidates
 
 
 BEYOND: Final = 4
-"""How a search ended that was none: beyond `_LARGEST` sums of coordinates may overflow."""
-TOLD: Final = 5
-"""How one ended whose answer and points are known, on the first candidate."""
+"""Outcome without a search: beyond `_LARGEST` sums of coordinates may overflow."""
+ANSWERED: Final = 5
+"""Outcome with answer and points known, on the first candidate."""
 _LARGEST: Final = 1e300
 
 
-class Asked(NamedTuple):
-    """What is wanted: the least distance of pairs of triangles up to `most`, or whether some is below `enough`; the
-    radii about the triangles; a bound on sums of their coordinates; whether candidates are wanted of sure answers."""
+class Query(NamedTuple):
+    """Goal of a search: the least distance of triangles up to `most`, or whether some is below `enough`; the radii
+    about the triangles; a bound on sums of their coordinates; whether candidates of proven answers are returned."""
 
     most: float
     enough: float
     radius: float
     other_radius: float
     reach: float
-    is_told: bool
+    is_answered: bool
 
 
 @inline
@@ -147,7 +149,7 @@ def push(heap: Heap, n: int, bound: float, i: int, j: int) -> None:
 
 @inline
 def drop_first(heap: Heap, n: int) -> None:
-    """Take the first of n entries out, the last one takes a place of its own."""
+    """Remove the first of n entries of the heap; the last one moves down from there."""
     bounds, lanes = heap.bounds, heap.lanes
     last, i, j = bounds[n - 1], lanes[n - 1, 0], lanes[n - 1, 1]
     place = 0
@@ -163,15 +165,15 @@ def drop_first(heap: Heap, n: int) -> None:
 
 
 @merged
-def _open(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
-    """Put the pairs of one box with the children of a node of the other body on the heap; return its height.
+def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
+    """Push the pairs of one box with the children of a node of the other body; return the size of the heap.
 
     pair: the node, the lane of the other body, and whether the node is the first body's.
     """
     node, other, is_first = pair
     view, fixed, own = (s.a, s.b, 0) if is_first else (s.b, s.a, 1)
     unit, their_unit = size_of(view), size_of(fixed)
-    fix(fixed, other, s.room.fixed)
+    load_lane(fixed, other, s.room.fixed)
     child_bounds(
         view.mesh.boxes, view.mesh.discs, node, s.room.fixed, s.room.frames, own * FRAME_ROWS, (1 - own) * FRAME_ROWS,
         their_unit / unit, inverse_ratio(their_unit, unit), s.room.work,
@@ -186,16 +188,16 @@ def _open(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
 
 @merged
 def _half_of(view: View, at: int) -> float:
-    """Return the largest half width of a box."""
+    """Return the largest half width of a box in a lane."""
     node, lane, b = at >> 3, at & 7, view.mesh.boxes
     return 2.0 if at == ROOT else float(max(b[node, 3, lane], b[node, 4, lane], b[node, 5, lane]))
 
 
 @inline
 def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
-    """Fill the candidates; return how the search ended, and their number. See `find_nearest`."""
+    """Fill the candidates; return the outcome and their number. See `find_nearest`."""
     first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
-    n, n_found = 1, 0
+    n, n_candidates = 1, 0
     s.room.heap.bounds[0], s.room.heap.lanes[0, 0], s.room.heap.lanes[0, 1] = 0.0, ROOT, ROOT
     while n > 0 and s.room.heap.bounds[0] <= limits[0]:  # bound: each pair of boxes enters once
         i, j = int(s.room.heap.lanes[0, 0]), int(s.room.heap.lanes[0, 1])
@@ -209,25 +211,25 @@ def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
         their_node = 0 if j == ROOT else int(second[j >> 3, j & 7])
         i_block, j_block = first[node, 0] < 0, second[their_node, 0] < 0
         if i_block and j_block:
-            how, n_found = measure_blocks(s, node, their_node, n_found, limits)
+            how, n_candidates = measure_blocks(s, node, their_node, n_candidates, limits)
             if how != DONE:
                 return how, 0
             continue
         is_first = not i_block and (j_block or _half_of(s.a, i) * sizes[0] >= _half_of(s.b, j) * sizes[1])
-        n = _open(s, n, (node if is_first else their_node, j if is_first else i, is_first), limits[0])
-    return DONE, keep_below(s.room.found, n_found, limits[0])
+        n = _expand(s, n, (node if is_first else their_node, j if is_first else i, is_first), limits[0])
+    return DONE, retain_below(s.room.candidates, n_candidates, limits[0])
 
 
 @kernel
 def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
-    asked: Asked, answers: FloatArray, room: Room, flag: FlagArray,
+    query: Query, answers: FloatArray, room: Room, flag: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Answer for the poses of both bodies, or one of the first, from span[0] to span[1] whose answers (n,) are NaN.
+    """Fill the NaN entries of answers (n,) for the poses span[0] to span[1] of both bodies, or one of the first.
 
-    Returns the first pose that is left, how its search ended, and the number of the pairs of triangles in `room.found`
-    that may be the nearest; span[1] where none is left. An answer is the double nearest to the distance; where a limit
-    is asked for, 0.0 for a pose that is surely nearer, infinity for one that is surely not.
+    Returns the first pose left open, the outcome of its search, and the number of candidates in `room.candidates`;
+    span[1] if none is left. An answer is the double nearest to the distance; with a limit 0.0 for a pose that is
+    provably nearer, infinity for one that is provably not.
     """
     limits, has_one = room.limits, len(first_poses.translations) == 1
     for item in range(span[0], span[1]):
@@ -236,13 +238,13 @@ def find_nearest(
         own = 0 if has_one else item
         start, move = first_poses.translations[own], second_poses.translations[item]
         size = max(abs(start[0]), abs(start[1]), abs(start[2]), abs(move[0]), abs(move[1]), abs(move[2]))
-        size = asked.reach + 2.0 * size
+        size = query.reach + 2.0 * size
         if not size < _LARGEST:
             return item, BEYOND, 0
         unit = math.ldexp(1.0, -min(max(math.frexp(size)[1], -1000), 1000))
-        limits[0], limits[1] = asked.most * unit, (asked.enough * unit if asked.enough > 0.0 else -1.0)
+        limits[0], limits[1] = query.most * unit, (query.enough * unit if query.enough > 0.0 else -1.0)
         place, other = place_pair(first.extent, first_poses, own, second.extent, second_poses, item)
-        radii = asked.radius * unit, asked.other_radius * unit
+        radii = query.radius * unit, query.other_radius * unit
         a, b = View(first, place, unit), View(second, other, unit)
         s = Search(a, b, 2.0 * unit * (place.error + other.error), room)
         defect = defect_of(place) + defect_of(other)
@@ -251,12 +253,12 @@ def find_nearest(
         how, n = _search(s, limits, flag)
         if how == CLOSER or (how == DONE and n == 0):
             answers[item] = 0.0 if how == CLOSER else np.inf
-        elif how == DONE and asked.most == np.inf:
+        elif how == DONE and query.most == np.inf:
             distance, n = refine(s, start, move, radii, n)
             if distance > 0.0:
                 answers[item] = distance
-                if asked.is_told and certify(s, start, move, radii, n, room.points):
-                    return item, TOLD, 1
-        if answers[item] != answers[item] or asked.is_told:
+                if query.is_answered and certify(s, start, move, radii, n, room.points):
+                    return item, ANSWERED, 1
+        if answers[item] != answers[item] or query.is_answered:
             return item, how, n
     return span[1], DONE, 0

@@ -1,11 +1,12 @@
-"""A vertex and an edge of two placed outlines in double-doubles: how far apart, where the foot lies, how sure that is.
+"""Distance of a vertex and an edge of two placed outlines in double-doubles, the position of the foot, and error
+bounds.
 
-**Bound.** Coordinates as given are doubles, their differences double-doubles without error; placed ones are off by
-`error`, and a distance by no more than twice that of both bodies. The height of a vertex over an edge u is a cross
-product over |u|: its two largest products cancel without loss, all others are below 2^-50 of those, so that it is off
-by 2^-98 of itself and 2^-148 of the longest vector. Over an edge along an axis it is a difference, exact, and equal
-ones are a tie. The sign of a scalar product is known where its products are exact: a sum is off by a part of itself.
-A foot moves by what moves the corners, times the distance of the vertex over the length of the edge.
+**Bound.** Given coordinates are doubles, their differences exact double-doubles; placed ones are off by `error`, and a
+distance by at most twice that of both bodies. height = cross(u, w) / |u|: the two largest products cancel without loss,
+all others are below 2^-50 of those, so the height is off by 2^-98 of itself and 2^-148 of the longest vector. Over an
+axis-parallel edge it is an exact difference, and equal ones are a tie. The sign of a scalar product is known if its
+products are exact: a sum is off by a part of itself. The foot moves by the errors of the corners times distance of the
+vertex / length of the edge.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from engine.predicates.vectors import as_point2
 from engine.types import FloatArray, IntArray
 
 LARGEST: Final = 2.0**200
-"""Of coordinates that the bounds hold for."""
+"""Largest coordinate for which the bounds are valid."""
 _SHORTEST: Final = 2.0**-400
-"""Of edges with a length, and of factors of exact products."""
+"""Least length of an edge, and least factor of exact products."""
 
 
 class Wide2(NamedTuple):
@@ -35,22 +36,35 @@ class Wide2(NamedTuple):
 
 
 Placed = namedtuple("Placed", "points following boxes error reach")
-"""An outline under a pose: points (n, 4), both coordinates rounded, then what they lack; the vertex at the end of each
-edge; the boxes of their blocks; a bound on the error of coordinates; the largest, infinite beyond what bounds hold for.
+"""Outline under a pose.
+
+| field | meaning |
+|---|---|
+| points | (n, 4) both coordinates rounded, then their low parts |
+| following | the vertex at the end of each edge |
+| boxes | of the blocks of edges |
+| error | bound on the error of coordinates |
+| reach | largest coordinate, infinite out of the range of the bounds |
 """
 
-Found = namedtuple("Found", "distance bound is_first first second face their_face")
-"""How far a vertex is from an edge, and a bound on the error of that; whether the vertex is the first body's; of both
-bodies the vertex, or the number of vertices + the edge, and the least edge that this lies on."""
+VertexEdge = namedtuple("VertexEdge", "distance bound is_first first second face their_face")
+"""Distance of a vertex and an edge, with its error bound.
+
+| field | meaning |
+|---|---|
+| is_first | whether the vertex is the first body's |
+| first, second | vertex, or number of vertices + edge, of both bodies |
+| face, their_face | the least edges that these lie on |
+"""
 
 
 @called
 def place(
     vertices: FloatArray, following: IntArray, turn: FloatArray, move: FloatArray, points: FloatArray, boxes: FloatArray
 ) -> tuple[float, float]:
-    """Write the points and boxes of an outline under a pose; return the last two of `Placed`.
+    """Write the points and boxes of an outline under a pose; return the last two fields of `Placed`.
 
-    Each sum of three is off by 12 u^2 of its terms. Axes turned onto axes: exact sums, given where doubles.
+    Each sum of three is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles unchanged.
     """
     reach, is_given = 0.0, True
     for k in range(2):
@@ -72,7 +86,7 @@ def place(
 
 @inline
 def _reach(points: FloatArray, following: IntArray, boxes: FloatArray, reach: float) -> float:
-    """Write the boxes of placed points; return the last of `Placed`; reach: of what coordinates are sums of."""
+    """Write the boxes of placed points; return the last field of `Placed`; reach: bound on the terms of coordinates."""
     box_blocks(points, following, boxes)
     for block in range(len(boxes)):
         for k in range(4):
@@ -107,7 +121,7 @@ def _magnitude(a: Wide) -> Wide:
 
 @inline
 def _is_whole(a: Wide) -> bool:
-    """Tell whether a number is a double that can be a factor of an exact product."""
+    """Return whether a number is a double that can be a factor of an exact product."""
     return a.low == 0.0 and (a.h == 0.0 or abs(a.h) > _SHORTEST)
 
 
@@ -127,7 +141,7 @@ def _dot(u: Wide2, w: Wide2) -> Wide:
 
 @inline
 def _along(u: Wide2, w: Wide2, error: float) -> tuple[float, float]:
-    """Return u . w and a bound on its error, 0.0 where its sign is sure."""
+    """Return dot(u, w) and a bound on its error, 0.0 if its sign is proven."""
     reach = max(size2(u), size2(w))
     value, slack = u.x.h * w.x.h + u.y.h * w.y.h, 2.0**-48 * size2(u) * size2(w) + 16.0 * error * reach + 2.0**-1000
     if abs(value) > slack:
@@ -140,7 +154,7 @@ def _along(u: Wide2, w: Wide2, error: float) -> tuple[float, float]:
 
 @inline
 def _along_axis(u: Wide2, w: Wide2) -> float:
-    """Return a number of the sign of u . w, for u along an axis."""
+    """Return a number with the sign of dot(u, w), for u along an axis."""
     x, way = (w.y.h, u.y.h) if u.x.h == 0.0 else (w.x.h, u.x.h)
     return x if way > 0.0 else -x
 
@@ -152,7 +166,8 @@ def _is_level(u: Wide2, error: float) -> bool:
 
 @called
 def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, int]:
-    """Return the first two of `Found`, and where the foot of p lies on an edge: start 0, end 1, between 2, unsure -1.
+    """Return the first two fields of `VertexEdge`, and the position of p's foot on an edge: start 0, end 1, between 2,
+    unproven -1.
 
     error: of the coordinates of both bodies together.
     """
@@ -180,7 +195,7 @@ def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, in
 
 @inline
 def foot_of(own: Placed, other: Placed, vertex: int, feature: int) -> tuple[Wide2, float]:
-    """Return the point of `other` that is nearest to a vertex, on a feature that is sure, and the error of that."""
+    """Return the point of `other` nearest to a vertex, on a proven feature, and its error."""
     n, p, error = len(other.following), point(own.points, vertex), own.error + other.error
     if feature < n:
         return point(other.points, feature), other.error

@@ -1,1 +1,1 @@
-"""Scenes that stay: many bodies prepared once, asked by points, pairs and segments, some of them moved."""
+"""Stored scenes: many bodies prepared once, queried by points, pairs and segments, also after some were moved."""

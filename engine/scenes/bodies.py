@@ -1,8 +1,7 @@
-"""The bodies of a scene, under poses that stay, and what is prepared of them, each thing when it is asked for first.
+"""Bodies of a scene under fixed poses, and their prepared structures, each built on first use.
 
-A tree over their boxes tells which of them a segment, or another body, may meet.
-
-Boxes are rounded outward (`place_boxes`), so no body is missed; those without bounds stand apart and are always named.
+A tree over their boxes selects the bodies that a segment, or another body, may meet. Boxes are rounded outward
+(`place_boxes`), so no body is missed; bodies without bounds are listed apart and always selected.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from engine.containment.posed_locators import posed_locator
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.running.budget import Budget
-from engine.scenes.located import Kinds, LocateTables, moved_boxes
+from engine.scenes.location_tables import LocateTables, Tables, moved_boxes
 from engine.scenes.near_boxes import BodyTree, put_keys
 from engine.scenes.table import Table
 from engine.segment_clipping.profiles import check_cut
@@ -38,13 +37,14 @@ from engine.solids.registry import own_box, row_of
 from engine.types import FloatArray, IntArray, read_only
 
 _LISTED: Final = 4
-"""Bodies that have no tree: their boxes are looked at sooner than one is built."""
+"""Up to this number of bodies there is no tree: testing all boxes is faster than building one."""
 
 
 class Bodies(Preparing):
     """Checked solids with a pose or None each; safe to share between threads.
 
-    whole, owners: bodies that these are some of, which share what does not depend on poses, and the solid of each.
+    whole, owners: the bodies of which these are a subset, which share what does not depend on poses, and the solid of
+    each.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Bodies(Preparing):
     def _place_odd(
         self, names: IntArray, poses: Sequence[Pose | None], low: FloatArray, high: FloatArray, budget: Budget
     ) -> None:
-        """Set the boxes of each csg among some: those of its operands under the pose, put together."""
+        """Set the boxes of each csg among some bodies, combined from its operands' boxes under the pose."""
         arrays = self.arrays(budget)
         odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, Csg)])
         for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
@@ -84,7 +84,7 @@ class Bodies(Preparing):
     def under(
         self, names: IntArray, poses: Sequence[Pose | None], budget: Budget
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return rotations (m, d, d) and translations of some bodies under other poses, and boxes, low and high."""
+        """Return rotations (m, d, d), translations and boxes (low, high) of some bodies under other poses."""
         arrays, m, d = self.arrays(budget), len(names), self.solids[0].dimension
         turns, moves = motions_of(poses, d)
         low, high, rows = np.empty((m, d)), np.empty((m, d)), np.arange(m)
@@ -95,7 +95,7 @@ class Bodies(Preparing):
         return turns, moves, low, high
 
     def locator(self, body: int) -> Locator:
-        """Return how points are located in a body."""
+        """Return the point locator of a body."""
 
         def make() -> Locator:
             try:
@@ -106,23 +106,23 @@ class Bodies(Preparing):
 
         return self.prepared(f"locator {body}", make)
 
-    def solid_tables(self, budget: Budget) -> Kinds:
-        """Return the tables of the solids that points are located in. Raises: UnsupportedSolidError."""
+    def solid_tables(self, budget: Budget) -> Tables:
+        """Return the location tables of the solids. Raises: UnsupportedSolidError."""
 
-        def build() -> Kinds:
+        def build() -> Tables:
             arrays = self.arrays(budget)
-            return Kinds(arrays.distinct, arrays.kinds, self.poses, budget)
+            return Tables(arrays.distinct, arrays.kinds, self.poses, budget)
 
         return self.prepared("solid_tables", build, budget.check)
 
     def tables(self, budget: Budget) -> LocateTables:
-        """Return what points are located in, at least one body."""
+        """Return the location tables of the bodies, at least one."""
         kinds = (self._whole or self).solid_tables(budget)
         owners = self.arrays(budget).kinds if self._whole is None else self._owners
         return self.prepared("tables", lambda: kinds.placed(owners, self.poses), budget.check)
 
     def check_located(self, budget: Budget) -> None:
-        """Raise unless points are located in every body. Raises: UnsupportedSolidError."""
+        """Raise unless points can be located in every body. Raises: UnsupportedSolidError."""
 
         def check() -> bool:
             for body, solid in enumerate(self.solids):
@@ -135,7 +135,7 @@ class Bodies(Preparing):
 
     @property
     def is_exact(self) -> bool:
-        """Whether no callable decides."""
+        """Whether no callable decides a location."""
 
         def find() -> bool:
             solids = {id(solid): solid for solid in self.solids if isinstance(solid, (Csg, Implicit))}.values()
@@ -144,7 +144,7 @@ class Bodies(Preparing):
         return self.prepared("is_exact", find)
 
     def batches(self, budget: Budget) -> SceneBatches:
-        """Return what pairs are related by. Raises: as `collide_scene` where it does not take a body."""
+        """Return the batches that relate pairs. Raises: as `collide_scene` for an unsupported body."""
 
         def build() -> SceneBatches:
             check_collidable(self.solids)
@@ -153,35 +153,35 @@ class Bodies(Preparing):
         return self.prepared("batches", build, budget.check)
 
     def table(self, budget: Budget) -> Table:
-        """Return what kernels for segments read of the bodies."""
+        """Return the segment table of the bodies."""
         like = None if self._whole is None else self._whole.table(budget)
         return self.prepared("table", lambda: Table(self.solids, self.poses, like), budget.check)
 
     def words(self, budget: Budget) -> tuple[list[int], Any]:
-        """Return what kernels for segments read of all bodies (`words_of`)."""
+        """Return the row of numbers that kernels for segments read of all bodies (`words_of`)."""
         return self.prepared(
             "words", lambda: words_of(self.tree(budget), NOBODY, self.table(budget).rows), budget.check
         )
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
-        """Make ready what these kernels want of a body."""
+        """Prepare the kernel inputs named by `wanted` for one body."""
         table = self.table(budget)
         with self._lock:
             table.prepare(body, wanted)
 
     def check_cut(self, budget: Budget) -> None:
-        """Raise unless segments are cut on every body."""
+        """Raise unless segments can be clipped to every body."""
         self.prepared("cut", lambda: check_cut(self.solids), budget.check)
 
 
 def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray, FloatArray]:
-    """Return low, high (dim,) around a body; infinite for one that may have no bounds (half-spaces and the like).
+    """Return low, high (dim,) around a body; infinite for one that may be unbounded (half-spaces and the like).
 
     check: as for `Solid.prepared`.
     """
     if isinstance(solid, Csg):
-        found: tuple[FloatArray, FloatArray] = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
-        return found
+        box: tuple[FloatArray, FloatArray] = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
+        return box
     low, high, _ = own_box(solid, check)
     if np.isinf(low).any():
         return low, high
@@ -195,7 +195,7 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray,
 
 
 def _csg_box(operation: str, boxes: list[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """Return the box of a Boolean tree; an intersection that is empty keeps a box that holds nothing."""
+    """Return the box of a Boolean tree; an empty intersection has an inverted box."""
     lows, highs = (np.array(sides) for sides in zip(*(boxes[:1] if operation == "difference" else boxes)))
     if operation == "union":
         return lows.min(axis=0), highs.max(axis=0)
@@ -207,8 +207,10 @@ _AS_GIVEN: Final = read_only(np.arange(_MANY))
 
 
 def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
-    """Return the tree over bodies by their boxes (n, dimension); up to so many have none, nor have those so near each
-    other that 1 / its scale is no double."""
+    """Return the tree over bodies by their boxes (n, dimension).
+
+    No tree is built for up to most_listed bodies, nor for bodies so near each other that 1 / scale is not finite.
+    """
     n, dimension = low.shape
     every = BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
     if n <= most_listed:
@@ -233,17 +235,18 @@ _NO_NUMBERS: Final = read_only(np.array([1.0, 0.0, 0.0, 0.0]))
 _ADDRESSES: Final[dict[int, int]] = {
     id(array): array.__array_interface__["data"][0] for array in (NOBODY, _NO_TREE.boxes, _NO_TREE.child, _NO_NUMBERS)
 }
-"""Of what stays, by its id: to ask an array for its own takes a microsecond."""
+"""Cached addresses of long-lived arrays, by id: reading the address from an array takes a microsecond."""
 NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.0, NOBODY, NOBODY) for d in (2, 3)}
 
 
 def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[int], Any]:
-    """Return the row that stands for a `BodyTree`, with a `Table`'s rows, and what it gives addresses of."""
+    """Return the row of numbers that encodes a `BodyTree` and the rows of a `Table`, and the arrays whose addresses it
+    contains."""
     tree = bodies.tree
     numbers = _NO_NUMBERS if tree is _NO_TREE else np.array([bodies.inverse, *tree.origin.tolist()])
-    kept = bodies.low, bodies.high, tree.boxes, tree.child, bodies.bounded, bodies.listed, numbers, names, placed
-    low, high, boxes, child, bounded, listed, *more = (_ADDRESSES.get(id(array)) or _address(array) for array in kept)
-    return [len(bodies.low), low, high, len(tree.child), boxes, child, bounded, len(bodies.listed), listed, *more], kept
+    read = bodies.low, bodies.high, tree.boxes, tree.child, bodies.bounded, bodies.listed, numbers, names, placed
+    low, high, boxes, child, bounded, listed, *more = (_ADDRESSES.get(id(array)) or _address(array) for array in read)
+    return [len(bodies.low), low, high, len(tree.child), boxes, child, bounded, len(bodies.listed), listed, *more], read
 
 
 def _address(array: Any) -> int:
@@ -251,8 +254,8 @@ def _address(array: Any) -> int:
 
 
 def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
-    """Return an order of segments in which those follow each other that are near each other at t, where they are many:
-    these find in the cache what others were asked about."""
+    """Return an order of segments in which neighbours at t follow each other, if there are many: their data stays in
+    the cache."""
     n = len(segments)
     if n < _MANY:
         return _AS_GIVEN[:n]

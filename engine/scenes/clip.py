@@ -1,7 +1,7 @@
-"""Segments through a scene: what the kernels settle (through.py), and what they leave.
+"""Segments through a scene: the kernels (segment_kernels.py), then the exact fallback for what they leave open.
 
-A body that stands where its solid does then cuts a segment as `clip_segments` does; posed ones, CSG trees and prisms in
-exact arithmetic (profiles.py).
+An unposed body then clips a segment as `clip_segments`; posed ones, CSG trees and prisms in exact arithmetic
+(profiles.py).
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from engine.containment.locators import locator_of
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import run_chunks
 from engine.scenes.bodies import order_of
-from engine.scenes.ends import Exact, Found, ScenePieces, in_order, joined
+from engine.scenes.ends import Exact, LoosePieces, ScenePieces, merge_parts, sort_pieces
 from engine.scenes.near_boxes import MOST_MET, scratch_for
-from engine.scenes.standing import Standing
-from engine.scenes.through import MET, Firsts, cut_near, find_first
+from engine.scenes.placements import Placements
+from engine.scenes.segment_kernels import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.decide_then_cut import FEW
 from engine.segment_clipping.on_boundary.boundary import clip_chunk
@@ -32,90 +32,95 @@ from engine.solids.pose import Pose
 from engine.types import OPEN, UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray, read_only
 
 _BYTES: Final = 400
-"""Of a piece, in its part, joined and in order."""
+"""Memory of a piece: in its part, concatenated and sorted."""
 _FEW: Final = 1024
-"""Segments that are asked about at once, as many as `run_chunks` takes at first."""
-_BODIES_KEPT: Final = 16
+"""Size of a small batch of segments, the first chunk of `run_chunks`."""
+_CACHED_PIECES: Final = 16
 _LEFT: Final = 16
-"""Pairs left for which there is room at once, beside one for each segment."""
+"""Initial room for open pairs, besides one for each segment."""
 _MOST_IN_GROUP: Final = 1 << 13
-"""Segments that are cut on one body in one piece of work."""
+"""Most segments clipped to one body in one task."""
 
 
 class Counts:
-    """Which segments the kernels left, and which took rational arithmetic."""
+    """Which segments the kernels left open, and which took rational arithmetic."""
 
     def __init__(self, n: int) -> None:
         self.is_beyond, self.is_rational = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
 
     def take(self, items: IntArray, counts: Counts) -> None:
-        """Add those of some segments, all of which a search left."""
+        """Add the counts of some segments, all of which a search left open."""
         self.is_beyond[items], self.is_rational[items] = True, counts.is_rational
 
 
 def clip_all(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
+    segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None
 ) -> ScenePieces:
     """Return all pieces of segments (n, 2, dim)."""
-    parts = _parts(segments, standing, counts, budget, workers)
-    found = joined(parts, segments.shape[2])
-    return in_order(found, len(segments), lambda: _exact_ends(segments, standing, budget), budget)
+    parts = _parts(segments, scene, counts, budget, workers)
+    pieces = merge_parts(parts, segments.shape[2])
+    return sort_pieces(pieces, len(segments), lambda: _exact_ends(segments, scene, budget), budget)
 
 
-def _exact_ends(segments: FloatArray, standing: Standing, budget: Budget) -> Exact:
-    """Return what tells the exact parameters of a piece; those of the bodies asked about last are kept."""
+def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exact:
+    """Return a function that gives the exact parameters of a piece; caches the last bodies."""
 
-    @lru_cache(_BODIES_KEPT)
+    @lru_cache(_CACHED_PIECES)
     def pieces(source: int, body: int) -> list[ExactPiece]:
         budget.check()
         p, q = segments[source].tolist()
-        return exact_pieces(p, q, *standing.placed(body), budget)
+        return exact_pieces(p, q, *scene.placed(body), budget)
 
     return lambda source, body, number: (pieces(source, body)[number].first, pieces(source, body)[number].last)
 
 
-def answer_few(segments: Any, standing: Standing, keep: str) -> ScenePieces | BoolArray | None:
-    """Return what `Scene.clip_segments` does of an array of a few segments, not yet looked at for NaN, in half the time
-    that the general way takes; None where nothing is kept of the scene yet, or numbers are none that kernels take."""
-    solids = standing.base.solids
+def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces | BoolArray | None:
+    """Fast path of `Scene.clip_segments` for a small batch, not yet checked for NaN; takes half the time of the general
+    path.
+
+    None if the caller must use the general path: nothing of the scene is cached yet, or numbers are out of the kernels'
+    range.
+    """
+    solids = scene.base.solids
     if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) <= _FEW:
         return None
-    if standing.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
+    if scene.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
         return None
     segments = read_only(segments)  # of the one kind that kernels are compiled for: this may be their first call
     n, is_any, order = len(segments), keep == "any", order_of(segments, 0.5, None)
     if keep == "all":
-        parts, left, is_plain = _cut_near(segments, order, 0, n, standing, UNLIMITED)
+        parts, left, is_plain = _cut_near(segments, order, 0, n, scene, UNLIMITED)
         if not is_plain:
             return None
         if left:
-            parts += _cut(segments, standing, Counts(n), UNLIMITED, 1, *np.concatenate(left).T)
-        return in_order(joined(parts, segments.shape[2]), n, lambda: _exact_ends(segments, standing, UNLIMITED))
-    words, room, reached = standing.words(UNLIMITED), scratch_for(standing.n_rows), _IN_ROWS.copy()
+            parts += _cut(segments, scene, Counts(n), UNLIMITED, 1, *np.concatenate(left).T)
+        return sort_pieces(merge_parts(parts, segments.shape[2]), n, lambda: _exact_ends(segments, scene, UNLIMITED))
+    words, room, reached = scene.words(UNLIMITED), scratch_for(scene.n_rows), _IN_ROWS.copy()
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
     entry_of(find_first)(segments, order, n, words, room, is_any, UNLIMITED.flag, state, out, reached)
     _, wanted, _, n_met, n_open, _ = reached.tolist()
     if wanted or (n_open and not np.isfinite(segments).all()):
         return None
-    found = out if is_any or n_met == n else [each[:n_met] for each in out]
+    hits = out if is_any or n_met == n else [each[:n_met] for each in out]
     if n_open:
-        return (meets_any if is_any else clip_first)(segments, standing, Counts(n), UNLIMITED, 1, (state, found))
-    return state.view(np.bool_) if is_any else ScenePieces(*found)
+        return (meets_any if is_any else clip_first)(segments, scene, Counts(n), UNLIMITED, 1, (state, hits))
+    return state.view(np.bool_) if is_any else ScenePieces(*hits)
 
 
 def clip_first(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None, found: Any = None
+    segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> ScenePieces:
-    """Return the first piece of each segment that meets a body, of those that begin at one point that of the first.
+    """Return the first piece of each segment that meets a body; of pieces that begin at one point, that of the first
+    body.
 
-    found: what `_searched` returns, if it is known.
+    searched: result of `_first_hits`, if known.
     """
-    state, out = found or _searched(segments, standing, False, budget, workers)
+    state, out = searched or _first_hits(segments, scene, False, budget, workers)
     left, sure = np.flatnonzero(state == OPEN), ScenePieces(*out)
     if not len(left):
         return sure
     more = Counts(len(left))
-    some = clip_all(read_only(segments[left]), standing, more, budget, workers)
+    some = clip_all(read_only(segments[left]), scene, more, budget, workers)
     counts.take(left, more)
     first = np.flatnonzero(np.append(True, some.source[1:] != some.source[:-1])[: len(some)])
     some.ranks[:, 1] = some.ranks[:, 1] > some.ranks[:, 0]
@@ -126,35 +131,35 @@ def clip_first(
 
 
 def meets_any(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None, found: Any = None
+    segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> BoolArray:
-    """Return of each segment whether it meets a body; found: what `_searched` returns, if it is known."""
-    state, _ = found or _searched(segments, standing, True, budget, workers)
+    """Return for each segment whether it meets a body; searched: result of `_first_hits`, if known."""
+    state, _ = searched or _first_hits(segments, scene, True, budget, workers)
     meets: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)
     more = Counts(len(left))
-    for part in _parts(read_only(segments[left]), standing, more, budget, workers) if len(left) else ():
+    for part in _parts(read_only(segments[left]), scene, more, budget, workers) if len(left) else ():
         meets[left[part.source]] = True
     counts.take(left, more)
     return meets
 
 
-def _searched(
-    segments: FloatArray, standing: Standing, is_any: bool, budget: Budget, workers: int | None
+def _first_hits(
+    segments: FloatArray, scene: Placements, is_any: bool, budget: Budget, workers: int | None
 ) -> tuple[FlagArray, Any]:
-    """Return of each segment the state and, unless `is_any`, the first pieces of those that are MET."""
-    n, words, order = len(segments), standing.words(budget), order_of(segments, 0.0, standing.where(budget))
+    """Return the state of each segment and, unless `is_any`, the first pieces of those that are MET."""
+    n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget))
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
     def task(first: int, last: int) -> None:
-        reached, room = np.array([first, 0, 0, 0, 0, 0]), scratch_for(standing.n_rows)
-        while True:  # bound: each turn reaches the end, or prepares what a body wants
+        reached, room = np.array([first, 0, 0, 0, 0, 0]), scratch_for(scene.n_rows)
+        while True:  # bound: each turn reaches the end, or prepares a body
             entry_of(find_first)(segments, order, last, words, room, is_any, budget.flag, state, out, reached)
             budget.check()
             _, wanted, body, *_ = reached.tolist()
             if wanted == 0:
                 break
-            standing.prepare(body, wanted, budget)
+            scene.prepare(body, wanted, budget)
 
     run_chunks(task, n, budget=budget, workers=workers)
     met = np.flatnonzero(state == MET)
@@ -170,38 +175,38 @@ def _firsts_for(n: int, dimension: int) -> Firsts:
 
 _NONE: Final = _firsts_for(0, 3)
 _IN_ROWS: Final = read_only(np.array([0, 0, 0, 0, 0, 1]))
-"""What `find_first` counts in, where few are asked about."""
+"""Counters of `find_first` for a small batch."""
 
 
 def _parts(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None
-) -> list[Found]:
-    """Return the pieces of segments within all bodies, in no order."""
-    n, parts, left = len(segments), dict[int, list[Found]](), dict[int, list[IntArray]]()
-    order = order_of(segments, 0.5, standing.where(budget))
+    segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None
+) -> list[LoosePieces]:
+    """Return the pieces of segments within all bodies, unordered."""
+    n, parts, left = len(segments), dict[int, list[LoosePieces]](), dict[int, list[IntArray]]()
+    order = order_of(segments, 0.5, scene.where(budget))
 
     def task(first: int, last: int) -> None:
-        parts[first], left[first], _ = _cut_near(segments, order, first, last, standing, budget)
+        parts[first], left[first], _ = _cut_near(segments, order, first, last, scene, budget)
 
     run_chunks(task, n, budget=budget, workers=workers)
-    found = [part for first in sorted(parts) for part in parts[first]]
+    pieces = [part for first in sorted(parts) for part in parts[first]]
     pairs = [part for first in sorted(left) for part in left[first]]
     if pairs:
         owners, bodies = np.concatenate(pairs).T
         counts.is_beyond[owners] = True
-        found += _cut(segments, standing, counts, budget, workers, owners, bodies)
-    return found
+        pieces += _cut(segments, scene, counts, budget, workers, owners, bodies)
+    return pieces
 
 
 def _cut_near(
-    segments: FloatArray, order: IntArray, first: int, last: int, standing: Standing, budget: Budget
-) -> tuple[list[Found], list[IntArray], bool]:
-    """Return the pieces of some segments within the bodies near them, which of these pairs are left (k, 2), and whether
-    no segment is of numbers that kernels leave, NaN above all."""
-    parts, left, n = list[Found](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
-    words, n_rows = standing.words(budget), 4 * (last - first) + MOST_MET
-    scratch = scratch_for(standing.n_rows)
-    while n[0] < last:  # bound: each turn has room for a body, or prepares what one wants
+    segments: FloatArray, order: IntArray, first: int, last: int, scene: Placements, budget: Budget
+) -> tuple[list[LoosePieces], list[IntArray], bool]:
+    """Return the pieces of some segments within the bodies near them, the open pairs (k, 2), and whether all numbers
+    are in the kernels' range (NaN is not)."""
+    parts, left, n = list[LoosePieces](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
+    words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
+    scratch = scratch_for(scene.n_rows)
+    while n[0] < last:  # bound: each turn has room for a body, or prepares one
         out, names = room_for(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
         pairs = np.empty((_LEFT + last - first, 2), np.int64)
         entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
@@ -209,21 +214,21 @@ def _cut_near(
         _, _, m, m_left, wanted, body, _ = n.tolist()
         if m:
             budget.take(_BYTES * m)
-            found = first_of(out, m)
-            parts.append(Found(found.source, names[0, :m], names[1, :m], *found[1:]))
+            pieces = first_of(out, m)
+            parts.append(LoosePieces(pieces.source, names[0, :m], names[1, :m], *pieces[1:]))
         if m_left:
             left.append(pairs[:m_left])
         if wanted:
-            standing.prepare(body, wanted, budget)
+            scene.prepare(body, wanted, budget)
     return parts, left, not n[6]
 
 
 def _cut(
-    segments: FloatArray, standing: Standing, counts: Counts, budget: Budget, workers: int | None, owners: IntArray,
+    segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, owners: IntArray,
     bodies: IntArray,
-) -> list[Found]:  # fmt: skip
-    """Return the pieces of pairs of a segment and a body that the kernels left, body by body."""
-    bodies = standing.names_of(bodies)
+) -> list[LoosePieces]:  # fmt: skip
+    """Return the pieces of the pairs of a segment and a body that the kernels left open, body by body."""
+    bodies = scene.names_of(bodies)
     order = np.argsort(bodies, kind="stable")
     owners, bodies = owners[order], bodies[order]
     starts = np.flatnonzero(np.append(True, bodies[1:] != bodies[:-1])[: len(bodies)]).tolist()
@@ -232,30 +237,30 @@ def _cut(
         for begin, last in zip(starts, [*starts[1:], len(bodies)])
         for first in range(begin, last, _MOST_IN_GROUP)
     ]
-    found: dict[int, Found] = {}
+    parts: dict[int, LoosePieces] = {}
 
     def task(first: int, last: int) -> None:
         for group in range(first, last):
             begin, end = groups[group]
             body, items = int(bodies[begin]), owners[begin:end]
-            pieces, rational, is_told = _on_body(read_only(segments[items]), *standing.placed(body), budget)
+            pieces, rational, is_known = _on_body(read_only(segments[items]), *scene.placed(body), budget)
             counts.is_beyond[items[rational]] = counts.is_rational[items[rational]] = True
             m = len(pieces.source)
             if m:
                 budget.take(_BYTES * m)
                 are_long = np.full(m, UNDECIDED)
-                if is_told:  # pieces that kernels made have ends that round alike only if they are one
-                    are_sure = ~np.isin(pieces.source, rational) if len(rational) else True
-                    are_long = np.where(are_sure, pieces.t[:, 0] != pieces.t[:, 1], UNDECIDED)
-                found[group] = Found(items[pieces.source], np.full(m, body), are_long, *pieces[1:])
+                if is_known:  # pieces that kernels made have ends that round alike only if they are one
+                    are_exact = ~np.isin(pieces.source, rational) if len(rational) else True
+                    are_long = np.where(are_exact, pieces.t[:, 0] != pieces.t[:, 1], UNDECIDED)
+                parts[group] = LoosePieces(items[pieces.source], np.full(m, body), are_long, *pieces[1:])
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
-    return [found[group] for group in sorted(found)]
+    return [parts[group] for group in sorted(parts)]
 
 
 def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
-    """Return the pieces of segments (n, 2, dim) within a placed solid, by source and t, and which of them took rational
-    arithmetic, all where some did and it is not told which; and whether the others are of boundary_cut.py."""
+    """Return the pieces of segments (n, 2, dim) within a placed solid, sorted by source and t, which segments took
+    rational arithmetic (all, if some did and it is unknown which), and whether the others come from boundary_cut.py."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)

@@ -1,7 +1,7 @@
-"""Public: every colliding pair of a scene of up to thousands of bodies, and those that are nearer than a gap.
+"""Public: all colliding pairs of a scene of up to thousands of bodies, and all pairs nearer than a gap.
 
-Of pairs that do not meet boxes along the axes, balls and convex bodies are measured in batches (closed_forms.py,
-convex_gaps.py), all others as by `clearance_poses`.
+Gaps of boxes along the axes, balls and convex bodies are measured in batches (closed_forms.py, convex_gaps.py), all
+others as by `clearance_poses`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from engine.bounding.box_grid import BLOCK, pairs_of_boxes
 from engine.collision.batches import SceneBatches, SceneBodies, scene_bodies
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import NO_DETAIL, Answers, PlacedPair, accuracy_of, check_has_detail, has_interior
-from engine.collision.convex_body import pooled
+from engine.collision.convex_body import pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Witness, Work
 from engine.collision.simple.closed_forms import form_of
@@ -26,7 +26,7 @@ from engine.collision.simple.form_relations import N_NUMBERS
 from engine.compiling.jit import entry_of
 from engine.distance.clearance import checked_distance, has_plane
 from engine.distance.convex_gaps import gaps_of_pairs
-from engine.distance.forms import are_small, gap_of_planes, told_under_poses
+from engine.distance.forms import are_small, distances_under_poses, gap_of_planes
 from engine.distance.spreads import SpreadPair, in_space
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
@@ -36,10 +36,10 @@ from engine.solids.pose import Pose
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
 
 _FEW_PAIRS: Final = 8
-"""Pairs that are sooner decided one by one than put into arrays."""
+"""Up to this number, deciding pairs one by one is faster than filling arrays."""
 _BYTES: Final = 64
 _BYTES_OF_WITNESS: Final = 150
-"""Of a pair that collides, in its block, put together, and sorted."""
+"""Memory of a colliding pair with witness: in its block, concatenated, and sorted."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,14 +151,14 @@ def collide_scene(
     """
     check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     batches = SceneBatches(scene_bodies(solids, poses))
-    asked = Asked(skip, only, gap, witnesses, boolean, detail)
+    query = PairQuery(skip, only, gap, witnesses, boolean, detail)
     with Budget(deadline, cancel) as budget:
-        found = collide_bodies(batches, asked, budget, workers, progress)
-    return found if report else found[0]
+        pairs = collide_bodies(batches, query, budget, workers, progress)
+    return pairs if report else pairs[0]
 
 
-class Asked(NamedTuple):
-    """What is asked about a scene, see `collide_scene`."""
+class PairQuery(NamedTuple):
+    """Options of a query about pairs of a scene, see `collide_scene`."""
 
     skip: object = None
     only: object = None
@@ -169,10 +169,10 @@ class Asked(NamedTuple):
 
 
 def collide_bodies(
-    batches: SceneBatches, asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
+    batches: SceneBatches, query: PairQuery, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ScenePairs, Accuracy]:
     """Return the colliding pairs of a prepared scene."""
-    bodies, (skip, only, gap, witnesses, boolean, detail) = batches.bodies, asked
+    bodies, (skip, only, gap, witnesses, boolean, detail) = batches.bodies, query
     boolean, detail = bool(boolean), bool(detail)  # what is not a bool would compile kernels of its own
     if detail:
         check_has_detail(((("solids", i), solid) for i, solid in enumerate(bodies.solids)), boolean)
@@ -194,8 +194,8 @@ def collide_bodies(
         answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
         _settle(bodies, pairs, answers, workers, progress)
         works += answers.works
-        near = None if gap is None else _near(batches, pairs, answers, gap, workers)
-        parts.append(_found(bodies, pairs, answers, near))
+        near = None if gap is None else _measure_gaps(batches, pairs, answers, gap, workers)
+        parts.append(_select_pairs(bodies, pairs, answers, near))
         budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].first))
     budget.check()
     if not parts:
@@ -204,13 +204,13 @@ def collide_bodies(
         parts = [ScenePairs(none, none, codes, () if witnesses else None, codes if detail else None,
                             distances if is_near else None)]  # fmt: skip
     accuracy = accuracy_of(n_candidates, n_open, works, "boxes" if only is None else "named pairs")
-    return parts[0] if len(parts) == 1 else _joined(parts), accuracy
+    return parts[0] if len(parts) == 1 else _concatenate(parts), accuracy
 
 
 def _settle(
     bodies: SceneBodies, pairs: IntArray, answers: Answers, workers: int | None, progress: Progress | None
 ) -> None:
-    """Settle the pairs of a block that the batches left, one by one, in parallel chunks."""
+    """Settle the pairs of a block that the batches left open, one by one, in parallel chunks."""
     left = answers.left()
     if progress is not None and len(left) < len(pairs):
         progress(len(pairs) - len(left))
@@ -225,42 +225,44 @@ def _settle(
     run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
 
 
-def _near(batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, workers: int | None) -> FloatArray:
-    """Return how far apart the pairs of a block are, 0 where they meet, infinite where no nearer than the gap."""
+def _measure_gaps(
+    batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, workers: int | None
+) -> FloatArray:
+    """Return the distances of the pairs of a block, 0 if they meet, infinite if not below the gap."""
     distances, disjoint = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
     is_measured = not answers.boolean
     distances[disjoint] = distances_below(batches, pairs[disjoint], gap, is_measured, answers.budget, workers)
     return distances
 
 
-def _found(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:
-    """Return the pairs of a block that collide or are near."""
+def _select_pairs(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:
+    """Return the pairs of a block that collide or are nearer than the gap."""
     meet = answers.relations != Relation.DISJOINT
     if answers.boolean:
         answers.relations[meet] = Relation.TOUCHING
-    kept = np.flatnonzero(meet if near is None else near != np.inf)
-    named = None if answers.witnesses is None else tuple(answers.witnesses[item] for item in kept.tolist())
-    details = None if answers.details is None else answers.details[kept]
+    rows = np.flatnonzero(meet if near is None else near != np.inf)
+    named = None if answers.witnesses is None else tuple(answers.witnesses[item] for item in rows.tolist())
+    details = None if answers.details is None else answers.details[rows]
     if details is not None:
-        details[~_have_interiors(bodies, pairs[kept], answers.budget)] = NO_DETAIL
-    distances = None if near is None or answers.boolean else near[kept]
-    return ScenePairs(pairs[kept, 0], pairs[kept, 1], answers.relations[kept], named, details, distances)
+        details[~_have_interiors(bodies, pairs[rows], answers.budget)] = NO_DETAIL
+    distances = None if near is None or answers.boolean else near[rows]
+    return ScenePairs(pairs[rows, 0], pairs[rows, 1], answers.relations[rows], named, details, distances)
 
 
-def _joined(parts: list[ScenePairs]) -> ScenePairs:
-    """Return the pairs found of all blocks as one, sorted; each block is."""
+def _concatenate(parts: list[ScenePairs]) -> ScenePairs:
+    """Return the pairs of all sorted blocks as one sorted result."""
     columns = zip(*((part.first, part.second, part.relation, part.detail, part.distance) for part in parts))
     joined: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
     order = np.lexsort((joined[1], joined[0]))
-    found: list[Any] = [None if column is None else column[order] for column in joined]
+    ordered: list[Any] = [None if column is None else column[order] for column in joined]
     named = [witness for part in parts for witness in part.witnesses or ()]
     witnesses = None if parts[0].witnesses is None else tuple(named[item] for item in order.tolist())
-    first, second, relation, detail, distance = found
+    first, second, relation, detail, distance = ordered
     return ScenePairs(first, second, relation, witnesses, detail, distance)
 
 
 def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> BoolArray:
-    """Tell for pairs of bodies whether both have an interior."""
+    """Return for pairs of bodies whether both have an interior."""
     kinds, places = np.unique(bodies.kinds[pairs], return_inverse=True)
     solid = np.array([has_interior(bodies.distinct[kind], budget) for kind in kinds.tolist()], np.bool_)
     first, second = places.reshape(-1, 2).T
@@ -270,7 +272,8 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
 def _candidates(
     bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
 ) -> Iterator[IntArray]:
-    """Yield pairs whose boxes meet, of those wanted and not skipped (keys), in sorted blocks; low: moved outward."""
+    """Yield sorted blocks of pairs whose boxes intersect, restricted to wanted and without skipped keys; low: moved
+    outward."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
@@ -280,7 +283,7 @@ def _candidates(
 
 
 def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntArray]:
-    """Yield the pairs named by their keys whose boxes meet, in blocks."""
+    """Yield blocks of the pairs of given keys whose boxes intersect."""
     for start in range(0, len(keys), BLOCK):
         first, second = np.divmod(keys[start : start + BLOCK], len(low))
         meet = (first < second) & ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
@@ -309,27 +312,28 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
 
 
 _STRETCHED: Final = 1.0 + 2.0**-38
-"""What a pose may stretch: no entry of R' R - I is beyond 1e-12; boxes have equal poses that `collide` leaves out."""
+"""Factor by which a pose may stretch: no entry of R' R - I exceeds 1e-12; boxes have equal poses that `collide` drops.
+"""
 
 
-_NONE: Final = pooled([])
+_NONE: Final = pool_bodies([])
 
 
 def enlarged(bodies: SceneBodies, gap: float | None) -> FloatArray:
-    """Return the low corners (n, d) moved outward by the gap: boxes of bodies that are nearer have a common point."""
+    """Return the low corners (n, d) moved outward by the gap: the boxes of bodies nearer than that intersect."""
     return bodies.low if gap is None else np.nextafter(bodies.low - gap * _STRETCHED, -np.inf)
 
 
 def distances_below(
     batches: SceneBatches, pairs: IntArray, gap: float, is_measured: bool, budget: Budget, workers: int | None
 ) -> FloatArray:
-    """Return ``(n,)`` the distances of pairs without a common point that are nearer than the gap, infinite for others.
+    """Return ``(n,)`` distances of disjoint pairs that are nearer than the gap, infinite for others.
 
-    is_measured: else only whether they are nearer is told, and those that are have 0.0.
+    is_measured: if False, pairs nearer than the gap get 0.0 instead.
     """
-    bodies, found = batches.bodies, np.full(len(pairs), np.inf)
+    bodies, distances = batches.bodies, np.full(len(pairs), np.inf)
     if not gap:
-        return found
+        return distances
     places = pairs + 1
     kinds, (i, j) = bodies.kinds[pairs], places.T
     turns, moves = bodies.rotations, bodies.translations
@@ -346,47 +350,47 @@ def distances_below(
     def by_batch(start: int, stop: int) -> None:
         entry_of(gaps_of_pairs)(
             forms, pool, convex, kinds[start:stop], PoseArrays(turns, moves, True), places[start:stop], gap,
-            is_measured, found[start:stop], budget.flag,
+            is_measured, distances[start:stop], budget.flag,
         )  # fmt: skip
 
     run_chunks(by_batch, len(pairs), budget=budget, workers=workers)
-    still = np.flatnonzero(np.isnan(found))
-    still = still[np.lexsort(kinds[still].T)]  # pairs of the same two solids are asked together
+    still = np.flatnonzero(np.isnan(distances))
+    still = still[np.lexsort(kinds[still].T)]  # one query for all pairs of the same two solids
 
     def by_search(start: int, stop: int) -> None:
         some = kinds[still[start:stop]]
         ends = [*(start + 1 + np.flatnonzero((some[1:] != some[:-1]).any(axis=1))).tolist(), stop]
         for begin, end in pairwise([start, *ends]):
             rows = still[begin:end]
-            found[rows] = _asked(bodies, pairs[rows], places[rows], gap, is_measured, budget)
+            distances[rows] = _distances_of_group(bodies, pairs[rows], places[rows], gap, is_measured, budget)
 
     run_chunks(by_search, len(still), budget=budget, first_chunk=4, workers=workers)
-    return found
+    return distances
 
 
-def _asked(
+def _distances_of_group(
     bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
 ) -> FloatArray:
-    """Return the distances of pairs of the same two solids under the poses of some rows, as `distances_below` does."""
+    """Return `distances_below` for pairs of the same two solids, under the poses of some rows."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
-    found = np.full(len(pairs), np.nan)
+    distances = np.full(len(pairs), np.nan)
     if has_plane(first, second):
         for item, ((i, j), place) in enumerate(zip(pairs.tolist(), places[:, 0].tolist())):
             budget.check()
             placed = (bodies.poses[i], bodies.poses[j]) if place else (None, None)
             apart, _ = gap_of_planes(first, second, placed, budget)
-            found[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
-        return found
+            distances[item] = np.inf if apart.is_at_least(Fraction(gap)) else apart.distance() if is_measured else 0.0
+        return distances
     if are_small(first, second):
         motions = [read_only(some[rows]) for rows in places.T for some in (bodies.rotations, bodies.translations)]
-        found = told_under_poses(first, second, motions, None if is_measured else Fraction(gap), budget)
-        found[found > gap], found[found == gap] = np.inf, np.nan
-        if not np.isnan(found).any():
-            return found
+        distances = distances_under_poses(first, second, motions, None if is_measured else Fraction(gap), budget)
+        distances[distances > gap], distances[distances == gap] = np.inf, np.nan
+        if not np.isnan(distances).any():
+            return distances
     own, others = (in_space(bodies.rotations[rows], bodies.translations[rows]) for rows in places.T)
     pair = SpreadPair(first, second, own, others, budget)
-    pair.fill(0, len(pairs), found, Fraction(gap))
+    pair.fill(0, len(pairs), distances, Fraction(gap))
     if is_measured:
-        found[found == 0.0] = np.nan
-        pair.fill(0, len(pairs), found)
-    return found
+        distances[distances == 0.0] = np.nan
+        pair.fill(0, len(pairs), distances)
+    return distances

@@ -1,7 +1,7 @@
 """Pieces of segments within the bodies of a scene, in the exact order of their ends along each segment.
 
-Parameters are rounded to the nearest doubles, which keeps their order; where two ends of a segment round alike, exact
-arithmetic finds which comes first, or that they are one (parameters.py).
+Parameters are rounded to nearest, which is monotone; if two ends of a segment round alike, exact arithmetic decides
+their order, or that they are equal (parameters.py).
 """
 
 from __future__ import annotations
@@ -51,9 +51,16 @@ class ScenePieces:
         return len(self.source)
 
 
-class Found(NamedTuple):
-    """Pieces, those of one segment in one body in order: source, body, (m,) whether each is longer than a point, 1 or
-    0, or where its ends round alike perhaps UNDECIDED; ends (2, m, dim), t and faces (m, 2)."""
+class LoosePieces(NamedTuple):
+    """Unsorted pieces; those of one segment in one body are in order.
+
+    | field | shape | meaning |
+    |---|---|---|
+    | source, body | (m,) | |
+    | are_long | (m,) | 1 if longer than a point, 0 if not; UNDECIDED perhaps, if both ends round alike |
+    | ends | (2, m, dim) | |
+    | t, faces | (m, 2) | |
+    """
 
     source: Any
     body: Any
@@ -64,49 +71,54 @@ class Found(NamedTuple):
 
 
 Exact = Callable[[int, int, int], tuple[Parameter, Parameter]]
-"""Tells the exact parameters of a piece: its source, its body, and which of their pieces it is."""
+"""Function from source, body and number of a piece among theirs to its exact parameters."""
 
 
-def joined(parts: list[Found], dimension: int) -> Found:
-    """Return all pieces, in no order."""
+def merge_parts(parts: list[LoosePieces], dimension: int) -> LoosePieces:
+    """Return all pieces, unordered."""
     if len(parts) == 1:
         return parts[0]
     none = np.empty(0, np.int64)
-    nothing = Found(none, none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
+    nothing = LoosePieces(none, none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
     if not parts:
         return nothing
     each = list(zip(nothing, *parts))
-    return Found(*(concatenated(each[k], axis=int(k == 3)) for k in range(6)))
+    return LoosePieces(*(concatenated(each[k], axis=int(k == 3)) for k in range(6)))
 
 
-def taken(found: Found, rows: IntArray) -> Found:
-    """Return some pieces."""
-    source, body, are_long, ends, t, faces = found
-    return Found(source[rows], body[rows], are_long[rows], ends[:, rows], t[rows], faces[rows])
+def take_pieces(pieces: LoosePieces, rows: IntArray) -> LoosePieces:
+    """Return the pieces of some rows."""
+    source, body, are_long, ends, t, faces = pieces
+    return LoosePieces(source[rows], body[rows], are_long[rows], ends[:, rows], t[rows], faces[rows])
 
 
-def in_order(found: Found, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED) -> ScenePieces:
-    """Return pieces, those of one source and body in order, in the exact order of their starts."""
-    m = len(found.source)
-    numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, found.ends.shape[2]))
+def sort_pieces(
+    pieces: LoosePieces, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED
+) -> ScenePieces:
+    """Return pieces in the exact order of their starts; those of one source and body are in order already."""
+    m = len(pieces.source)
+    numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, pieces.ends.shape[2]))
     out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)
     order, ranks, offsets = np.empty(4 * m, np.int64), np.empty((m, 2), np.int64), np.zeros(n_sources + 2, np.int64)
-    given = found.source, found.body, found.are_long, found.ends[0], found.ends[1], found.t, found.faces
+    given = pieces.source, pieces.body, pieces.are_long, pieces.ends[0], pieces.ends[1], pieces.t, pieces.faces
     is_tied = np.zeros(n_sources, np.bool_)
     arrays = tuple(map(np.ascontiguousarray, given))
-    are_exact = entry_of(put_in_order)(arrays, offsets, order, ranks, is_tied, out, budget.flag)
+    are_exact = entry_of(sort_rounded)(arrays, offsets, order, ranks, is_tied, out, budget.flag)
     budget.check()
     if not are_exact:
-        rows, some = np.flatnonzero(is_tied[out[0]]), taken(found, np.flatnonzero(is_tied[found.source]))
-        for array, looked_at in zip(out, _in_exact_order(some, exact())):
+        rows, some = np.flatnonzero(is_tied[out[0]]), take_pieces(pieces, np.flatnonzero(is_tied[pieces.source]))
+        for array, looked_at in zip(out, _sort_exactly(some, exact())):
             array[rows] = looked_at
     return ScenePieces(*out)
 
 
-def _in_exact_order(found: Found, exact: Exact) -> tuple[Any, ...]:
-    """Return the arrays of `ScenePieces` for pieces of segments some of whose ends, 2 * piece + side, round alike."""
-    found, ranks = taken(found, np.lexsort((found.body, found.source))), np.empty((len(found.source), 2), np.int64)
-    sources, bodies, are_long, t, faces = (each.tolist() for each in (*found[:3], *found[4:]))
+def _sort_exactly(pieces: LoosePieces, exact: Exact) -> tuple[Any, ...]:
+    """Return the arrays of `ScenePieces` for segments with ends, 2 * piece + side, that round alike."""
+    pieces, ranks = (
+        take_pieces(pieces, np.lexsort((pieces.body, pieces.source))),
+        np.empty((len(pieces.source), 2), np.int64),
+    )
+    sources, bodies, are_long, t, faces = (each.tolist() for each in (*pieces[:3], *pieces[4:]))
     numbers = [0] * len(sources)  # of a piece among those of its source and body
 
     def value(end: int) -> Parameter:
@@ -129,21 +141,20 @@ def _in_exact_order(found: Found, exact: Exact) -> tuple[Any, ...]:
         ends = sorted(range(2 * begin, 2 * piece), key=cmp_to_key(difference))
         steps = [0, *(difference(*pair) != 0 for pair in pairwise(ends))]
         ranks.reshape(-1)[ends], begin = np.cumsum(steps), piece
-    by_start = np.lexsort((found.body, ranks[:, 0], found.source))
-    found = taken(found, by_start)
-    return found.source, found.body, found.ends[0], found.ends[1], found.t, found.faces, ranks[by_start]
+    by_start = np.lexsort((pieces.body, ranks[:, 0], pieces.source))
+    pieces = take_pieces(pieces, by_start)
+    return pieces.source, pieces.body, pieces.ends[0], pieces.ends[1], pieces.t, pieces.faces, ranks[by_start]
 
 
 @kernel
-def put_in_order(
+def sort_rounded(
     given: Any, offsets: IntArray, order: IntArray, ranks: IntArray, is_tied: BoolArray, out: Any, flag: FlagArray
 ) -> bool:
-    """Fill `out`, the arrays of `ScenePieces`, with pieces given by those before the last, and `are_long`; tell whether
-    their order is exact, and of which sources it is not: of ends that round alike those of one piece may be known to
-    differ, or to be one, and the segment's own are one.
+    """Fill `out`, the arrays of `ScenePieces`, in the order of rounded parameters; return whether that order is exact.
 
-    Room to work in: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2). is_tied: (n,) zeros. Polls
-    `flag`.
+    given: the arrays before the last, and `are_long`. is_tied: (n,) zeros, set for sources with an undecided order: of
+    ends that round alike, those of one piece may be known to differ or to be equal, and the segment's own are equal.
+    Work space: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2). Polls `flag`.
     """
     source, body, are_long, start, end, t, faces = given
     are_exact = True

@@ -1,7 +1,8 @@
-"""Which bodies of a scene hold each of many points.
+"""Point location in a scene: which bodies contain each of many points.
 
-A tree over the boxes of the bodies names the candidates of a point, and the tables of the bodies (located.py) decide
-most of them on the spot. A few candidates, and what the tables leave, each body locates as `locate` does.
+A tree over the boxes of the bodies selects the candidates of a point, and the tables of the bodies (location_tables.py)
+decide most of them in the kernel. Small batches, and what the tables leave open, are located body by body as `locate`
+does.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ from engine.containment.methods.filters import in_space
 from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
-from engine.scenes.located import LocateTables, locate_in_body
+from engine.scenes.location_tables import LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
-from engine.scenes.standing import Standing
+from engine.scenes.placements import Placements
 from engine.solids.mesh import Polyhedron
 from engine.solids.ragged import Ragged
 from engine.solids.registry import BodyKind
 from engine.types import UNDECIDED, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 _BYTES: Final = 72
-"""Of a body and point that it may hold: its key in its part and with the others, sorted, its point, body, location."""
+"""Memory of a candidate: its key in its part and with the others, sorted; its point, body and location."""
 _MOST_SORTED: Final = 32
-"""Bodies that hold a point, put in order one by one."""
+"""Number of candidates of a point up to which their keys are sorted by insertion."""
 _FEW_POINTS, _FEW_BODIES, _FEW_VERTICES = 32, 16, 1000
-"""So few points are located body by body where so few, of so few vertices each, are asked about for the first time."""
+"""Limits of a small batch, in points, bodies, and vertices of a body; it is located body by body on first use."""
 _MOST_IN_GROUP: Final = 1 << 14
-"""Points that one body locates in one piece of work."""
+"""Most points that one body locates in one task."""
 _FEWEST_FOR_TREES: Final = 64
-"""Points that a tree is built for; fewer are left to what `locate` does with few points."""
+"""Number of points from which a tree is built; fewer are located as a small batch of `locate`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +66,13 @@ class SceneLocations(Ragged):
 @kernel
 def locate_near(
     points: FloatArray, first: int, last: int, where: Where, tables: LocateTables, room: IntArray, keys: IntArray,
-    asked: IntArray, flag: FlagArray,
+    query_counts: IntArray, flag: FlagArray,
 ) -> Any:  # fmt: skip
-    """List the bodies that hold points (n, dim) first ... last, or may, as far as there is room.
+    """Write the bodies that contain points (n, dim) first ... last, or may, as far as there is room.
 
-    keys (room,): 4 (point n_bodies + body) + location, UNDECIDED among them, ascending; asked (n_meshes,): of how many
-    points each mesh was a candidate.
-    Returns the numbers of points done, of keys, of those that took more than a filter, and whether the keys ascend.
+    keys (room,): 4 (point n_bodies + body) + location, UNDECIDED possible, ascending. query_counts (n_meshes,): number
+    of points for which each mesh is a candidate. Returns the numbers of points done, of keys, of those that took more
+    than a filter, and whether the keys ascend.
     """
     scratch, n, is_flat, is_sorted = scratch_at(room), where.together.low.shape[0], points.shape[1] == 2, True
     n_keys, n_beyond, done = 0, 0, first
@@ -87,7 +88,7 @@ def locate_near(
             location, is_beyond = locate_in_body(tables, body, is_flat, p, scratch.stack, flag)
             n_beyond += is_beyond
             if tables.kinds[body] == BodyKind.MESH:
-                asked[tables.slots[body]] += 1
+                query_counts[tables.slots[body]] += 1
             if location == -1:
                 continue
             key, put = 4 * (item * n + (body if body < n else where.names[body - n])) + location, n_keys
@@ -118,23 +119,23 @@ def locate_pairs(
 
 
 def locate_all(
-    points: FloatArray, standing: Standing, budget: Budget, workers: int | None, progress: Progress | None
+    points: FloatArray, scene: Placements, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
-    """Return the bodies that hold each of some checked points."""
+    """Return the bodies that contain each of some checked points."""
     budget.check()
-    n, n_bodies, parts = len(points), len(standing.base.solids), dict[int, IntArray]()
+    n, n_bodies, parts = len(points), len(scene.base.solids), dict[int, IntArray]()
     if not n_bodies:
         none = SceneLocations(np.zeros(n + 1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_))
         return none, Accuracy("exact", None, n, 0, 0, "box_grid")
-    points, beyond, asked, has_new = read_only(points), [0], list[IntArray](), False
-    if 0 < n <= _FEW_POINTS and n_bodies <= _FEW_BODIES and not standing.base.kept("can_locate"):
-        if all(len(getattr(solid, "vertices", ())) <= _FEW_VERTICES for solid in standing.base.solids):
-            return _first(points, standing, budget, progress)
-    where, tables = standing.where(budget), standing.tables(budget)
+    points, beyond, query_counts, has_new = read_only(points), [0], list[IntArray](), False
+    if 0 < n <= _FEW_POINTS and n_bodies <= _FEW_BODIES and not scene.base.kept("can_locate"):
+        if all(len(getattr(solid, "vertices", ())) <= _FEW_VERTICES for solid in scene.base.solids):
+            return _locate_small_batch(points, scene, budget, progress)
+    where, tables = scene.where(budget), scene.tables(budget)
 
     def task(start: int, stop: int) -> None:
-        done, size, found = start, 2 * (stop - start) + standing.n_rows, list[IntArray]()
-        scratch, counted = scratch_for(standing.n_rows), np.zeros(len(tables.sizes), np.int64)
+        done, size, blocks = start, 2 * (stop - start) + scene.n_rows, list[IntArray]()
+        scratch, counted = scratch_for(scene.n_rows), np.zeros(len(tables.sizes), np.int64)
         while done < stop:  # bound: each turn locates a point, for all candidates of one have room
             keys = np.empty(size, np.int64)
             done, n_keys, n_beyond, is_sorted = entry_of(locate_near)(
@@ -142,23 +143,23 @@ def locate_all(
             )
             budget.check()
             budget.take(_BYTES * n_keys)
-            found.append(keys[:n_keys] if is_sorted else np.sort(keys[:n_keys]))
+            blocks.append(keys[:n_keys] if is_sorted else np.sort(keys[:n_keys]))
             beyond.append(n_beyond)
-        parts[start] = np.concatenate(found)
-        asked.append(counted)
+        parts[start] = np.concatenate(blocks)
+        query_counts.append(counted)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress)
     keys = np.concatenate([np.zeros(0, np.int64), *(parts[start] for start in sorted(parts))])
-    if asked and len(tables.sizes):
-        has_new = _build_trees(standing, np.sum(asked, axis=0), budget, workers)
+    if query_counts and len(tables.sizes):
+        has_new = _build_trees(scene, np.sum(query_counts, axis=0), budget, workers)
     located = (keys & 3).astype(np.int8)
     owners, bodies = np.divmod(keys >> 2, n_bodies)
     left = np.flatnonzero(located == UNDECIDED)
-    counts, is_exact = Counts(0, 0), standing.base.is_exact
+    counts, is_exact = Counts(0, 0), scene.base.is_exact
     if len(left):
-        located[left], counts = _settled(points, owners[left], bodies[left], standing, has_new, budget, workers)
-        held = located >= 0
-        located, owners, bodies = located[held], owners[held], bodies[held]
+        located[left], counts = _locate_exactly(points, owners[left], bodies[left], scene, has_new, budget, workers)
+        is_hit = located >= 0
+        located, owners, bodies = located[is_hit], owners[is_hit], bodies[is_hit]
     offsets = np.zeros(n + 1, np.int64)
     np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
@@ -167,39 +168,41 @@ def locate_all(
     return SceneLocations(offsets, bodies, located == 0), accuracy
 
 
-def _first(
-    points: FloatArray, standing: Standing, budget: Budget, progress: Progress | None
+def _locate_small_batch(
+    points: FloatArray, scene: Placements, budget: Budget, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
-    """Return the bodies that hold each of a few points, each body asked about all, before a tree is made."""
-    n, located, counts = len(points), np.empty((len(standing.base.solids), len(points)), np.int8), [0, 0]
-    standing.base.check_located(budget)
+    """Fast path for small batches before a tree exists: locates all points body by body."""
+    n, located, counts = len(points), np.empty((len(scene.base.solids), len(points)), np.int8), [0, 0]
+    scene.base.check_located(budget)
     for body in range(len(located)):
-        solid, pose = standing.placed(body)
-        found = located_at_once(points, solid) if pose is None else None
-        if found is None:
-            more = standing.locator(body).chosen(n, budget).fill(points, located[body], budget)
+        solid, pose = scene.placed(body)
+        answer = located_at_once(points, solid) if pose is None else None
+        if answer is None:
+            more = scene.locator(body).chosen(n, budget).fill(points, located[body], budget)
         else:
-            located[body], more = found[0], Counts(*found[1:3])
+            located[body], more = answer[0], Counts(*answer[1:3])
         counts = [min(n, counts[0] + more.beyond), min(n, counts[1] + more.rational)]
     owners, bodies = np.nonzero(located.T >= 0)
     if progress is not None:
         progress(n)
-    accuracy = Accuracy("exact" if standing.base.is_exact else "float64", None, n, counts[0], counts[1], "box_grid")
+    accuracy = Accuracy("exact" if scene.base.is_exact else "float64", None, n, counts[0], counts[1], "box_grid")
     offsets = np.searchsorted(owners, np.arange(n + 1))
     return SceneLocations(offsets, bodies, located[bodies, owners] == 0), accuracy
 
 
-def _settled(
-    points: FloatArray, owners: IntArray, bodies: IntArray, standing: Standing, has_new: bool, budget: Budget,
+def _locate_exactly(
+    points: FloatArray, owners: IntArray, bodies: IntArray, scene: Placements, has_new: bool, budget: Budget,
     workers: int | None,
 ) -> tuple[Int8Array, Counts]:  # fmt: skip
-    """Return the locations of pairs of a point and a body, each body's by its locator, and what they took."""
-    found, order = np.full(len(owners), UNDECIDED, np.int8), np.argsort(bodies, kind="stable")
+    """Return the locations of pairs of a point and a body, by each body's locator, and their counts."""
+    locations, order = np.full(len(owners), UNDECIDED, np.int8), np.argsort(bodies, kind="stable")
     if has_new:
-        tables, names, scratch = standing.tables(budget), standing.rows_of(bodies), scratch_for(standing.n_rows)
-        entry_of(locate_pairs)(points, owners[order], names[order], tables, scratch, again := found[order], budget.flag)
+        tables, names, scratch = scene.tables(budget), scene.rows_of(bodies), scratch_for(scene.n_rows)
+        entry_of(locate_pairs)(
+            points, owners[order], names[order], tables, scratch, again := locations[order], budget.flag
+        )
         budget.check()
-        found[order] = again
+        locations[order] = again
         order = order[again == UNDECIDED]
     ends = np.flatnonzero(np.append(bodies[order][1:] != bodies[order][:-1], True)) + 1 if len(order) else order
     groups = [
@@ -213,26 +216,26 @@ def _settled(
         for begin, end in groups[first:last]:
             places = order[begin:end]
             located = np.empty(end - begin, np.int8)
-            locator = standing.locator(int(bodies[places[0]])).chosen(end - begin, budget)
+            locator = scene.locator(int(bodies[places[0]])).chosen(end - begin, budget)
             counts.append(locator.fill(points[owners[places]], located, budget))
-            found[places] = located
+            locations[places] = located
 
     run_chunks(task, len(groups), budget=budget, first_chunk=1, workers=workers)
-    return found, Counts(sum(each.beyond for each in counts), sum(each.rational for each in counts))
+    return locations, Counts(sum(each.beyond for each in counts), sum(each.rational for each in counts))
 
 
-def _build_trees(standing: Standing, asked: IntArray, budget: Budget, workers: int | None) -> bool:
-    """Build trees and cells of the polyhedra that are asked often enough; return whether tables lack one of these."""
+def _build_trees(scene: Placements, query_counts: IntArray, budget: Budget, workers: int | None) -> bool:
+    """Build trees and cells of polyhedra that are queried often enough; return whether a table lacks one of these."""
     chosen = list[tuple[Polyhedron, int]]()
-    for solid, n_asked in zip(standing.base.solid_tables(budget).meshes, asked.tolist()):
-        if n_asked and len(solid.triangles) <= MOST_FACES:
-            if n_asked >= _FEWEST_FOR_TREES or solid.kept("tree") is not None:
-                chosen.append((solid, n_asked))
+    for solid, n_queries in zip(scene.base.solid_tables(budget).meshes, query_counts.tolist()):
+        if n_queries and len(solid.triangles) <= MOST_FACES:
+            if n_queries >= _FEWEST_FOR_TREES or solid.kept("tree") is not None:
+                chosen.append((solid, n_queries))
 
     def build(start: int, stop: int) -> None:
-        for solid, n_asked in chosen[start:stop]:
+        for solid, n_queries in chosen[start:stop]:
             tree_of(solid, budget.check)
-            sides_if_they_pay(solid, n_asked, budget)
+            sides_if_they_pay(solid, n_queries, budget)
 
     run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
-    return bool(chosen) and standing.has_new_trees([solid for solid, _ in chosen])
+    return bool(chosen) and scene.has_new_trees([solid for solid, _ in chosen])

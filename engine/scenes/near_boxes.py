@@ -1,6 +1,6 @@
-"""Which bodies of a tree of boxes does a segment, or a box, come near; compiled. In the plane z is 0.
+"""Traversal of a tree of boxes: the bodies near a segment or a box; compiled. In the plane z is 0.
 
-Room for the work on one segment at a time in a scene, kept by each thread: one array, whose parts have names.
+Also the work space of one segment in a scene, cached per thread: one array with named parts.
 """
 
 from __future__ import annotations
@@ -21,40 +21,48 @@ from engine.segment_clipping.pieces import Pieces, point_of
 from engine.types import FloatArray, Int32Array, IntArray, Point3
 
 MOST_MET: Final = 512
-"""Triangles that a segment crosses; with more it is UNDECIDED."""
+"""Most triangles that a segment crosses; with more it is UNDECIDED."""
 
 _here: Final = threading.local()
-_MOST_KEPT: Final = 1 << 14
-"""Bodies of a scene whose room is kept: some 800 kB a thread."""
+_MOST_CACHED: Final = 1 << 14
+"""Number of bodies up to which a thread caches its work space: some 800 kB."""
 
-Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best found depths near")
-"""Room for the work on one segment. stack: of one body, cuts: its `Crossings`, room: its pieces, the
-last row for the first of them all. waiting, keys: nodes and bodies to be asked, and where they are entered; entered
-(1, 8), of one node. best: where the first piece begins; found: the body it lies in, and whether another may begin there
-too. depths: how many nodes and bodies of a tree wait, and how many of those without a place in it. near: bodies."""
+Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best hit depths near")
+"""Work space of one segment.
+
+| field | meaning |
+|---|---|
+| stack, cuts | of one body, the latter its `Crossings` |
+| room | the pieces of one body, the last row for the first piece of all |
+| waiting, keys | nodes and bodies waiting, and where the segment enters them |
+| entered | (1, 8), entries of one node |
+| best, hit | start of the first piece; its body, and whether another may begin there too |
+| depths | number of nodes and bodies of a tree waiting, and of bodies outside the tree |
+| near | bodies |
+"""
 _SIZES: Final = (
     STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
     2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, 2, MOST_MET,
 )  # fmt: skip
 """Words of the arrays of a `Scratch`, in order, but for `near`."""
 _AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
-"""Where these begin, in bytes."""
+"""Offsets of these, in bytes."""
 
 
 def scratch_for(n_bodies: int) -> IntArray:
-    """Return room for the work on one segment at a time (`scratch_at`); each thread keeps its own."""
-    found: IntArray | None = getattr(_here, "scratch", None)
-    if found is None or found[1] <= n_bodies:
-        found = np.empty(_AT[-1] // 8 + n_bodies + 1, np.int64)
-        found[:2] = found.ctypes.data, n_bodies + 1
-        if n_bodies <= _MOST_KEPT:
-            _here.scratch = found
-    return found
+    """Return the work space of one segment (`scratch_at`), cached per thread."""
+    scratch: IntArray | None = getattr(_here, "scratch", None)
+    if scratch is None or scratch[1] <= n_bodies:
+        scratch = np.empty(_AT[-1] // 8 + n_bodies + 1, np.int64)
+        scratch[:2] = scratch.ctypes.data, n_bodies + 1
+        if n_bodies <= _MOST_CACHED:
+            _here.scratch = scratch
+    return scratch
 
 
 @merged
 def scratch_at(words: IntArray) -> Scratch:
-    """Return the arrays that `scratch_for` has room for."""
+    """Return the named parts of the array of `scratch_for`."""
     at, m = words[0], MOST_MET
     cuts = Crossings(
         array_at(at + _AT[2], (m,), np.float64), array_at(at + _AT[3], (m, 3), np.float64),
@@ -75,23 +83,22 @@ def scratch_at(words: IntArray) -> Scratch:
 
 
 BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
-"""The boxes of bodies, low and high (n, dimension), infinite where they may have no bounds; a `Bvh` over those that are
-bounded, where they are not few, 1 / its scale, and which body is where in it; the others, looked at one by one."""
+"""Boxes of bodies, low and high (n, dimension), infinite for unbounded ones; a `Bvh` over the bounded ones, if there
+are enough, 1 / its scale, and the body of each item; the other bodies, tested one by one."""
 Where = namedtuple("Where", "together moved names")
-"""Where the bodies of a scene are: the `BodyTree` of n of them together, and of those that moved since, which count
-from n on; what these are called in the scene, ascending."""
+"""Positions of the bodies of a scene: the `BodyTree` of all n together, and of those moved since, numbered from n on;
+the indices of the latter in the scene, ascending."""
 N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, NAMES, PLACED = range(12)
-"""What stands of a `BodyTree` in a row of whole numbers, sizes and addresses: one is handed on where it would be a
-hundred numbers. NUMBERS: of (4,), inverse and origin. NAMES: of (n,), what moved bodies are called. PLACED: of the
-rows of their `Table`."""
+"""Columns of a `BodyTree` encoded as a row of integers, sizes and addresses: one argument instead of a hundred.
+NUMBERS: of (4,), inverse and origin. NAMES: of (n,), indices of moved bodies. PLACED: of the rows of their `Table`."""
 _MOST_WAY: Final = 2.0**1000
 _SLACK: Final = 2.0**-20
-"""By how much a box in the tree's coordinates, at most 2 where it matters, is widened for its rounding to float32."""
+"""Enlargement of a box in tree coordinates, at most 2 where it matters, for its rounding to float32."""
 
 
 @inline
 def place_in(names: IntArray, body: int) -> int:
-    """Return where a body stands among names, which ascend; -1 where it does not."""
+    """Binary search: return the index of a body in ascending names; -1 if absent."""
     low, high = 0, names.size
     while low < high:  # bound: halved each turn
         middle = (low + high) // 2
@@ -104,7 +111,7 @@ def place_in(names: IntArray, body: int) -> int:
 
 @merged
 def tree_in(row: IntArray, dimension: int) -> BodyTree:
-    """Return the `BodyTree` of a row."""
+    """Decode the `BodyTree` of a row."""
     n, numbers = row[N_BODIES], array_at(row[NUMBERS], (4,), np.float64)
     boxes = array_at(row[BOXES], (row[N_NODES], BOX_ROWS, WIDTH), np.float32)
     child = array_at(row[CHILD], (row[N_NODES], WIDTH), np.int32)
@@ -116,14 +123,14 @@ def tree_in(row: IntArray, dimension: int) -> BodyTree:
 
 @inline
 def name_in(words: IntArray, body: int) -> int:
-    """Return what a body, of which those that moved count from n on, is called in the scene."""
+    """Return the index in the scene of a body, given its number, where moved bodies count from n on."""
     n, m = words[0, N_BODIES], words[1, N_BODIES]
     return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
 
 
 @inline
 def has_moved(words: IntArray, body: int) -> bool:
-    """Tell whether one of all bodies stands elsewhere by now."""
+    """Return whether one of the n bodies has been moved since."""
     m = words[1, N_BODIES]
     return m > 0 and place_in(array_at(words[1, NAMES], (m,), np.int64), body) >= 0
 
@@ -139,13 +146,13 @@ def way_of(segments: FloatArray, item: int, bodies: BodyTree) -> Way:
 
 @inline
 def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
-    """Begin to look for the bodies of a tree that a segment may meet."""
+    """Start the traversal of a tree for a segment."""
     scratch.waiting[0], scratch.keys[0], scratch.depths[0], scratch.depths[1] = 0, -1.0, way.is_near, bodies.listed.size
 
 
 @inline
 def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last: float, scratch: Scratch) -> int:
-    """Return the next body whose box a segment may enter before `last`, about the nearest; -1 where there is none."""
+    """Return the next body whose box a segment may enter before `last`, about in order of entry; -1 for none."""
     depths = scratch.depths
     while depths[0] > 0:  # bound: each node, and each body, waits once
         depths[0] -= 1
@@ -165,24 +172,27 @@ def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last:
 
 @inline
 def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray) -> int:
-    """Fill scratch.near with the bodies that a segment may meet; return how many."""
-    scratch, n_found = scratch_at(room), 0
+    """Fill scratch.near with the bodies that a segment may meet; return their number."""
+    scratch, n_near = scratch_at(room), 0
     for side in range(1 + (words[1, N_BODIES] > 0)):
         bodies, n_before = tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
         way = way_of(segments, item, bodies)
         begin_way(bodies, way, scratch)
         body = next_body(segments, item, bodies, way, np.float32(1.0), scratch)
         while body >= 0:
-            scratch.near[n_found] = n_before + body
-            n_found += side == 1 or not has_moved(words, body)
+            scratch.near[n_near] = n_before + body
+            n_near += side == 1 or not has_moved(words, body)
             body = next_body(segments, item, bodies, way, np.float32(1.0), scratch)
-    return n_found
+    return n_near
 
 
 @inline
 def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) -> bool:
-    """Tell whether a segment may meet the box of a body: (box - start) / (end - start) loses 4 units of rounding along
-    each axis, or 2^-1074 where it underflows; differences beyond `_MOST_WAY`, which may be infinite, say nothing."""
+    """Return whether a segment may meet the box of a body.
+
+    error: (box - start) / (end - start) is off by 4 units of rounding on each axis, or 2^-1074 on underflow;
+    differences beyond `_MOST_WAY`, which may be infinite, decide nothing.
+    """
     meet, enters, leaves = True, 0.0, 1.0
     for k in range(segments.shape[2]):
         start, end = segments[item, 0, k], segments[item, 1, k]
@@ -197,8 +207,8 @@ def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) ->
 
 @inline
 def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, depth: int) -> int:
-    """Put what a node of a tree names, and a segment enters before `last`, on scratch.waiting from `depth` on, the
-    nearest last; return where it ends."""
+    """Push the children of a node that a segment enters before `last` on scratch.waiting from `depth` on, the nearest
+    last; return the new depth."""
     waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
     bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
     while bits != 0:
@@ -215,18 +225,17 @@ def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, de
 
 
 @inline
-def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array, found: IntArray) -> int:
-    """Fill `found` with the bodies of a `Where` whose boxes a box (dim,) meets, which may be infinite; return how
-    many."""
-    n_found, names = _of_box(low, high, where.together, 0, where.names, stack, found, 0), where.names
+def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array, hits: IntArray) -> int:
+    """Fill hits with the bodies of a `Where` whose boxes meet a box (dim,), maybe infinite; return their number."""
+    n_hits, names = _of_box(low, high, where.together, 0, where.names, stack, hits, 0), where.names
     if names.size > 0:
-        n_found = _of_box(low, high, where.moved, where.together.low.shape[0], names[:0], stack, found, n_found)
-    return n_found
+        n_hits = _of_box(low, high, where.moved, where.together.low.shape[0], names[:0], stack, hits, n_hits)
+    return n_hits
 
 
 @inline
 def _is_met(low: FloatArray, high: FloatArray, bodies: BodyTree, body: int, left_out: IntArray) -> bool:
-    """Tell whether a box meets that of a body which is not among those left out."""
+    """Return whether a box meets that of a body which is not among those left out."""
     meet = True
     for k in range(low.size):
         meet &= (low[k] <= bodies.high[body, k]) & (high[k] >= bodies.low[body, k])
@@ -241,10 +250,10 @@ def _local(value: float, inverse: float, way: float) -> Any:
 @inline
 def _of_box(
     low: FloatArray, high: FloatArray, bodies: BodyTree, n_before: int, left_out: IntArray, stack: Int32Array,
-    found: IntArray, n_found: int,
+    hits: IntArray, n_hits: int,
 ) -> int:  # fmt: skip
-    """Fill `found` from n_found on with the bodies of a `BodyTree` whose boxes a box meets, and that are not left out;
-    return where they end."""
+    """Append to hits the bodies of a `BodyTree` whose boxes meet a box and that are not left out; return the new
+    number."""
     tree, inverse, depth, stack[0] = bodies.tree, bodies.inverse, 1, 0
     is_flat, x, y, z = low.size == 2, tree.origin[0], tree.origin[1], tree.origin[2]
     bottom, top = (0.0 if is_flat else low[2]) - z, (0.0 if is_flat else high[2]) - z
@@ -262,18 +271,17 @@ def _of_box(
                 depth += 1
             elif below != EMPTY:
                 body = bodies.bounded[-1 - below]
-                found[n_found] = n_before + body
-                n_found += _is_met(low, high, bodies, body, left_out)
+                hits[n_hits] = n_before + body
+                n_hits += _is_met(low, high, bodies, body, left_out)
     for body in bodies.listed:
-        found[n_found] = n_before + body
-        n_found += _is_met(low, high, bodies, body, left_out)
-    return n_found
+        hits[n_hits] = n_before + body
+        n_hits += _is_met(low, high, bodies, body, left_out)
+    return n_hits
 
 
 @kernel
 def put_keys(segments: Any, t: float, bodies: Any, keys: Any) -> None:
-    """Set keys (n,) to the cells of a tree, 32 along each axis, in which segments are at t, in the order of G. M.
-    Morton, 1966."""
+    """Set keys (n,) to the Morton codes, 32 cells an axis, of the positions of segments at t (G. M. Morton, 1966)."""
     origin, inverse = bodies.tree.origin, bodies.inverse
     for item in range(segments.shape[0]):
         key = 0

@@ -9,7 +9,8 @@ in double-doubles with running bounds (u = 2^-53): an entry of M carries u^2, it
 a coordinate of p' is within 32 u^2 sum |p - t|, and one of e' likewise; entries of M are below 1.01. A body without a
 pose is one under the identity, whose p' and e' carry no error. A ball stays in the world, about the image of its
 centre. What a bound leaves open (a sign, the order of two parameters, a coordinate that may round either way) is
-UNDECIDED. Doubles tell whether a body is met, and by which planes: what they leave open, double-doubles seldom tell.
+UNDECIDED. Doubles decide whether a body is met, and by which planes; double-doubles seldom decide what doubles leave
+open.
 """
 
 from __future__ import annotations
@@ -42,14 +43,14 @@ def _row(m: FloatArray, i: int, v: Vector) -> Pair:
 
 @inline
 def _turned(m: FloatArray, v: Vector) -> tuple[Vector, float]:
-    """Return M v for a vector of pairs without error, and the bound of each coordinate."""
+    """Return M v for a vector of exact pairs, and the error bound of each coordinate."""
     bound = _FRAME_BOUND * (abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0]))
     return (_row(m, 0, v), _row(m, 1, v), _row(m, 2, v)), bound
 
 
 @inline
 def in_frame(body: IntArray, segments: FloatArray, item: int) -> Frame:
-    """Return p' and e' of a segment in the frame of a body (4,) with their bounds, 0 for one without a pose."""
+    """Return p' and e' of a segment in the frame of a body (4,), with their error bounds, 0 for an unposed one."""
     is_flat = segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     way = difference(p, q)
@@ -63,7 +64,7 @@ def in_frame(body: IntArray, segments: FloatArray, item: int) -> Frame:
 
 @inline
 def _plane_at(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float, float]:
-    """Return n . v + offset as a double-double, and its bound; blur: of each coordinate of v."""
+    """Return dot(n, v) + offset as a double-double, and its bound; blur: of each coordinate of v."""
     ah, al = dd_scale(v[0][0], v[0][1], row[0])
     bh, bl = dd_scale(v[1][0], v[1][1], row[1])
     ch, cl = dd_scale(v[2][0], v[2][1], row[2])
@@ -76,7 +77,8 @@ def _plane_at(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[f
 
 @inline
 def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float]:
-    """Return n . v + offset by doubles, and its bound: three sums, a product and the tail of v lose 5 u of the size."""
+    """Return dot(n, v) + offset in doubles, and its bound: three sums, a product and the low part of v lose 5 u of the
+    size."""
     x, y, z = row[0] * v[0][0], row[1] * v[1][0], row[2] * v[2][0]
     size = abs(x) + abs(y) + abs(z) + abs(offset)
     return x + y + z + offset, 2.0**-50 * size + 1.01 * blur * (abs(row[0]) + abs(row[1]) + abs(row[2]))
@@ -84,13 +86,13 @@ def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[floa
 
 @inline
 def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
-    """Return 1, -1 or UNDECIDED for a segment that surely meets all half-spaces, or not, and where it does the planes
-    that cut it first and last, -1 for none; by doubles.
+    """Return 1, -1 or UNDECIDED for a segment that provably meets all half-spaces, or not; and the first and last
+    cutting planes, -1 for none; in doubles.
 
-    Each parameter t = -s / d is known within r = 1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000.
+    Each parameter t = -s / d has the error r = 1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000.
     """
     own, blur, along, along_blur = frame
-    enters, leaves, first, last, is_sure = (-1.0, -1.0), (2.0, 2.0), -1, -1, True
+    enters, leaves, first, last, is_proven = (-1.0, -1.0), (2.0, 2.0), -1, -1, True
     for face in range(rows.shape[0]):
         s, s_bound = _value(rows[face], own, rows[face, 3], blur)
         d, d_bound = _value(rows[face], along, 0.0, along_blur)
@@ -101,29 +103,29 @@ def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
         if of_p == 1 and of_q == 1:
             continue
         if of_p == UNDECIDED or of_q == UNDECIDED or d_bound > 2.0**-10 * abs(d):
-            is_sure = False
+            is_proven = False
             continue
         t = -s / d
         r = 1.01 * (s_bound + t * d_bound) / abs(d) + 2.0**-51 * t
         if of_p < 0:
-            is_sure &= t - r > enters[1] or t + r < enters[0]
+            is_proven &= t - r > enters[1] or t + r < enters[0]
             if t > enters[1]:
                 first = face
             enters = (max(enters[0], t - r), max(enters[1], t + r))
         else:
-            is_sure &= t + r < leaves[0] or t - r > leaves[1]
+            is_proven &= t + r < leaves[0] or t - r > leaves[1]
             if t < leaves[0]:
                 last = face
             leaves = (min(leaves[0], t - r), min(leaves[1], t + r))
     if enters[0] > leaves[1]:
         return -1, -1, -1
-    return (1 if is_sure and enters[1] < leaves[0] else UNDECIDED), first, last
+    return (1 if is_proven and enters[1] < leaves[0] else UNDECIDED), first, last
 
 
 @inline
 def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return 1, -1 or UNDECIDED for a segment that meets all half-spaces of a body, or not, or may, and the ends of its
-    piece as `put_piece` takes them, unless `is_any`."""
+    """Return 1, -1 or UNDECIDED for a segment that meets all half-spaces of a body, or not; and, unless `is_any`, the
+    ends of its piece as `put_piece` takes them."""
     frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
     own, blur, along, along_blur = frame
     meets, entered, left = _planes_cut(rows, frame)
@@ -142,7 +144,7 @@ def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool
 
 @inline
 def in_ball(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return what `between_planes` does for a ball: d = q - p, and f = p - c off by the rounding of the image c."""
+    """Return the result of `between_planes` for a ball: d = q - p, and f = p - c off by the rounding of the image c."""
     c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     along = difference(p, q)

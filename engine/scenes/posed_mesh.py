@@ -1,8 +1,8 @@
-"""Segments on placed meshes, compiled: triangles met by their tree, crossings in order; see posed_cut.py.
+"""Segments against placed meshes: crossed triangles by tree traversal, crossings in order; compiled. See posed_cut.py.
 
-Doubles of p' and p' + e', off by `blur` at most, find the triangles; without a pose they are the segment's own ends,
-and exact signs settle what the filter leaves. A closed mesh turns the location over at each crossing, so that of the
-first end, by a vertical ray in the same frame, is all that is wanted beside them.
+Doubles of p' and p' + e', off by `blur` at most, select the triangles; without a pose they are the segment's own ends,
+and exact signs settle what the filter leaves open. A closed mesh flips the location at each crossing, so only the
+location of the first end, by a vertical ray in the same frame, is needed besides.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
 UNSURE: Final = -1
 WANTS_BODY: Final = -2
 WANTS_TREE: Final = -3
-"""In place of a number of pieces: UNDECIDED, or the body, or the tree that points are located by, is not prepared."""
+"""In place of a number of pieces: UNDECIDED, or the body, or its location tree, is not prepared."""
 
 
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
-"""What of `Mesh` is read here."""
+"""The fields of `Mesh` that are read here."""
 MESH_WORDS: Final = 37
-"""Of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_line`'s addresses,
-0 where there is no tree, and sizes (8,); then as doubles origin, inverse, whether all is safe, low and high of its box
-(11,), and `tree_line`'s places (10,)."""
+"""Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_line`'s
+addresses, 0 without a tree, and sizes (8,); then as doubles origin, inverse, whether all is in range, low and high of
+its box (11,), and `tree_line`'s places (10,)."""
 TREE, PLACES, TREE_PLACES = 8, 16, 27
-"""Where these begin."""
+"""Offsets of these."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
 
 
@@ -74,9 +74,11 @@ def _tree_of(address: int) -> Any:
 
 
 @inline
-def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
-    """Fill met and codes with the triangles that a segment crosses; return how many, UNSURE where one may be met
-    otherwise. Where `is_any` one that is surely met is enough, and 1 is returned."""
+def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
+    """Fill met and codes with the triangles that a segment crosses; return their number, UNSURE if one is not proven.
+
+    With `is_any`, one triangle that is provably met ends the search with 1.
+    """
     cuts = scratch.cuts
     waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
     n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
@@ -89,11 +91,11 @@ def _gather(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, s
 
 
 @inline
-def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
-    """Make one of crossings, which are sorted, that lie in one point; return how many are in order then, or UNSURE.
+def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
+    """Merge sorted crossings in one point; return the number of remaining ones, or UNSURE.
 
-    Where the location does not turn over, a closed mesh is met in a point, or not left: such a point stands there
-    twice, the second time by -2 - face. At least two crossings make such a point, so that 4 n places are enough.
+    If the location does not flip, a closed mesh is met in a point, or not left: such a point is written twice, the
+    second time as -2 - face. At least two crossings make such a point, so 4 n places suffice.
     """
     cuts, order, n_out, begin = scratch.cuts, scratch.cuts.order, 2 * n, 0
     if 4 * n > MOST_MET:
@@ -126,14 +128,14 @@ def _join_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_cl
 
 @inline
 def _values(at_p: tuple[float, ...], blur: float, normal: Any) -> Any:
-    """Return what `dot` does of a vector that is known to `blur` a coordinate, and lost 4 u^2 of it in its rounding."""
+    """Return `dot` of a vector with errors `blur` a coordinate, rounded to 4 u^2 of itself."""
     h, low, bound = at_p
     return h, low, 1.5 * bound + 1.01 * blur * (normal[0][2] + normal[1][2] + normal[2][2])
 
 
 @inline
 def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
-    """Make a crossing, in a corner where one is touched; tell whether all is surely nearest."""
+    """Compute a crossing, in a corner if one is touched; return whether all coordinates are correctly rounded."""
     (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
@@ -157,20 +159,20 @@ def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame
     t, low = dd_div(-s, -s_low, d, d_low)
     cuts.t[place], n = t + low, place_of(code)
     if n > 2:
-        is_sure = put_point(cuts.points[place], segments, item, t, low, slack)
+        is_proven = put_point(cuts.points[place], segments, item, t, low, slack)
     else:
         for k in range(3):
             cuts.points[place, k] = mesh.elements[element, n, k] + 0.0
         bound = (T_BOUND + slack) * abs(t)
-        is_sure = slack < 0.001 and t + (low - bound) == t + (low + bound)
-    if not is_sure and along_blur == 0.0:  # case: unposed, a coordinate midway between two doubles above all
-        cuts.t[place], is_sure = cross_exactly(segments, item, mesh.elements, element, cuts.points[place])
-    return is_sure
+        is_proven = slack < 0.001 and t + (low - bound) == t + (low + bound)
+    if not is_proven and along_blur == 0.0:  # case: unposed, a coordinate midway between two doubles above all
+        cuts.t[place], is_proven = cross_exactly(segments, item, mesh.elements, element, cuts.points[place])
+    return is_proven
 
 
 @inline
 def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_placed: bool) -> tuple[Point3, Any, float]:
-    """Return doubles of both ends of a segment in a frame, and how far a coordinate may be off."""
+    """Return doubles of both ends of a segment in a frame, and the error of a coordinate."""
     p = Point3(own[0][0], own[1][0], own[2][0])
     q = Point3(p.x + along[0][0], p.y + along[1][0], p.z + along[2][0])
     size = max(abs(p.x), abs(p.y), abs(p.z), abs(q.x), abs(q.y), abs(q.z))
@@ -181,8 +183,11 @@ def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_plac
 def crossings_in(
     body: IntArray, segments: FloatArray, item: int, is_any: bool, words: IntArray, stop: FlagArray
 ) -> tuple[int, bool]:
-    """Make the crossings of a segment with a placed mesh, in order; return how many, or why not, and whether the first
-    end lies in it. Where `is_any` they are not made, and any positive number says that there is one."""
+    """Compute the crossings of a segment with a placed mesh, in order; return their number, or a reason, and whether
+    the first end is inside.
+
+    With `is_any` they are not computed, and any positive number means that there is one.
+    """
     is_placed, is_closed, scratch = body[3] != 0, body[1] != 0, scratch_at(words)
     lines, numbers = array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
     frame = in_frame(body, segments, item)
@@ -190,7 +195,7 @@ def crossings_in(
     if not is_placed:
         q = corner(segments, item, 1)
     mesh, is_in = _mesh_of(lines, numbers), False
-    n_met = _gather(mesh, p, q, blur, is_any, scratch)
+    n_met = _collect_crossings(mesh, p, q, blur, is_any, scratch)
     if n_met < 0 or (is_any and n_met > 0):
         return n_met, False
     if is_closed and _is_near_box(numbers, p, blur):
@@ -212,12 +217,12 @@ def crossings_in(
         touches |= scratch.cuts.codes[i] != CROSSED
     if not sort_crossings(scratch.cuts, n_met) and not touches:
         return UNSURE, False
-    return (_join_touches(mesh, scratch, n_met, is_in, is_closed) if touches else n_met), is_in
+    return (_merge_touches(mesh, scratch, n_met, is_in, is_closed) if touches else n_met), is_in
 
 
 @inline
 def _is_near_box(numbers: FloatArray, p: Point3, blur: float) -> bool:
-    """Tell whether a point known to `blur` a coordinate may lie in the box of a mesh."""
+    """Return whether a point with errors `blur` a coordinate may lie in the box of a mesh."""
     low, high = PLACES + 5, PLACES + 8
     is_out = (p.x + blur < numbers[low]) | (p.x - blur > numbers[high])
     is_out |= (p.y + blur < numbers[low + 1]) | (p.y - blur > numbers[high + 1])

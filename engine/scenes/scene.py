@@ -1,4 +1,4 @@
-"""Public: a scene that stays, whose structures are prepared once and serve every question."""
+"""Public: a stored scene, whose structures are prepared once and serve every query."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from engine.errors import (
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies
-from engine.scenes.clip import Counts, answer_few, clip_all, clip_first, meets_any
-from engine.scenes.collide_scene import Asked, ScenePairs, collide_bodies, pair_keys
-from engine.scenes.ends import ScenePieces, in_order, joined
+from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, meets_any
+from engine.scenes.collide_scene import PairQuery, ScenePairs, collide_bodies, pair_keys
+from engine.scenes.ends import ScenePieces, merge_parts, sort_pieces
 from engine.scenes.locate import SceneLocations, locate_all
-from engine.scenes.standing import Standing
+from engine.scenes.placements import Placements
 from engine.segment_clipping.exact_pieces import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, as_points, shown
@@ -68,15 +68,15 @@ class Scene(Immutable):
     (0, 1)
     """
 
-    __slots__ = ("_standing",)
+    __slots__ = ("_placements",)
 
     type: ClassVar[str] = "scene"
-    _standing: Standing
+    _placements: Placements
 
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None] | None = None) -> None:
         check_bodies(solids, poses)
         bodies = Bodies(tuple(solids), (None,) * len(solids) if poses is None else tuple(poses))
-        object.__setattr__(self, "_standing", Standing(bodies, {}))
+        object.__setattr__(self, "_placements", Placements(bodies, {}))
 
     def __len__(self) -> int:
         return len(self.solids)
@@ -90,12 +90,12 @@ class Scene(Immutable):
     @property
     def solids(self) -> tuple[Solid, ...]:
         """The solid of each body."""
-        return self._standing.base.solids
+        return self._placements.base.solids
 
     @property
     def poses(self) -> tuple[Pose | None, ...]:
         """The pose of each body, None for one that stands where its solid does."""
-        return self._standing.poses
+        return self._placements.poses
 
     @property
     def bounds(self) -> FloatArray | None:
@@ -103,15 +103,15 @@ class Scene(Immutable):
         no bounds. None where there are no bodies."""
         if not len(self):
             return None
-        boxes = self._standing.boxes(Budget())
+        boxes = self._placements.boxes(Budget())
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
     @property
     def memory(self) -> int:
         """Bytes of all arrays held, of the solids and of what is prepared too, shared ones once."""
-        found: dict[int, int] = {}
-        _collect_arrays((self.solids, *self._standing.all_kept), found, set())
-        return sum(found.values()) + _BYTES_OF_POSE * sum(pose is not None for pose in self.poses)
+        sizes: dict[int, int] = {}
+        _collect_arrays((self.solids, *self._placements.all_cached), sizes, set())
+        return sum(sizes.values()) + _BYTES_OF_POSE * sum(pose is not None for pose in self.poses)
 
     def moved(self, poses: Mapping[int, Pose | None]) -> Scene:
         """Return the scene with some bodies under other poses; what is prepared of the others is shared.
@@ -145,7 +145,7 @@ class Scene(Immutable):
             if type(pose) is not Pose or len(pose.translation) != solids[0].dimension:
                 check_pose(pose, solids[body], f"poses[{body}]")
         scene = object.__new__(Scene)
-        object.__setattr__(scene, "_standing", self._standing.after(given))
+        object.__setattr__(scene, "_placements", self._placements.after(given))
         return scene
 
     def locate(
@@ -173,8 +173,8 @@ class Scene(Immutable):
         check_options(workers, progress, report=report)
         array = as_points(points, self.solids[0].dimension if len(self) else None)
         with Budget(deadline, cancel) as budget:
-            found = locate_all(array, self._standing, budget, workers, progress)
-        return found if report else found[0]
+            answer = locate_all(array, self._placements, budget, workers, progress)
+        return answer if report else answer[0]
 
     def collide(
         self,
@@ -215,42 +215,42 @@ class Scene(Immutable):
             As `collide_scene`.
         """
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
-        asked = Asked(skip, only, gap, witnesses, boolean, detail)
+        query = PairQuery(skip, only, gap, witnesses, boolean, detail)
         with Budget(deadline, cancel) as budget:
             if moved is None or not len(self):
                 self._named([] if moved is None else moved, "moved")
-                found = collide_bodies(self._standing.whole().batches(budget), asked, budget, workers, progress)
+                pairs = collide_bodies(self._placements.whole().batches(budget), query, budget, workers, progress)
             else:
-                found = self._collide_some(self._named(moved, "moved"), asked, budget, workers, progress)
-        return found if report else found[0]
+                pairs = self._collide_some(self._named(moved, "moved"), query, budget, workers, progress)
+        return pairs if report else pairs[0]
 
     def _collide_some(
-        self, named: list[int], asked: Asked, budget: Budget, workers: int | None, progress: Progress | None
+        self, named: list[int], query: PairQuery, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[ScenePairs, Accuracy]:
-        """Return the pairs with a body named: convex bodies at once, else a scene of their own."""
-        standing, n = self._standing, len(self)
-        reach = 0.0 if asked.gap is None else checked_distance(asked.gap, "gap")
-        keys, relations = standing.pairs_with(np.array(named, np.int64), reach, bool(asked.boolean), budget)
-        is_plain = not (asked.witnesses or asked.detail) and asked.gap is asked.only is asked.skip is None
+        """Return the pairs with a named body: convex bodies in one batch, others as a scene of their own."""
+        standing, n = self._placements, len(self)
+        reach = 0.0 if query.gap is None else checked_distance(query.gap, "gap")
+        keys, relations = standing.pairs_with(np.array(named, np.int64), reach, bool(query.boolean), budget)
+        is_plain = not (query.witnesses or query.detail) and query.gap is query.only is query.skip is None
         if is_plain and not (relations == UNSETTLED).any():
             met = np.flatnonzero(relations)
             order = met[np.argsort(keys[met])]
             first, second = np.divmod(keys[order], n)
-            relations = np.full(len(met), TOUCHING, np.int8) if asked.boolean else relations[order]
+            relations = np.full(len(met), TOUCHING, np.int8) if query.boolean else relations[order]
             return ScenePairs(first, second, relations), Accuracy("exact", None, len(keys), 0, 0, "named pairs")
-        if asked.only is not None:
-            keys = keys[np.isin(keys, pair_keys(asked.only, n, "only", budget))]
-        if asked.skip is not None:
-            keys = keys[~np.isin(keys, pair_keys(asked.skip, n, "skip", budget))]
+        if query.only is not None:
+            keys = keys[np.isin(keys, pair_keys(query.only, n, "only", budget))]
+        if query.skip is not None:
+            keys = keys[~np.isin(keys, pair_keys(query.skip, n, "skip", budget))]
         pairs = np.stack(np.divmod(keys, n), axis=1)
         bodies, local = np.unique(pairs, return_inverse=True)
-        asked = asked._replace(skip=None, only=local.reshape(-1, 2))
+        query = query._replace(skip=None, only=local.reshape(-1, 2))
         some = standing.base.batches(budget).under(bodies, [standing.pose(body) for body in bodies.tolist()])
         try:
-            found, accuracy = collide_bodies(some, asked, budget, workers, progress)
+            result, accuracy = collide_bodies(some, query, budget, workers, progress)
         except EngineError as error:
             raise _renamed(error, bodies.tolist()) from None
-        return replace(found, first=bodies[found.first], second=bodies[found.second]), accuracy
+        return replace(result, first=bodies[result.first], second=bodies[result.second]), accuracy
 
     @overload
     def clip_segments(
@@ -328,7 +328,7 @@ class Scene(Immutable):
         ([1, 0], [[0.125, 0.25], [0.5, 0.75]])
         """
         if report is False and is_unlimited(workers, deadline, cancel, progress):
-            few = answer_few(segments, self._standing, keep)
+            few = clip_small_batch(segments, self._placements, keep)
             if few is not None:
                 return few
         check_options(workers, progress, report=report)
@@ -339,14 +339,14 @@ class Scene(Immutable):
         counts = Counts(n)
         with Budget(deadline, cancel) as budget:
             budget.check()
-            self._standing.base.check_cut(budget)
+            self._placements.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):
-                result = in_order(joined([], array.shape[2]), n, lambda: lambda *_: (ZERO, ONE))
+                result = sort_pieces(merge_parts([], array.shape[2]), n, lambda: lambda *_: (ZERO, ONE))
                 result = np.zeros(n, np.bool_) if keep == "any" else result
             else:
                 cut: Any = {"all": clip_all, "first": clip_first, "any": meets_any}[keep]
-                result = cut(array, self._standing, counts, budget, workers)
+                result = cut(array, self._placements, counts, budget, workers)
             budget.check()
         if progress is not None and n:
             progress(n)
@@ -363,19 +363,19 @@ class Scene(Immutable):
             ascending = sorted(set(bodies))
             if ascending[0] >= 0 and ascending[-1] < len(self):
                 return ascending
-        found, n = set(), len(self)
+        indices, n = set(), len(self)
         for place, body in enumerate(bodies):
             if isinstance(body, (bool, np.bool_)) or not isinstance(body, (int, np.integer)):
                 raise InvalidArrayError(f"{name} names bodies by index, got {type(body).__name__}", (name, place))
             if not 0 <= body < n:
                 message = f"{name} names body {shown(body)}, which is not there; the scene has {n}"
                 raise IndexOutOfRangeError(message, (name, place))
-            found.add(int(body))
-        return sorted(found)
+            indices.add(int(body))
+        return sorted(indices)
 
 
 def check_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> None:
-    """Raise unless these are solids of one dimension and a pose or None for each, naming the first that is wrong."""
+    """Raise unless all solids have one dimension and each has a pose or None; the error names the first wrong one."""
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
     for index, solid in enumerate(solids):
@@ -403,7 +403,7 @@ def check_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:
-    """Return an error about one of some bodies that names it as the scene does."""
+    """Return an error with the index of a subset of bodies replaced by that of the scene."""
     if len(error.where) > 1 and error.where[0] == "solids":
         place = cast(int, error.where[1])
         message = error.message.replace(f"solids[{place}]", f"solids[{bodies[place]}]")

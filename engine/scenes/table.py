@@ -1,4 +1,4 @@
-"""What the kernels for segments read of the bodies of a scene (`Cut`): of each, when it is asked for first."""
+"""Segment tables: what the kernels for segments (`Cut`) read of the bodies of a scene, filled per body on demand."""
 
 from __future__ import annotations
 
@@ -23,38 +23,41 @@ from engine.types import FloatArray, IntArray
 
 
 class Table:
-    """The bodies of a scene for the kernels: `rows` (n, 4) are filled body by body, the kind of each last.
+    """Segment table of a scene: `rows` (n, 4), filled body by body, the kind of each last.
 
-    Behind the kind: of planes how many they are, of a mesh whether it is closed; an address, of planes (k, 4), of a
-    ball (7,) its centre in the world, double-doubles, and radius, of a mesh its `MESH_WORDS`; and that of the body's
-    frame (`_frame_of`), 0 for none.
+    | column | meaning |
+    |---|---|
+    | kind | `BodyKind` |
+    | number | planes: how many; mesh: whether it is closed |
+    | address | planes: (k, 4); ball: (7,) centre in the world as double-doubles, radius; mesh: `MESH_WORDS` |
+    | frame | address of `_frame_of`, 0 for none |
 
-    like: the table of bodies that these are some of, which share what stands there of solids.
+    like: the table of which these bodies are a subset, sharing the data of solids.
     """
 
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None], like: Table | None = None) -> None:
         self._solids, self._poses = solids, poses
         self.rows: IntArray = unready(len(solids))
-        self._kept: dict[int, Any] = {} if like is None else like._kept
+        self._cached: dict[int, Any] = {} if like is None else like._cached
         """By the id of a solid what rows name by its address."""
         self._own: list[Any] = []
         """The same, of one body."""
 
     def prepare(self, body: int, wanted: int) -> None:
-        """Make ready what kernels want of a body. Caller holds the lock of the bodies."""
+        """Prepare the kernel inputs for one body. Caller holds the lock of the bodies."""
         solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)
             addresses, sizes, places = tree_line(tree_of(solid))
-            words = self._kept[id(solid)]
+            words = self._cached[id(solid)]
             words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
             words[TREE + 1 : TREE + 5] = addresses[1:]
-            words[TREE] = addresses[0]  # order: last, kernels of other threads look at it
+            words[TREE] = addresses[0]  # order: last, kernels of other threads read it
         elif self.rows[body, 0] == BodyKind.UNREADY:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 
     def _fill(self, row: IntArray, solid: Any, pose: Pose | None) -> int:
-        """Fill the row of a body, but for its kind; return that, OTHER where no kernel takes its type, or numbers."""
+        """Fill the row of a body, except its kind, and return that; OTHER if no kernel takes its type, or numbers."""
         kind = row_of(solid).kind
         if kind == BodyKind.BALL:
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
@@ -73,26 +76,26 @@ class Table:
             self._own.append(frame)
             row[3] = frame.ctypes.data
         if kind in (BodyKind.ROWS, BodyKind.BOX):
-            planes = self._kept.setdefault(id(solid), rows_in_space(rows_of(solid)))
+            planes = self._cached.setdefault(id(solid), rows_in_space(rows_of(solid)))
             row[1], row[2] = len(planes), planes.ctypes.data
             return BodyKind.ROWS if _are_safe(planes.ravel().tolist()) else BodyKind.OTHER
         if kind == BodyKind.MESH:
-            words = self._kept.get(id(solid))
-            words = self._kept.setdefault(id(solid), _words_of(solid)) if words is None else words
+            words = self._cached.get(id(solid))
+            words = self._cached.setdefault(id(solid), _words_of(solid)) if words is None else words
             row[1], row[2] = isinstance(solid, Polyhedron), words.ctypes.data
             return BodyKind.MESH
         return BodyKind.OTHER
 
 
 def unready(n: int) -> IntArray:
-    """Return what says of n bodies that none is prepared."""
+    """Return the empty prepared-state table for n bodies."""
     rows = np.zeros((n, 4), np.int64)
     rows[:, 0] = BodyKind.UNREADY
     return rows
 
 
 def _words_of(solid: Any) -> IntArray:
-    """Return what kernels read of a mesh, without the tree that points are located by."""
+    """Return the numbers that kernels read of a mesh, without its location tree."""
     mesh: Any = boundary_of(solid)
     low, high, _ = own_box(solid)
     words = np.zeros(MESH_WORDS, np.int64)
@@ -103,8 +106,10 @@ def _words_of(solid: Any) -> IntArray:
 
 
 def _frame_of(pose: Pose) -> FloatArray | None:
-    """Return the frame of a pose, None where kernels do not take its numbers: a row (7,) of each axis, of R^-1 as
-    double-doubles and of the shift; those of the plane with z = z."""
+    """Return the frame of a pose: a row (7,) for each axis, of R^-1 as double-doubles and of the shift.
+
+    None if kernels do not take its numbers. Poses of the plane map z to z.
+    """
     entries, below = exact_inverse(pose)
     n, frame = pose.dimension, np.zeros((3, 7))
     frame[2, 4] = 1.0

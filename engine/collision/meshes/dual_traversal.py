@@ -1,10 +1,10 @@
-"""All pairs of faces of two placed bodies that have a common point, or the first pair that settles the question.
+"""Dual traversal: all pairs of faces of two placed bodies that have a common point, or the first pair that decides.
 
-Two trees are descended together: a pair of nodes is replaced by those pairs of their children whose boxes
-(`box_lanes.meeting`) and discs (`lanes/boxes.py`) may meet, two blocks of faces by the pairs of faces that neither
-boxes nor planes part (`lanes/faces.py`); those are classified by signs. All of these are conservative under a pose, so
-no contact is missed. Pairs beyond the room for them are counted: who wants them makes that much room and asks again,
-and of the faces that meet in a common corner only (`contact_kinds.py`) gets no more than say all.
+The two trees are descended together: a pair of nodes is replaced by the pairs of children whose boxes
+(`lanes/boxes.py`) and discs may intersect; two blocks of faces by the pairs of faces that neither
+boxes nor planes separate (`lanes/faces.py`), which are classified by signs. All tests are conservative under a pose, so
+no contact is missed. Pairs beyond the room are counted; the caller enlarges the room and searches again. Of the faces
+with a common corner only (`contact_kinds.py`) just enough pairs are listed to know every face in contact.
 
 Source: S. Gottschalk, M. Lin, D. Manocha, OBBTree: a hierarchical structure for rapid interference detection, 1996.
 """
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.bounding.bvh import MAX_DEPTH
-from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, keep_first
+from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, insert_sorted
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
 from engine.collision.meshes.parity import proves_overlap, state_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
@@ -35,36 +35,46 @@ SEEK_PIERCING_BY_FIRST = 1
 SEEK_PIERCING_BY_SECOND = 2
 SEEK_CONTACT = 3
 PIERCING = SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
-"""What ends a search early: a crossing that proves overlapping interiors; one that proves that the first (second) body,
-a surface, passes through the interior of the other; any contact at all."""
+"""Goals that end a search early: a crossing that proves overlapping interiors; one that proves that the first (second)
+body, a surface, passes through the interior of the other; any contact."""
 
 DONE, SETTLED, FULL, INTERRUPTED = range(4)
-"""How a search ended: all pairs seen; the pair at row 0 settles the question; too many for the room; by the flag."""
+"""| outcome | meaning |
+|---|---|
+| DONE | all pairs seen |
+| SETTLED | the pair in row 0 decides the query |
+| FULL | more pairs than room |
+| INTERRUPTED | the flag was set |
+"""
 LEAST_LOOK = 4096
-"""So many pairs are counted, however little room there is: a later one may settle the question."""
+"""Number of pairs counted even if the room is smaller: a later one may decide the query."""
 
 STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH
-"""A pair of nodes is replaced by at most 64, one of the two nodes a level deeper: bound of what is waiting."""
+"""Bound on pairs of nodes waiting: a pair is replaced by at most 64, one of the two nodes a level deeper."""
 
 
 Descent = namedtuple("Descent", "stack frames work poses signs")
 """Work space of a search.
 
-stack (STACK_ROWS, 2) int32: pairs of nodes waiting. frames (2, 22, 8) float32: see `lanes/boxes.py`. work (28, 8)
-float32: of `lanes/boxes.py` and `lanes/faces.py`, for one pair of nodes. poses (2, 12) float64: rotation and
-translation of either body, for exact signs. signs (11,) int8: of `contact_kinds.py`.
+| field | shape | meaning |
+|---|---|---|
+| stack | (STACK_ROWS, 2) int32 | pairs of nodes waiting |
+| frames | (2, 22, 8) float32 | see `lanes/boxes.py` |
+| work | (28, 8) float32 | of `lanes/boxes.py` and `lanes/faces.py`, for one pair of nodes |
+| poses | (2, 12) float64 | rotation and translation of either body, for exact signs |
+| signs | (11,) int8 | of `contact_kinds.py` |
 """
 
-Found = namedtuple("Found", "pairs kinds met")
-"""Room for pairs of faces that are not apart: pairs (room, 2) and their classes kinds (room,), room >= 1.
+Contacts = namedtuple("Contacts", "pairs kinds met")
+"""Room for pairs of faces in contact: pairs (room, 2), their classes kinds (room,), room >= 1.
 
-met: empty, or of all faces of the first, then of the second, whether a listed pair has them. Then
-`contact_kinds.py` chooses, and there are N_NAMED rows more.
+met: empty, or for all faces of the first, then of the second body, whether a listed pair has it. Then
+`contact_kinds.py` selects the pairs, and there are N_NAMED rows more.
 """
 
 
 class Place(NamedTuple):
-    """Where the two bodies are: rounded placements (`place_pair`), are they posed, and the error of exact signs."""
+    """Placements of two bodies: rounded (`place_pair`), whether they are posed, and the error of exact signs."""
 
     a: Placement
     b: Placement
@@ -73,38 +83,38 @@ class Place(NamedTuple):
 
 
 class Search(NamedTuple):
-    """One question to two bodies: where they are, what ends it early (SEEK_...), and where its answer goes."""
+    """One query about two bodies: placements, the goal that ends it early (SEEK_...), and the room for its contacts."""
 
     first: MeshArrays
     second: MeshArrays
     place: Place
     descent: Descent
     seek: int
-    found: Found
+    contacts: Contacts
     flag: FlagArray
 
 
 def new_descent() -> Descent:
-    """Return work space for one search at a time."""
+    """Return the work space of one search."""
     frames, work = np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((WORK_ROWS, LANES), np.float32)
     return Descent(np.empty((STACK_ROWS, 2), np.int32), frames, work, np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8))
 
 
-def new_found(room: int, n_faces: int = 0) -> Found:
-    """Return room for pairs; n_faces: of both bodies, where of common corners those are listed that say all."""
+def new_contacts(room: int, n_faces: int = 0) -> Contacts:
+    """Return room for pairs of faces; n_faces: the faces of both bodies if pairs with common corners are selected."""
     n = room + (N_NAMED if n_faces else 0)
-    return Found(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
+    return Contacts(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
 
 
 @inline
-def room_of(found: Found) -> int:
-    """Return how many pairs there is room for."""
-    return len(found.kinds) - (N_NAMED if len(found.met) > 0 else 0)
+def capacity_of(contacts: Contacts) -> int:
+    """Return the number of pairs that fit."""
+    return len(contacts.kinds) - (N_NAMED if len(contacts.met) > 0 else 0)
 
 
 @inline
 def store_pose(poses: FloatArray, row: int, pose: PoseArrays, item: int) -> None:
-    """Write one pose as exact signs take it: rotation by rows, then translation."""
+    """Write a pose for exact signs: rotation by rows, then translation."""
     for i in range(3):
         for k in range(3):
             poses[row, 3 * i + k] = pose.rotations[item, i, k]
@@ -116,7 +126,7 @@ def place_bodies(
     first: MeshArrays, first_pose: PoseArrays, first_item: int, second: MeshArrays, second_pose: PoseArrays,
     second_item: int, descent: Descent,
 ) -> tuple[Place, bool]:  # fmt: skip
-    """Place two bodies and fill the frames and poses of a search; tell whether they are surely apart."""
+    """Place two bodies and fill the frames and poses of a search; return whether they are provably disjoint."""
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
     is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
@@ -139,42 +149,42 @@ def placed_triangle(t: Facet, place: Placement) -> Facet:
 
 
 @inline
-def before_poses(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
-    """Return a face of either body before its pose."""
+def unposed_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
+    """Return a face of each body in its own coordinates."""
     own = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
     return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
 
 
 @inline
 def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
-    """Return two faces for exact signs, before their poses unless placing is exact, and an axis of each."""
+    """Return two faces for exact signs, unposed unless placing is exact, and an axis of each."""
     axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
     if s.place.error == 0.0:
         t, u = placed_triangle(triangle_of(s.first, i), s.place.a), placed_triangle(triangle_of(s.second, j), s.place.b)
         return with_pose(t), with_pose(u), axis_at(axis, s.place.a), axis_at(their_axis, s.place.b)
-    t, u = before_poses(s, i, j)
+    t, u = unposed_faces(s, i, j)
     return t, u, axis, their_axis
 
 
 @inline
 def exact_error(s: Search) -> float:
-    """Return the error of the points of `exact_faces`, as the filter of exact signs takes it."""
+    """Return the error of the points of `exact_faces`, for the filter of exact signs."""
     return 0.0 if s.place.error == 0.0 else s.place.posed_error
 
 
 @merged
 def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
-    """Return the class of two faces, placed t and u, that surely meet in a common corner only; else UNDECIDED."""
+    """Return the class of two faces, placed t and u, that provably share one corner only; else UNDECIDED."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
-    own, their = before_poses(s, i, j)
+    own, their = unposed_faces(s, i, j)
     common = common_corner(s.descent.poses, t, u, own, their, s.place.error)
     return CORNER + common if common >= 0 else UNDECIDED
 
 
 @merged
 def settle_class(s: Search, i: int, j: int) -> int:
-    """Return the class of two faces that is left open; UNDECIDED without area, or out of range."""
+    """Return the class of two faces left open by the filter; UNDECIDED without area, or out of range."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their, axis, _ = exact_faces(s, i, j)
@@ -182,8 +192,8 @@ def settle_class(s: Search, i: int, j: int) -> int:
 
 
 @merged
-def settles(s: Search, kind: int, i: int, j: int) -> bool:
-    """Tell whether a contact of class `kind` answers what is sought."""
+def is_decisive(s: Search, kind: int, i: int, j: int) -> bool:
+    """Return whether a contact of class `kind` answers the query."""
     if s.seek == SEEK_CONTACT:
         return True
     if kind != CROSSING:
@@ -196,8 +206,8 @@ def settles(s: Search, kind: int, i: int, j: int) -> bool:
 
 
 @merged
-def take_bit(low: int, high: int) -> tuple[int, int, int]:
-    """Return the number of the lowest of 64 bits, given as two halves that are not both 0, and the halves without."""
+def pop_lowest_bit(low: int, high: int) -> tuple[int, int, int]:
+    """Return the index of the lowest set bit of 64, given as two halves not both 0, and the halves without it."""
     if low != 0:
         return lowest_bit(low), low & (low - 1), high
     return 32 + lowest_bit(high), low, high & (high - 1)
@@ -205,14 +215,14 @@ def take_bit(low: int, high: int) -> tuple[int, int, int]:
 
 @merged
 def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int]:
-    """Classify the pairs of faces of blocks i and j that the bits low and high name; write those that are not apart.
+    """Classify the pairs of faces of blocks i and j selected by the bits low and high; write those in contact.
 
-    Returns DONE, or what ended it early; the number of pairs found.
+    Returns DONE or the early outcome, and the number of pairs.
     """
-    pairs, kinds, met = s.found
-    room = room_of(s.found)
+    pairs, kinds, met = s.contacts
+    room = capacity_of(s.contacts)
     while low != 0 or high != 0:  # bound: each turn takes a bit
-        bit, low, high = take_bit(low, high)
+        bit, low, high = pop_lowest_bit(low, high)
         i_face, j_face = -1 - int(s.first.child[i, bit >> 3]), -1 - int(s.second.child[j, bit & 7])
         t = placed_triangle(triangle_of(s.first, i_face), s.place.a)
         u = placed_triangle(triangle_of(s.second, j_face), s.place.b)
@@ -224,14 +234,14 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
         if kind == UNDECIDED:
             kind = settle_class(s, i_face, j_face)
         if kind >= CORNER and len(met) > 0:
-            i_face, j_face, kind = keep_first(s.first.faces, s.second.faces, pairs, kinds, i_face, j_face, kind)
+            i_face, j_face, kind = insert_sorted(s.first.faces, s.second.faces, pairs, kinds, i_face, j_face, kind)
             n_first = len(s.first.faces)
             if i_face < 0 or (met[i_face] and met[n_first + j_face]):
                 continue
             met[i_face] = met[n_first + j_face] = True
         if kind == APART:
             continue
-        if kind != UNDECIDED and settles(s, kind, i_face, j_face):
+        if kind != UNDECIDED and is_decisive(s, kind, i_face, j_face):
             pairs[0, 0], pairs[0, 1], kinds[0] = i_face, j_face, kind
             return SETTLED, 1
         if n_pairs < room:
@@ -245,10 +255,10 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
 
 
 @merged
-def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]:
-    """Put the pairs of children of nodes i and j that may meet in their place on the stack; of two blocks, nothing.
+def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]:
+    """Replace nodes i and j on the stack by the pairs of children that may intersect; push nothing for two blocks.
 
-    Returns the height of the stack, and of two blocks the bits of their pairs of faces that may meet.
+    Returns the height of the stack, and for two blocks the bits of their pairs of faces that may intersect.
     """
     stack, frames, work, _, _ = s.descent
     child, their_child = s.first.child, s.second.child
@@ -273,7 +283,7 @@ def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int
         scales = (s.first.scale, s.second.scale)
         low, high = discs_meeting(low, high, s.first.discs, i, s.second.discs, j, frames, scales, work)
         while low != 0 or high != 0:
-            bit, low, high = take_bit(low, high)
+            bit, low, high = pop_lowest_bit(low, high)
             stack[n_stack, 0], stack[n_stack, 1] = child[i, bit >> 3], their_child[j, bit & 7]
             n_stack += 1
     return n_stack, 0, 0
@@ -281,7 +291,7 @@ def replace_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int
 
 @merged
 def search(s: Search) -> tuple[int, int]:
-    """Write the pairs of faces not apart, a settling one to row 0; return how the search ended, and their number."""
+    """Write the pairs of faces in contact, a decisive one to row 0; return the outcome and the number of pairs."""
     stack = s.descent.stack
     stack[0, 0], stack[0, 1] = 0, 0
     n_stack, n_pairs = 1, 0
@@ -290,16 +300,16 @@ def search(s: Search) -> tuple[int, int]:
             return INTERRUPTED, n_pairs
         n_stack -= 1
         i, j = int(stack[n_stack, 0]), int(stack[n_stack, 1])
-        n_stack, low, high = replace_pair(s, i, j, n_stack)
+        n_stack, low, high = expand_pair(s, i, j, n_stack)
         if low != 0 or high != 0:
             how, n_pairs = classify_faces(s, i, j, low, high, n_pairs)
             if how != DONE:
                 return how, n_pairs
-    pairs, kinds, _ = s.found
-    room = room_of(s.found)
-    for kept in range(room, kinds.shape[0]):  # what `contact_kinds.py` keeps
-        if pairs[kept, 0] >= 0:
+    pairs, kinds, _ = s.contacts
+    room = capacity_of(s.contacts)
+    for row in range(room, kinds.shape[0]):  # the pairs that name the witness
+        if pairs[row, 0] >= 0:
             if n_pairs < room:
-                pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = pairs[kept, 0], pairs[kept, 1], kinds[kept]
+                pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = pairs[row, 0], pairs[row, 1], kinds[row]
             n_pairs += 1
     return DONE, n_pairs

@@ -1,14 +1,14 @@
-"""The exact posed coordinates of a body, as Python integers over one power of two. Computed per vertex, when asked for.
+"""Exact posed coordinates of a body, as integers over one power of two, computed per vertex on demand.
 
-A posed coordinate is a sum of products of doubles, so a whole pair of bodies fits on one lattice of spacing 2^-shift.
-Signs of determinants of such integers are exact, need no fractions, and cost a few microseconds.
+A posed coordinate is a sum of products of doubles, so a pair of bodies fits on one lattice of spacing 2^-shift. Signs
+of determinants of such integers are exact, need no fractions, and cost a few microseconds.
 
-Two faces on these: their class, whatever their shape, and the kind of their contact. Slow and complete: settles what
-the kernel leaves UNDECIDED (posed faces near contact, faces without area, exponents out of range) and names the kind of
-a witness. A face without area is its longest segment, or a point. Corners, edges and faces are simplices, and one
-question serves all: have two of them a common point, of their relative interiors or at all? They have if weights of the
-corners of one and of the other, positive or not negative, give one point. All weights that do, of equal sums, form a
-space of at most five dimensions, and Fourier and Motzkin tell whether some of its points have the signs wanted.
+Two faces on these: their class, for any shape, and the kind of their contact. Slow and complete: it settles what the
+kernel leaves UNDECIDED (posed faces near contact, faces without area, exponents out of range). A face without area is
+its longest segment, or a point. Corners, edges and faces are simplices, and one predicate serves all: do two of them,
+or their relative interiors, have a common point? They do if some weights of the corners, positive or not negative, give
+the same point of both. These weights, of equal sums, form a space of at most five dimensions, and Fourier-Motzkin
+elimination decides whether one of its points has the required signs.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ def plane_through(corners: Corners) -> Plane:
 
 
 def on_lattice(value: float, shift: int) -> int:
-    """Return value * 2^shift, which the caller knows to be an integer."""
+    """Return value * 2^shift, an integer by guarantee of the caller."""
     numerator, denominator = value.as_integer_ratio()
     return (numerator << shift) // denominator
 
 
 class ExactBody:
-    """One placed body on the lattice of a pair."""
+    """A placed body on the lattice of a pair."""
 
     def __init__(self, mesh: MeshBody, pose: Pose | None, shift: int) -> None:
         self.mesh = mesh
@@ -69,16 +69,16 @@ class ExactBody:
 
     def vertex(self, index: int) -> Vector:
         """Return the exact placed vertex."""
-        found = self._vertices.get(index)
-        if found is None:
+        point = self._vertices.get(index)
+        if point is None:
             p = self.mesh.arrays.vertices[index].tolist()
             if self._rotation is None:
-                found = tuple(on_lattice(value, self.shift) for value in p)
+                point = tuple(on_lattice(value, self.shift) for value in p)
             else:
                 q = [on_lattice(value, self.shift - self._r_shift) for value in p]
-                found = tuple(dot(row, q) + t for row, t in zip(self._rotation, self._translation))
-            self._vertices[index] = found
-        return found
+                point = tuple(dot(row, q) + t for row, t in zip(self._rotation, self._translation))
+            self._vertices[index] = point
+        return point
 
     def corners(self, face: int) -> Corners:
         """Return the three exact corners of a triangle."""
@@ -87,39 +87,39 @@ class ExactBody:
 
     def plane(self, face: int) -> Plane:
         """Return the exact plane of a triangle."""
-        found = self._planes.get(face)
-        if found is None:
-            found = self._planes[face] = plane_through(self.corners(face))
-        return found
+        cached = self._planes.get(face)
+        if cached is None:
+            cached = self._planes[face] = plane_through(self.corners(face))
+        return cached
 
     def axis(self, face: int) -> int:
-        """Return the axis on which a triangle's normal is largest, -1 if it has no area."""
+        """Return the axis of the largest component of a triangle's normal, -1 without area."""
         return largest_axis(self.plane(face)[:3])
 
     def faces_in(self, low: list[float], high: list[float]) -> list[int]:
-        """Return, ascending, at least the triangles that meet the closed box; bounds may be infinite."""
+        """Return, ascending, a superset of the triangles that meet a closed box; bounds may be infinite."""
         faces: list[int] = faces_in(self.mesh.arrays, self.pose, low, high).tolist()
         return faces
 
     def at(self, point: Sequence[Fraction]) -> tuple[int, ...]:
-        """Return any point as x, y, z, w on the lattice."""
+        """Return a point as x, y, z, w on the lattice."""
         w = math.lcm(*(x.denominator for x in point))
         x, y, z = (int(x * w) << self.shift for x in point)
         return x, y, z, w
 
 
 def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[float]) -> IntArray:
-    """Return, ascending, at least the triangles of a placed mesh that meet a closed box; bounds may be infinite."""
-    box, found = np.array([*low, *high]), np.empty(256, np.int64)
-    n_found = entry_of(_faces_in_box)(arrays, pose, box, found)
-    if n_found > len(found):
-        found = np.empty(n_found, np.int64)
-        entry_of(_faces_in_box)(arrays, pose, box, found)
-    return np.asarray(np.sort(found[:n_found]), np.int64)
+    """Return, ascending, a superset of the triangles of a placed mesh that meet a closed box, which may be infinite."""
+    box, hits = np.array([*low, *high]), np.empty(256, np.int64)
+    n_hits = entry_of(_faces_in_box)(arrays, pose, box, hits)
+    if n_hits > len(hits):
+        hits = np.empty(n_hits, np.int64)
+        entry_of(_faces_in_box)(arrays, pose, box, hits)
+    return np.asarray(np.sort(hits[:n_hits]), np.int64)
 
 
 def exact_pair(first: MeshBody, second: MeshBody, poses: Poses, shift: int = 0) -> tuple[ExactBody, ExactBody]:
-    """Return both bodies on one lattice, of spacing 2^-shift at most."""
+    """Return both bodies on one lattice of spacing at most 2^-shift."""
     for mesh, pose in zip((first, second), poses):
         own = mesh.shift
         if pose is not None:
@@ -129,14 +129,14 @@ def exact_pair(first: MeshBody, second: MeshBody, poses: Poses, shift: int = 0) 
 
 
 def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
-    """Return doubles around a rational, infinite where it is beyond them."""
+    """Return doubles on both sides of a rational, infinite beyond their range."""
     value = rounded_quotient(numerator, denominator)
     return float(np.nextafter(value, -np.inf)), float(np.nextafter(value, np.inf))
 
 
 @inline
 def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: FloatArray) -> bool:
-    """Tell whether a placed child box surely has no common point with bounds (6,); NaN is never apart."""
+    """Return whether a placed child box provably misses bounds (6,); a NaN proves nothing."""
     r, t = pose.rotations[0], pose.translations[0]
     for i in range(3):
         centre, half = t[i], margin
@@ -149,14 +149,14 @@ def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, mar
 
 
 @allocating_kernel
-def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: FloatArray, found: IntArray) -> int:
-    """Write the triangles whose placed boxes may meet bounds (6,) into found (room,); return their number."""
+def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: FloatArray, hits: IntArray) -> int:
+    """Write the triangles whose placed boxes may meet bounds (6,) to hits (room,); return their number."""
     t = pose.translations[0]
     shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
     margin = 2.0**-47 * (3.0 * mesh.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
     stack = np.empty(STACK, np.int32)
     stack[0] = 0
-    n_stack, n_found = 1, 0
+    n_stack, n_hits = 1, 0
     while n_stack > 0:  # bound: each node enters once
         n_stack -= 1
         node = int(stack[n_stack])
@@ -168,10 +168,10 @@ def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: FloatArray, found:
                 stack[n_stack] = child
                 n_stack += 1
                 continue
-            if n_found < found.shape[0]:
-                found[n_found] = -1 - child
-            n_found += 1
-    return n_found
+            if n_hits < hits.shape[0]:
+                hits[n_hits] = -1 - child
+            n_hits += 1
+    return n_hits
 
 
 Flat = tuple[int, int]
@@ -182,13 +182,13 @@ def value_at(plane: Plane, p: Vector) -> int:
     return plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3]
 
 
-def without_axis(p: Vector, axis: int) -> Flat:
+def drop_axis(p: Vector, axis: int) -> Flat:
     """Return the two other coordinates in cyclic order."""
     return p[(axis + 1) % 3], p[(axis + 2) % 3]
 
 
 def as_simplex(t: Corners) -> tuple[Vector, ...]:
-    """Return the three corners, or the two ends of a face without area, or its one point."""
+    """Return the three corners of a face; without area the two ends of its segment, or its one point."""
     p, q, r = t
     if any(cross(minus(q, p), minus(r, p))):
         return t
@@ -196,8 +196,8 @@ def as_simplex(t: Corners) -> tuple[Vector, ...]:
     return ends if ends[0] != ends[1] else ends[:1]
 
 
-def _weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector]:
-    """Return for each corner of s, then of t, its weights in a basis of all that give both simplices the same point."""
+def _common_weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector]:
+    """Return the weights of the corners of s, then of t, in a basis of all weights that give the same point of both."""
     origin, n = s[0], len(s) - 1  # its own weight is what the others of s lack
     vectors = [*(minus(p, origin) for p in s[1:]), *(minus(origin, p) for p in t)]
     rows = [(*vector, *(int(k == i) for k in range(len(vectors)))) for i, vector in enumerate(vectors)]
@@ -210,8 +210,8 @@ def _weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector]:
     return list(zip(*((sum(row[3 + n :]) - sum(row[3 : 3 + n]), *row[3:]) for row in rows)))
 
 
-def _has_point(positive: list[Vector], not_negative: list[Vector]) -> bool:
-    """Tell whether at some z all of some linear functions are positive, and none of some others negative."""
+def _is_feasible(positive: list[Vector], not_negative: list[Vector]) -> bool:
+    """Return whether some z makes all `positive` linear functions positive and all `not_negative` ones not negative."""
     n = len(positive[0])
     rows = {(*row, True) for row in positive} | {(*row, False) for row in not_negative}
     for k in range(n):  # of rows that grow and fall with z[k], a sum without it
@@ -221,15 +221,15 @@ def _has_point(positive: list[Vector], not_negative: list[Vector]) -> bool:
     return not any(row[n] for row in rows)  # 0 > 0
 
 
-def _meet(s: tuple[Vector, ...], t: tuple[Vector, ...], *, within: bool) -> bool:
-    """Tell whether two simplices have a common point, within: one that lies in the relative interior of both."""
-    weights = _weights(s, t)
+def _simplices_intersect(s: tuple[Vector, ...], t: tuple[Vector, ...], *, within: bool) -> bool:
+    """Return whether two simplices have a common point, and whether their relative interiors have one."""
+    weights = _common_weights(s, t)
     if not weights:
         return False
     if len(weights[0]) == 1:  # order: nearly always
         signs = {sign_of(weight) for (weight,) in weights}
         return len(signs) == 1 if within else len(signs - {0}) == 1
-    return _has_point(weights, []) if within else _has_point([tuple(map(sum, zip(*weights[: len(s)])))], weights)
+    return _is_feasible(weights, []) if within else _is_feasible([tuple(map(sum, zip(*weights[: len(s)])))], weights)
 
 
 def classify_exact(t1: Corners, t2: Corners) -> int:
@@ -237,22 +237,22 @@ def classify_exact(t1: Corners, t2: Corners) -> int:
     plane1, plane2 = plane_through(t1), plane_through(t2)
     sides1, sides2 = [sign_of(value_at(plane2, p)) for p in t1], [sign_of(value_at(plane1, p)) for p in t2]
     s1, s2 = as_simplex(t1), as_simplex(t2)
-    if abs(sum(sides1)) == 3 or abs(sum(sides2)) == 3 or not _meet(s1, s2, within=False):
+    if abs(sum(sides1)) == 3 or abs(sum(sides2)) == 3 or not _simplices_intersect(s1, s2, within=False):
         return APART
     if len(s1) < 3 or len(s2) < 3:
         return CONTACT
     if not any(sides2):
         return COPLANAR
     both_straddle = {1, -1} <= set(sides1) and {1, -1} <= set(sides2)
-    return CROSSING if both_straddle and _meet(s1, s2, within=True) else CONTACT
+    return CROSSING if both_straddle and _simplices_intersect(s1, s2, within=True) else CONTACT
 
 
 def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
-    """Return the kind of the contact of two faces that meet: the one of highest dimension."""
+    """Return the kind of the contact of two faces that meet: the one of the highest dimension."""
     first, second = _features(as_simplex(t1)), _features(as_simplex(t2))
 
     def meet(d: int, e: int) -> bool:
-        return any(_meet(f, g, within=True) for f in first[d] for g in second[e])
+        return any(_simplices_intersect(f, g, within=True) for f in first[d] for g in second[e])
 
     if meet(2, 2) and not any(value_at(plane_through(t1), p) for p in t2):
         return "face_face"

@@ -1,14 +1,14 @@
-"""What lies on either side of a face, region by region: the exact answer where contacts alone prove nothing.
+"""Exact fallback where contacts alone prove nothing: the status of both bodies on either side of each region of a face.
 
 The faces of both bodies cut a face T into regions. Within a region, each body is inside or outside just above T, and
-just below. One point per region, with rational coordinates, and the line through it along the axis on which T's normal
-is largest, tell all: crossings strictly above the point give the status above T; faces that hold the point lie in T's
-plane there, and each changes the status on the way through.
+just below. One point per region, with rational coordinates, and the line through it along the axis of T's largest
+normal component decide both: crossings strictly above the point give the status above T; faces that contain the point
+lie in T's plane there, and each flips the status.
 
-Regions are sampled by slabs: between two neighbouring abscissas of end points and crossings of the traces no two traces
-cross, so one point between each two neighbours on the middle of every slab meets every region with an interior. The
-line is moved by (eps, eps^2) across itself (ties.py), so that it meets no edge; its plane tells whether a face holds
-the point.
+Regions are sampled by slabs: between neighbouring abscissas of end points and crossings of the traces no two traces
+cross, so one point between neighbours on the middle of every slab reaches every region with an interior. The line is
+moved by (eps, eps^2) across itself (orientation.py), so that it meets no edge; its plane decides whether a face
+contains the point.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from engine.collision.meshes.exact_body import (
     ExactBody,
     Plane,
     Vector,
+    drop_axis,
     rounded_outward,
     value_at,
-    without_axis,
 )
 from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import cross, dot, minus, sign_of
@@ -52,15 +52,15 @@ class Sides(NamedTuple):
 
 
 def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
-    """Return the status of `body` along `axis` at q; a face that holds q must not contain that axis."""
+    """Return the status of `body` along `axis` at q; a face that contains q must not contain that axis."""
     sides = sides_over(body, q, axis, None)
     assert sides is not None
     return sides
 
 
 def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
-    """Return the status of `body` along `axis` at q, a point of `plane`; None where a face that holds q and is not
-    parallel to that plane leaves it open (it is not looked at where `plane` is None)."""
+    """Return the status of `body` along `axis` at q, a point of `plane`; None if a face through q that is not parallel
+    to that plane leaves it open (not tested if `plane` is None)."""
     if not body.mesh.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
@@ -74,7 +74,7 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
         if slope == 0:  # case: a face along the line, or without area
             continue
         corners = body.corners(face)
-        if not _moved_line_meets(corners, j, k, x, y, w):
+        if not _perturbed_line_hits(corners, j, k, x, y, w):
             continue
         height = other[0] * q[0] + other[1] * q[1] + other[2] * q[2] + other[3] * w
         if height == 0:
@@ -87,33 +87,34 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
-    """Return the side of a clean face, 1 that of its normal or -1, of its body, 0 for unknown; kept with the mesh."""
-    kept, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
-    if kept[face] not in (1, -1):
+    """Return the side of a clean face on which its body lies: 1 that of its normal, or -1; 0 if unknown. Cached in the
+    mesh."""
+    cached, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
+    if cached[face] not in (1, -1):
         for q in points_within(body.corners(face)):
             sides = sides_over(body, q, axis, plane)
             if sides is not None:
-                kept[face] = 1 if sides.above == (plane[axis] > 0) else -1
-                return int(kept[face])
+                cached[face] = 1 if sides.above == (plane[axis] > 0) else -1
+                return int(cached[face])
         return 0
-    return int(kept[face])
+    return int(cached[face])
 
 
 def points_within(corners: Corners) -> Iterator[Homogeneous]:
-    """Yield a few points within a face."""
+    """Yield a few points in the relative interior of a face."""
     for weights in WITHIN:
         x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
         yield x, y, z, sum(weights)
 
 
 def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
-    """Return the ends of a box of doubles around points on one denominator."""
+    """Return the ends of a box of doubles around points over one denominator."""
     scale, sides = points[0][3] << body.shift, list(zip(*points))[:3]
     return [rounded_outward(min(x), scale)[0] for x in sides], [rounded_outward(max(x), scale)[1] for x in sides]
 
 
-def _moved_line_meets(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
-    """Tell whether the line over (x, y) / w, moved by (eps, eps^2), passes through a face that is not upright."""
+def _perturbed_line_hits(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
+    """Return whether the line over (x, y) / w, moved by (eps, eps^2), passes through a face that is not upright."""
     before = 0
     for index in range(3):
         a, b = corners[index], corners[(index + 1) % 3]
@@ -133,24 +134,24 @@ def regions_of(
 ) -> Iterator[Homogeneous]:
     """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace.
 
-    only: a side of the face's plane and the faces that meet the face, where what lies on that side is all that counts.
+    only: a side of the face's plane and the faces that meet the face; restricts the cutters to that side.
     """
     traces = _traces(body, face, cutters, budget, only)
     if not traces:
         yield next(points_within(body.corners(face)))
-    for (x, y), _ in _samples(body, face, traces, budget) if traces else ():
-        yield _lifted(x, y, body.plane(face), body.axis(face))
+    for (x, y), _ in _sample_regions(body, face, traces, budget) if traces else ():
+        yield _lift_to_plane(x, y, body.plane(face), body.axis(face))
 
 
 def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
-    """Yield a point within, and the corners, of each convex cell between the traces of its body's faces."""
+    """Yield an interior point and the corners of each convex cell between the traces of the body's own faces."""
     plane, axis = body.plane(face), body.axis(face)
-    for (x, y), (x0, x1, low, high) in _samples(body, face, _traces(body, face, [body], budget, None), budget):
+    for (x, y), (x0, x1, low, high) in _sample_regions(body, face, _traces(body, face, [body], budget, None), budget):
         corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
-        yield _lifted(x, y, plane, axis), [_lifted(*corner, plane, axis) for corner in corners]
+        yield _lift_to_plane(x, y, plane, axis), [_lift_to_plane(*corner, plane, axis) for corner in corners]
 
 
-def _lifted(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
+def _lift_to_plane(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
     """Return the point of the plane over (x, y)."""
     j, k, n = (axis + 1) % 3, (axis + 2) % 3, abs(plane[axis])
     w, sign = x.denominator * y.denominator, sign_of(plane[axis])
@@ -168,7 +169,7 @@ def _segment(p: Rational2, q: Rational2) -> Trace:
 def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None) -> list[Trace]:
     """Return the segments in which other faces meet the plane of a face, near the face, projected along its axis."""
     low, high = _around(body, [(*p, 1) for p in body.corners(face)])
-    found = set()
+    segments = set()
     for cutter in cutters:
         for other in cutter.faces_in(low, high) if only is None else only[1]:
             budget.check()
@@ -177,15 +178,15 @@ def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget
             points = cutter.corners(other)
             values = [value_at(body.plane(face), p) for p in points]
             if only is None or max(only[0] * value for value in values) > 0:
-                found |= {_segment(p, q) for p, q in _trace(points, values, body.axis(face)) if p != q}
-    return sorted(found)
+                segments |= {_segment(p, q) for p, q in _trace(points, values, body.axis(face)) if p != q}
+    return sorted(segments)
 
 
 def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
     """Return the segments in which a face meets the plane at which its corners have `values`."""
     if not any(values):
-        return [(without_axis(points[i], axis), without_axis(points[i - 2], axis)) for i in range(3)]
-    flat = [without_axis(p, axis) for p in points]
+        return [(drop_axis(points[i], axis), drop_axis(points[i - 2], axis)) for i in range(3)]
+    flat = [drop_axis(p, axis) for p in points]
     ends: list[Rational2] = [p for p, value in zip(flat, values) if value == 0]
     for i in range(3):
         (f, (x, y)), (g, (z, w)) = (values[i], flat[i]), (values[i - 2], flat[i - 2])
@@ -194,9 +195,11 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
     return [(ends[0], ends[1])] if len(ends) == 2 else []
 
 
-def _samples(body: ExactBody, face: int, traces: list[Trace], budget: Budget) -> Iterator[tuple[Rational2, _Cell]]:
-    """Yield a point in every region that `traces` cut from a face, projected along its axis, and the cell around it."""
-    corners = [without_axis(corner, body.axis(face)) for corner in body.corners(face)]
+def _sample_regions(
+    body: ExactBody, face: int, traces: list[Trace], budget: Budget
+) -> Iterator[tuple[Rational2, _Cell]]:
+    """Yield a point in every region that `traces` cut from a face, projected along its axis, and its cell."""
+    corners = [drop_axis(corner, body.axis(face)) for corner in body.corners(face)]
     own = [_segment(corners[i], corners[i - 2]) for i in range(3)]
     left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
     segments = [_on_line(s) for s in sorted({*own, *traces}) if s[0][0] <= right and s[1][0] >= left]
@@ -221,7 +224,7 @@ def _samples(body: ExactBody, face: int, traces: list[Trace], budget: Budget) ->
 
 
 class _Segment(NamedTuple):
-    """Left and right end, both again as integers (x, y, w), and the line a x + b y + c = 0 through them."""
+    """Left and right end, as integers (x, y, w), and the line a x + b y + c = 0 through them."""
 
     ends: Trace
     left: Vector
@@ -245,7 +248,7 @@ def _height(s: _Segment, x: Rational) -> Fraction:
 
 
 def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
-    """Return where two segments cross in a point that is an end of neither; None otherwise (ends are stops already)."""
+    """Return the abscissa where two segments cross in a point that is an end of neither, else None."""
     for one, other in ((s, t), (t, s)):
         if sign_of(dot(one.line, other.left)) * sign_of(dot(one.line, other.right)) >= 0:
             return None
@@ -256,7 +259,7 @@ def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
 def pieces_of_segment(
     body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
 ) -> Iterator[Homogeneous]:
-    """Yield a point in each piece that the faces of `cutter` cut from a segment; points of a face may be among them."""
+    """Yield a point in each piece that the faces of `cutter` cut from a segment; some may lie on a face."""
     p, q = ends
     low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}
@@ -275,7 +278,8 @@ def pieces_of_segment(
 
 
 def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:
-    """Yield a face's plane and those through its edges across it: a segment's status changes on one of them."""
+    """Yield the plane of a face and the planes through its edges across it: a segment changes its status on these
+    only."""
     plane = cutter.plane(face)
     if any(plane[:3]):
         yield plane

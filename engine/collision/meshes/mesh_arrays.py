@@ -1,7 +1,7 @@
-"""What collision sees of a body: triangles, their tree, and what is known of each face. Built once per solid, lazily.
+"""Collision mesh of a body: triangles, their tree, and the cached state of each face. Built once per solid, lazily.
 
-A polyhedron and a box are closed meshes under even-odd; a surface, and a box that is flat on some axis, have nothing
-inside. All arrays are in the body's own coordinates: poses are applied where a query runs.
+A polyhedron and a box are closed meshes under even-odd; a surface, and a box that is flat on some axis, have no inside.
+All arrays are in the body's own coordinates: poses are applied where a query runs.
 """
 
 from __future__ import annotations
@@ -31,18 +31,28 @@ from engine.types import BoolArray, Float32Array, FloatArray, Int8Array, Int32Ar
 
 NO_AREA = -1
 UNKNOWN_AXIS = -2
-"""Values in `axis` beside 0, 1, 2: no projection has an area; a predicate was undecided."""
+"""| value of `axis` | meaning |
+|---|---|
+| 0, 1, 2 | an axis along which the projection has an area |
+| NO_AREA | no projection has an area |
+| UNKNOWN_AXIS | a predicate was undecided |
+"""
 
 STATE_UNKNOWN = -1
 STATE_CLEAN = 0
 STATE_CROSSED = 1
 STATE_STACKED = 2
-"""Values in `state`: nothing computed yet; no other face of the body meets the relative interior in more than single
-points; some other face crosses it along a segment; some other face of the same plane covers part of it (or unsure)."""
+"""| value of `state` | meaning |
+|---|---|
+| STATE_UNKNOWN | not computed yet |
+| STATE_CLEAN | other faces of the body meet the relative interior in single points at most |
+| STATE_CROSSED | another face crosses it along a segment |
+| STATE_STACKED | another face of the same plane covers part of it (or this is unsure) |
+"""
 
 
 STILL = PoseArrays(read_only(np.eye(3)[None]), read_only(np.zeros((1, 3))), False)
-"""Of a body without a pose."""
+"""Pose of a body without a pose."""
 
 
 BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
@@ -56,7 +66,7 @@ MeshArrays = namedtuple(
     "has_inside",
 )
 """What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
-inner nodes (`lanes/boxes.py`) hold beside boxes, the rows of the other kind not set. `state` is filled by kernels as
+inner nodes (`lanes/boxes.py`) hold besides boxes, the rows of the other kind not set. `state` is filled by kernels as
 needed, and `inner`, on which side of a face its body lies (`parity.py`), 0 unknown: any thread writes the same values.
 components: of triangles connected through vertices, one each, ascending. faces: the caller's face of each triangle;
 first_face: the least in the first component. has_inside: False for surfaces and flat boxes."""
@@ -87,7 +97,7 @@ class MeshBody:
 
 
 def mesh_body_of(solid: Solid) -> MeshBody:
-    """Return the mesh of a polyhedron, surface or 3D box, built at the first call."""
+    """Return the cached mesh of a polyhedron, surface or 3D box."""
     return solid.prepared("mesh_body", lambda: build_mesh_body(solid))
 
 
@@ -106,8 +116,8 @@ def build_mesh_body(solid: Solid) -> MeshBody:
 def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:
     """Return the mesh of checked arrays.
 
-    Triangles and vertices are copied in the order of the tree: the faces near a contact then lie side by side in
-    memory, which a large mesh, asked at another place by every pose, needs more than anything else.
+    Triangles and vertices are copied in the order of the tree, so that faces near a contact are close in memory; large
+    meshes under many poses depend on it.
     """
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
@@ -119,7 +129,7 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
     used, components = np.empty((len(vertices), 3)), np.empty(n_triangles, np.int64)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):  # uncompiled runs only
         given = vertices, triangles, faces
-        n_used, n_components, first_face = _lay_out(*given, child, order, ordered, used, axis, components)
+        n_used, n_components, first_face = _reorder_by_tree(*given, child, order, ordered, used, axis, components)
         reach, lowest_bit, shift = _lattice_of(used[:n_used])
     blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
     _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
@@ -136,15 +146,15 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
 
 
 @allocating_kernel
-def _lay_out(
+def _reorder_by_tree(
     vertices: FloatArray, triangles: IntArray, faces: IntArray, child: Int32Array, order: IntArray, ordered: IntArray,
     used: FloatArray, axis: Int8Array, components: IntArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Renumber triangles and vertices in the order of the tree; return the numbers of vertices and components, and the
-    least face connected with the first triangle.
+    """Renumber triangles and vertices in the order of the tree.
 
     child: of the tree, items renumbered. order (n,): the old number of each triangle; ordered (n, 3): its vertices;
-    used (n_vertices, 3): their coordinates; axis (n,): `axis_of`; components: the first triangle of each.
+    used (n_vertices, 3): their coordinates; axis (n,): `axis_of`; components: the first triangle of each. Returns the
+    numbers of vertices and components, and the least face connected with the first triangle.
     """
     n_triangles = n_used = n_components = 0
     number = np.full(vertices.shape[0], -1, np.int64)
@@ -165,7 +175,7 @@ def _lay_out(
                 ordered[item, corner] = number[vertex]
             axis[item] = axis_of(facet_at(used, ordered[item, 0], ordered[item, 1], ordered[item, 2]))
     parent = np.empty(n_used, np.int64)
-    _join(ordered, np.zeros(n_triangles, np.bool_), parent)
+    _union(ordered, np.zeros(n_triangles, np.bool_), parent)
     number[:n_used] = 0
     first_face = faces[order[0]]
     for item in range(n_triangles):
@@ -199,8 +209,8 @@ def _fill_blocks(
 
 @kernel
 def _lattice_of(vertices: FloatArray) -> tuple[float, int, int]:
-    """Return the largest magnitude of a coordinate, k of the largest power 2^k that divides all (0 if all are zero),
-    and k >= 0 so that every coordinate times 2^k is an integer, surely."""
+    """Return the largest magnitude of a coordinate, the exponent k of the largest 2^k that divides all (0 if all are
+    zero), and some k >= 0 with every coordinate times 2^k an integer."""
     reach, lowest, smallest = 0.0, 2000, 2000
     for vertex in range(vertices.shape[0]):
         for k in range(3):
@@ -224,12 +234,12 @@ def lattice_shift(values: FloatArray) -> int:
 
 
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax); of a flat one each place once."""
+    """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax), without duplicates for a flat box."""
     flat, corners = box.min == box.max, corners_of_box(box.min, box.max)
     faces = np.arange(6)
     if not flat.any():
         return corners, BOX_TRIANGLES.reshape(-1, 3), np.repeat(faces, 2)
-    # the two faces across a flat axis are one: keep that; a segment or point: any face will do
+    # the two faces across a flat axis are one: unchanged; a segment or point: any face will do
     faces = faces[2 * int(np.argmax(flat)) :][:1]
     _, first, merged = np.unique(corners, axis=0, return_index=True, return_inverse=True)
     return corners, first[merged.reshape(-1)][BOX_TRIANGLES[faces].reshape(-1, 3)], np.repeat(faces, 2)
@@ -241,15 +251,15 @@ def axis_of(t: Facet) -> int:
     n = cross(minus(t.q, t.p), minus(t.r, t.p))
     x, y, z = abs(n.x), abs(n.y), abs(n.z)
     best = 0 if (x >= y and x >= z) else (1 if y >= z else 2)
-    found = NO_AREA
+    result = NO_AREA
     for turn in range(3):
         axis = (best + turn) % 3
         side = orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
         if side == 1 or side == -1:
             return axis
         if side != 0:
-            found = UNKNOWN_AXIS
-    return found
+            result = UNKNOWN_AXIS
+    return result
 
 
 @inline
@@ -261,19 +271,19 @@ def triangle_of(mesh: MeshArrays, item: int) -> Facet:
 
 @inline
 def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
-    """Return a point in the coordinates of the body's tree, rounded."""
+    """Return a point in the coordinates of the tree, rounded."""
     o, scale = mesh.origin, mesh.scale
     return Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale)
 
 
 @kernel
 def join_vertices(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
-    """Set parent (n_vertices,) so that vertices connected by triangles not left out have one representative."""
-    _join(triangles, left_out, parent)
+    """Union-find: set parent (n_vertices,) to one representative of vertices connected by triangles not left out."""
+    _union(triangles, left_out, parent)
 
 
 @inline
-def _join(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
+def _union(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
     for vertex in range(parent.shape[0]):
         parent[vertex] = vertex
     for item in range(triangles.shape[0]):

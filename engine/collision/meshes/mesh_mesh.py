@@ -4,18 +4,18 @@ of two that overlap, which sticks out of the other and whether their boundaries 
 1. **Contacts**: every pair of faces with a common point. A strict crossing that `parity.py` accepts proves that the
    open interiors meet, and ends the search.
 2. **Patches** (mesh_pair.py): faces without contact, connected through vertices, lie wholly inside or wholly outside
-   the other body, so one vertex tells. Without any contact disjoint or inside follow. A patch inside the other body
-   proves overlapping, if some face of it has an inside of its own body beside it.
+   the other body, so one vertex decides. Without any contact disjoint or inside follow. A patch inside the other body
+   proves overlapping, if its own body is inside next to some face of it.
 3. **Regions**: what is left are weak contacts (a vertex on a face, flush faces, edges that touch). If the open
    interiors meet, the border of their intersection has a piece with area on some face of either body; on patches that
-   is settled, so a region that both cut from a face in contact has both insides on one side.
+   is decided, so a region that both cut from a face in contact has both insides on one side.
 
-Faces that cancel under even-odd (stacked) have nothing to show for themselves; their patches go through step 3 too.
+Faces that cancel under even-odd (stacked) prove nothing; their patches go through step 3 too.
 
-**Parts.** A body A sticks out of B if A's open interior meets the outside of B: beside some region of a face of either,
-on one side, A is inside and B is not. A crossing that proves overlapping shows all four combinations around it; a patch
-has one status of the other body on both sides; of each face in contact either side of each region tells, and one with
-nothing of the other body beside it but faces of its own plane is one region.
+**Parts.** A body A sticks out of B if A's open interior meets the outside of B: on one side of some region of a face of
+either, A is inside and B is not. A crossing that proves overlapping shows all four combinations around it; a patch has
+one status of the other body on both sides; a face in contact is decided by either side of each region, and it is a
+single region if the other body meets it only in faces of its own plane.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ import numpy as np
 from engine.collision.codes import DISJOINT, OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes import exact_regions as regions
 from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
-from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Found
+from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Contacts
 from engine.collision.meshes.exact_body import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STILL, MeshBody, mesh_body_of
-from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, unless_identity, what_to_seek
+from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, search_goal, unless_identity
 from engine.collision.meshes.parity import INSIDE, OUTSIDE
 from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, RELATION, SAME_SIDE
 from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Parts, Poses, Witness, Work
@@ -39,8 +39,9 @@ from engine.solids.base import Solid
 from engine.types import FloatArray, IntArray, Relation
 
 
-def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
-    """Tell whether both insides come up to one side of a region of a face; and whether one is inside the other."""
+def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
+    """Return whether both bodies are inside on one side of a region of a face, and whether one body is inside the
+    other."""
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
     if axis < 0:
@@ -53,7 +54,7 @@ def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
             theirs = regions.sides_at(other, q, axis)
             if theirs.above if is_above else theirs.below:
                 return True, False
-        return False, False  # a point of the face within the other body has both insides beside it
+        return False, False  # a point of the face within the other body has both insides next to it
     pierces = False
     for q in regions.regions_of(body, face, [other, body] if body.mesh.has_inside else [other], pair.work.budget):
         theirs = regions.sides_at(other, q, axis)
@@ -66,7 +67,7 @@ def look_at_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
 
 
 def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
-    """Tell whether a face that is only a segment has a point in the other body's open interior."""
+    """Return whether a face that is only a segment has a point in the other body's open interior."""
     body, other = pair.exact[own], pair.exact[1 - own]
     if body.axis(face) >= 0 or not other.mesh.has_inside:
         return False
@@ -85,27 +86,27 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
     if poses[0] is not None or poses[1] is not None:
         poses = unless_identity(poses)
         posed = a.posed(poses[0]), b.posed(poses[1])
-    told = told_by_kernel(a, b, posed, work)
-    if isinstance(told, Collision):
-        return told
+    answer = relation_from_kernel(a, b, posed, work)
+    if isinstance(answer, Collision):
+        return answer
     work.budget.check()
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
         pair = MeshPair(a, b, poses, work)
-        pair.find_contacts(told)
+        pair.find_contacts(answer)
         return _relation(pair)
 
 
-def told_by_kernel(
+def relation_from_kernel(
     first: MeshBody, second: MeshBody, posed: PosedPair, work: Work
-) -> Collision | tuple[list[int], Found]:
-    """Return the answer where `relate_poses` tells it, else what `relate` says."""
-    seek = what_to_seek(first, second, work)
-    row, found = relate(first, second, posed, seek, work)
+) -> Collision | tuple[list[int], Contacts]:
+    """Return the answer of `relate_poses` if it is complete, else what `relate` returns."""
+    seek = search_goal(first, second, work)
+    row, contacts = relate(first, second, posed, seek, work)
     relation, kind, face, their_face, n = row
     if work.witness or relation == UNSETTLED:
-        answer = answer_of(relation, kind, face, their_face, n == ONE_SETTLES and seek in PIERCING)
+        answer = decode_row(relation, kind, face, their_face, n == ONE_SETTLES and seek in PIERCING)
         if answer is None:
-            return row, found
+            return row, contacts
     else:
         answer = UNNAMED[relation]
     if n > 0:
@@ -114,8 +115,9 @@ def told_by_kernel(
 
 
 @lru_cache(1 << 14)
-def answer_of(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
-    """Return what a row of `relate_poses` says, None if incomplete; cached, as making it costs more than a search."""
+def decode_row(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
+    """Return the answer encoded in a row of `relate_poses`, None if incomplete; cached, since making one costs more
+    than a search."""
     if relation == DISJOINT:
         return NO_CONTACT
     if UNSETTLED in (relation, kind):
@@ -125,7 +127,7 @@ def answer_of(relation: int, kind: int, face: int, their_face: int, pierces: boo
 
 
 def _relation(pair: MeshPair) -> Collision:
-    """Return the answer: by contacts, by patches, by regions."""
+    """Return the relation: by contacts, by patches, by regions."""
     contacts = pair.contacts
     if pair.is_settled:
         relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
@@ -134,31 +136,31 @@ def _relation(pair: MeshPair) -> Collision:
         return Collision(RELATIONS[pair.row[RELATION]], pair.named())
     patches = [pair.patches(own, contacts[:, own], INSIDE) for own in (0, 1)]
     if not len(contacts):
-        n_inside = [sum(map(len, found)) for found in patches]
+        n_inside = [sum(map(len, vertices)) for vertices in patches]
         if n_inside == [0, 0]:
             return NO_CONTACT
         for own in (0, 1):
             if n_inside[own] == len(pair.meshes[own].faces) and n_inside[1 - own] == 0:
                 relation = (Relation.FIRST_INSIDE_SECOND, Relation.SECOND_INSIDE_FIRST)[own]
-                return _contain(pair, relation, own, patches[own][0])
+                return _containment(pair, relation, own, patches[own][0])
     return _overlap_or_touch(pair, patches)
 
 
 def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collision:
-    """Return overlapping or touching, where no crossing has proven the first."""
+    """Return overlapping or touching, where no crossing has proven overlapping."""
     contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
     both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):
         for patch in patches[own]:
-            if both and any(sides.above or sides.below for sides in pair.sides_beside(own, patch)):
+            if both and any(sides.above or sides.below for sides in pair.patch_sides(own, patch)):
                 if len(contacts):
                     return Collision(Relation.OVERLAPPING, pair.named())
-                return _contain(pair, Relation.OVERLAPPING, own, patch)
+                return _containment(pair, Relation.OVERLAPPING, own, patch)
     for own in (0, 1):
-        is_told = not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside)
-        for face in [] if is_told else np.unique(contacts[:, own]).tolist():
+        is_decided = not both and (piercing or not pair.work.witness or not pair.meshes[1 - own].has_inside)
+        for face in [] if is_decided else np.unique(contacts[:, own]).tolist():
             pair.work.budget.check()
-            overlaps, pierces = look_at_regions(pair, own, face)
+            overlaps, pierces = inspect_regions(pair, own, face)
             if overlaps:
                 return Collision(Relation.OVERLAPPING, pair.named())
             piercing = piercing or pierces
@@ -168,13 +170,13 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
     if len(contacts):
         return Collision(Relation.TOUCHING, pair.named(piercing=piercing))
     own = 0 if patches[0] else 1
-    return _contain(pair, Relation.TOUCHING, own, patches[own][0], piercing=piercing)
+    return _containment(pair, Relation.TOUCHING, own, patches[own][0], piercing=piercing)
 
 
-def _contain(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
-    """Return a relation with a patch of body `own` inside the other one as its witness."""
+def _containment(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
+    """Return a relation whose witness is a patch of body `own` inside the other one."""
     face = int(pair.meshes[own].faces[patch].min())
-    answer = answer_of(relation, CONTAINED, *((face, -1), (-1, face))[own], piercing)
+    answer = decode_row(relation, CONTAINED, *((face, -1), (-1, face))[own], piercing)
     return answer if pair.work.witness and answer is not None else UNNAMED[relation]
 
 
@@ -183,7 +185,7 @@ _ABOVE, _BELOW = regions.Sides(True, False, False), regions.Sides(False, True, F
 
 
 def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
-    """Return what of two overlapping polyhedra or boxes lies outside the other."""
+    """Return which of two overlapping polyhedra or boxes has a part outside the other."""
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
         a, b, poses = mesh_body_of(first), mesh_body_of(second), unless_identity(poses)
         if poses == (None, None) and _have_equal_faces(a, b):
@@ -192,7 +194,7 @@ def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
 
 
 def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
-    """Tell whether two meshes have the same triangles, in any order and orientation."""
+    """Return whether two meshes have the same triangles, in any order and orientation."""
     if first is second:
         return True
     if len(first.faces) != len(second.faces) or first.arrays.extent.reach != second.arrays.extent.reach:
@@ -209,10 +211,10 @@ def _sorted_faces(mesh: MeshBody) -> FloatArray:
 
 
 class _OverlappingPair(MeshPair):
-    """Two bodies whose open interiors are known to meet, and which of them has been seen to stick out."""
+    """Two bodies with intersecting open interiors, and which of them is known to have a part outside the other."""
 
     def parts(self) -> Parts:
-        """Return the answer; what is not needed for it is left out."""
+        """Return the answer; skips every step that cannot change it."""
         self._sticks_out = [False, False]
         self.find_contacts()
         if self.is_settled:  # by a crossing: overlapping is known
@@ -225,8 +227,8 @@ class _OverlappingPair(MeshPair):
         for own in (0, 1):
             for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
                 for patch in self.patches(own, contacts[:, own], place):
-                    for ours in self.sides_beside(own, patch):
-                        self._see(own, ours, theirs)
+                    for ours in self.patch_sides(own, patch):
+                        self._record_region(own, ours, theirs)
                     if all(self._sticks_out):
                         return
         for own in (0, 1):
@@ -234,20 +236,20 @@ class _OverlappingPair(MeshPair):
             faces, firsts = np.unique(contacts[order, own], return_index=True)
             for face, kinds in zip(faces.tolist(), np.split(self.kinds[order], firsts[1:])):
                 self.work.budget.check()
-                self._see_face(own, face, set(kinds.tolist()))
+                self._record_face(own, face, set(kinds.tolist()))
                 if all(self._sticks_out):
                     return
 
-    def _see(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
-        """Take note of what lies on either side of a region of body `own`."""
+    def _record_region(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
+        """Record the statuses on either side of a region of body `own`."""
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
                 self._sticks_out[own] = True
             if other and not mine:
                 self._sticks_out[1 - own] = True
 
-    def _see_face(self, own: int, face: int, kinds: set[int]) -> None:
-        """Take note of what lies beside a face whose contacts are of some kinds (`in_detail`)."""
+    def _record_face(self, own: int, face: int, kinds: set[int]) -> None:
+        """Record the statuses on both sides of a face whose contacts are of some kinds (`classify_in_detail`)."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:
@@ -256,14 +258,14 @@ class _OverlappingPair(MeshPair):
         is_cut = any(kind < SAME_SIDE and kind >> own & 1 for kind in kinds)
         if is_clean and not is_cut:  # one region, and its own body on one side of it: call that above
             if not kinds.isdisjoint((SAME_SIDE, OPPOSITE)):
-                self._see(own, _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW)
+                self._record_region(own, _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW)
                 return
             for q in regions.points_within(body.corners(face)):
                 theirs = regions.sides_over(other, q, axis, body.plane(face))
                 if theirs is not None and theirs.above == theirs.below:
-                    self._see(own, _ABOVE, theirs)
+                    self._record_region(own, _ABOVE, theirs)
                     return
         for q in regions.regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
-            self._see(own, regions.sides_at(body, q, axis), regions.sides_at(other, q, axis))
+            self._record_region(own, regions.sides_at(body, q, axis), regions.sides_at(other, q, axis))
             if all(self._sticks_out):
                 return

@@ -1,4 +1,4 @@
-"""Two placed meshes in one question: their contacts, exact coordinates, states of faces, where their vertices lie."""
+"""Two placed meshes in one query: contacts, exact coordinates, states of faces, locations of vertices."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ _BLOCK = 64
 
 
 class _WorkSpace(threading.local):
-    """What one call of a kernel fills; calls of one thread take turns."""
+    """Work space of a kernel call; calls of one thread take turns."""
 
     def __init__(self) -> None:
-        self.descent, self.found, self.rows = (
+        self.descent, self.contacts, self.rows = (
             dual.new_descent(),
-            dual.new_found(ROOM_AT_ONCE),
+            dual.new_contacts(INITIAL_ROOM),
             np.empty((1, N_COLUMNS), np.int64),
         )
         self.row = self.rows[0]
 
 
 PosedPair = tuple[PoseArrays, PoseArrays]
-"""The one pose of either body, as kernels take it."""
-ROOM_AT_ONCE = 256
+"""The pose of each body, as kernels take it."""
+INITIAL_ROOM = 256
 SPACE = _WorkSpace()
 
 
@@ -49,30 +49,33 @@ def unless_identity(poses: Poses) -> Poses:
 
 
 def relate(
-    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: dual.Found | None = None,
+    first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: dual.Contacts | None = None,
     n_named: int | None = None,
-) -> tuple[list[int], dual.Found]:  # fmt: skip
-    """Return what `relate_poses` says of a pair, and where all of its contacts are, until the next call; known: these
-    and their classes, where found already; n_named: as of `relate_poses`, None for what `work` says."""
-    found, n_known = (SPACE.found, 0) if known is None else (known, len(known.kinds))
+) -> tuple[list[int], dual.Contacts]:  # fmt: skip
+    """Return the row of `relate_poses` for a pair, and its contacts, valid until the next call.
+
+    known: the contacts and their classes, if computed already. n_named: as of `relate_poses`; None to take it from
+    `work`.
+    """
+    contacts, n_known = (SPACE.contacts, 0) if known is None else (known, len(known.kinds))
     n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
-    room = len(found.kinds)
+    room = len(contacts.kinds)
     while True:  # bound: each turn has more room
         entry_of(relate_poses)(
-            first.arrays, second.arrays, *posed, seek, n_named, SPACE.descent, found, n_known,
+            first.arrays, second.arrays, *posed, seek, n_named, SPACE.descent, contacts, n_known,
             SPACE.rows, work.budget.flag,
         )  # fmt: skip
         row: list[int] = SPACE.row.tolist()
         n = row[N_CONTACTS]
         if n <= room:
-            return row, found
+            return row, contacts
         work.budget.check()
         room = n if n <= dual.LEAST_LOOK else 16 * n
-        found = dual.new_found(room, len(first.faces) + len(second.faces))
+        contacts = dual.new_contacts(room, len(first.faces) + len(second.faces))
 
 
-def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
-    """Return what ends the search for contacts early."""
+def search_goal(first: MeshBody, second: MeshBody, work: Work) -> int:
+    """Return the goal that ends the search for contacts early."""
     own, their = first.arrays.has_inside, second.arrays.has_inside
     if own and their and not work.boolean:
         return dual.SEEK_OVERLAP
@@ -82,10 +85,13 @@ def what_to_seek(first: MeshBody, second: MeshBody, work: Work) -> int:
 
 
 class MeshPair:
-    """One question, what kernels say of it, and the exact coordinates computed for it so far.
+    """One query: kernel results, and the exact coordinates computed so far.
 
-    row: of `relate_poses`; contacts (n, 2): the pairs of faces with a common point, in order, or the one that settles
-    all, as is_settled tells; kinds (n,): their classes, or what `relate_poses` puts there.
+    | field | meaning |
+    |---|---|
+    | row | row of `relate_poses` |
+    | contacts | (n, 2) pairs of faces in contact, in order; if is_settled, the decisive one |
+    | kinds | (n,) their classes, or what `relate_poses` writes there |
     """
 
     def __init__(self, first: MeshBody, second: MeshBody, poses: Poses, work: Work, n_named: int | None = None) -> None:
@@ -94,7 +100,7 @@ class MeshPair:
         self.poses = poses
         self.posed = (first.posed(poses[0]), second.posed(poses[1]))
         self.work = work
-        self.seek = what_to_seek(first, second, work)
+        self.seek = search_goal(first, second, work)
         self._exact: tuple[ExactBody, ExactBody] | None = None
 
     @property
@@ -104,18 +110,18 @@ class MeshPair:
             self._exact = exact_pair(*self.meshes, self.poses)
         return self._exact
 
-    def find_contacts(self, seen: tuple[list[int], dual.Found] | None = None) -> None:
-        """Find all contacts; seen: what `relate` said of the pair, where it was asked already."""
-        self.row, found = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
+    def find_contacts(self, seen: tuple[list[int], dual.Contacts] | None = None) -> None:
+        """Compute all contacts; seen: the result of `relate`, if the pair was related already."""
+        self.row, room = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
-        self.contacts, self.kinds = found.pairs[:n].copy(), found.kinds[:n].copy()
+        self.contacts, self.kinds = room.pairs[:n].copy(), room.kinds[:n].copy()
         self.work.n_beyond_filter += n
         if not self.is_settled and (self.kinds == UNDECIDED).any():
             self._settle_classes(self.kinds)
 
     def _settle_classes(self, kinds: Int8Array) -> None:
-        """Find the classes that kernels left open, and let them judge all contacts then."""
+        """Decide exactly the classes that kernels left open, then relate the pair by all contacts again."""
         open_ones = np.flatnonzero(kinds == UNDECIDED)
         self.work.n_rational += len(open_ones)
         a, b = self.exact
@@ -128,12 +134,12 @@ class MeshPair:
                 return
         self.contacts, self.kinds = self.contacts[kinds != APART], kinds[kinds != APART]
         if len(self.kinds):
-            found = dual.Found(self.contacts, self.kinds, np.empty(0, np.bool_))
-            self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, found, self.n_named)
+            room = dual.Contacts(self.contacts, self.kinds, np.empty(0, np.bool_))
+            self.row, _ = relate(*self.meshes, self.posed, self.seek, self.work, room, self.n_named)
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
-        """The rule of `dual_traversal.settles` for a class found exactly."""
+        """Apply the rule of `dual_traversal.is_decisive` to an exact class."""
         if self.seek == dual.SEEK_CONTACT:
             return True
         if kind != CROSSING:
@@ -146,20 +152,21 @@ class MeshPair:
         return STATE_CLEAN in (first, second) and STATE_STACKED not in (first, second)
 
     def named(self, *, piercing: bool = False) -> Witness | None:
-        """Return the strongest of the first contacts, of equal ones that of the first faces; None if none is asked."""
+        """Return the strongest of the first contacts, of equal ones that of the first faces; None if no witness is
+        requested."""
         if not self.work.witness:
             return None
         best = tuple(self.row[KIND:N_CONTACTS])
         if best[0] == UNSETTLED:
             a, b = self.exact
-            found = []
+            candidates = []
             for i, j in self.contacts[:N_NAMED].tolist():
                 self.work.budget.check()
                 kind = kind_of_contact(a.corners(i), b.corners(j))
-                found.append((STRENGTH.index(kind), int(self.meshes[0].faces[i]), int(self.meshes[1].faces[j])))
+                candidates.append((STRENGTH.index(kind), int(self.meshes[0].faces[i]), int(self.meshes[1].faces[j])))
                 if kind == "face_face":
                     break
-            best = min(found)
+            best = min(candidates)
         return Witness(STRENGTH[best[0]], best[1], best[2], "", piercing)
 
     def state(self, own: int, face: int) -> int:
@@ -175,23 +182,24 @@ class MeshPair:
         left_out[in_contact] = True
         parent = np.empty(len(mesh.arrays.vertices), np.int64)
         join_vertices(triangles, left_out, parent)
-        kept = np.flatnonzero(~left_out)
-        roots = parent[triangles[kept, 0]]
+        free_faces = np.flatnonzero(~left_out)
+        roots = parent[triangles[free_faces, 0]]
         vertices = np.unique(roots)
-        found = np.empty(len(vertices), np.int8)
+        locations = np.empty(len(vertices), np.int8)
         posed, theirs = self.posed[own], self.posed[1 - own]
-        locate_vertices(mesh.arrays, posed, vertices, other.arrays, theirs, found, self.work.budget.flag)
+        locate_vertices(mesh.arrays, posed, vertices, other.arrays, theirs, locations, self.work.budget.flag)
         self.work.budget.check()
-        for index in np.flatnonzero(found == UNDECIDED):
+        for index in np.flatnonzero(locations == UNDECIDED):
             self.work.budget.check()
             self.work.n_beyond_filter += 1
             self.work.n_rational += 1
             point = self.exact[own].vertex(int(vertices[index]))
-            found[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else OUTSIDE
-        return [kept[roots == vertex] for vertex in vertices[found == place]]
+            locations[index] = INSIDE if sides_at(self.exact[1 - own], (*point, 1), 2).at else OUTSIDE
+        return [free_faces[roots == vertex] for vertex in vertices[locations == place]]
 
-    def sides_beside(self, own: int, patch: IntArray) -> Iterator[Sides]:
-        """Yield the status of a body beside each region of a patch of it; one that changes across a face says all."""
+    def patch_sides(self, own: int, patch: IntArray) -> Iterator[Sides]:
+        """Yield the status of a body next to each region of a patch; a status that changes across a face ends the
+        search."""
         body = self.exact[own]
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):

@@ -1,8 +1,8 @@
-"""Two triangles in floats: points of them that are nearly nearest, and proven bounds on how far apart they are.
+"""Closest points of two triangles in floats: nearly nearest points, and proven bounds on the distance.
 
-Whatever points are found, their distance bounds that of the triangles from above. From below it is bounded by the slab
-between the triangles across the line of the two points: the triangles are convex, so the bounds meet where the points
-are the nearest ones. Triangles without area are segments and points.
+The distance of any two points bounds that of the triangles from above. The slab between the triangles across the line
+of these points bounds it from below: the triangles are convex, so the bounds meet at the nearest points. Triangles
+without area are segments and points.
 
 Source: C. Ericson, Real-Time Collision Detection, 2005, 5.1.9 (segments) and 5.1.10 (triangles); the slab is the
 support bound of E. Gilbert, D. Johnson, S. Keerthi, 1988 (`distance/convex_gaps.py`).
@@ -20,17 +20,22 @@ from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import Point3
 
 FACE: Final = 6
-"""Features of a triangle: 0 to 2 its vertices, 3 to 5 the edge from vertex k - 3 to the next, 6 all of it."""
+"""| feature of a triangle | code |
+|---|---|
+| vertex k | k |
+| edge from vertex k to the next | 3 + k |
+| face | 6 |
+"""
 _ROUNDING: Final = 2.0**-47
-"""Of the largest coordinate as seen from a corner: a point on an edge or face takes 4 roundings in each coordinate,
-three dots of 3 products and the differences less than 30 u in all."""
+"""Relative to the largest coordinate seen from a corner: a point on an edge or face takes 4 roundings a coordinate,
+three dot products of 3 terms and the differences less than 30 u in all."""
 _TINY: Final = 1e-300
 _AS_GOOD: Final = 1.0 - 2.0**-45
-"""Of a distance: points within that are taken for the nearest."""
+"""Factor on a distance: points within it count as nearest."""
 
 
 class Nearest(NamedTuple):
-    """The points nearest to each other so far, their features, and the square of their distance."""
+    """Nearest points so far, their features, and their squared distance."""
 
     p: Point3
     q: Point3
@@ -56,8 +61,8 @@ def _end_or_edge(t: float, k: int) -> int:
 
 
 @inline
-def _edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
-    """Return the nearer of `best` and the nearest points of edge i of s and edge j of t."""
+def _nearest_on_edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
+    """Return the nearer of `best` and the closest points of edge i of s and edge j of t."""
     a, c = corner(s, i), corner(t, j)
     u, v = minus(corner(s, i + 1), a), minus(corner(t, j + 1), c)
     w = minus(a, c)
@@ -75,9 +80,9 @@ def _edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
 
 
 @inline
-def _foot(p: Point3, t: Facet) -> tuple[bool, Point3]:
-    """Return whether the foot of p on the plane of t lies in the triangle, and it, as a mean of the corners: that is a
-    point of the triangle, however the normal of a needle was rounded."""
+def _project_to_triangle(p: Point3, t: Facet) -> tuple[bool, Point3]:
+    """Return whether the foot of p on the plane of t lies in the triangle, and the foot as a convex combination of the
+    corners, which is a point of the triangle even if the normal of a needle is badly rounded."""
     u, v, w = minus(t.q, t.p), minus(t.r, t.p), minus(p, t.p)
     normal = cross(u, v)
     size = dot(normal, normal)
@@ -87,8 +92,8 @@ def _foot(p: Point3, t: Facet) -> tuple[bool, Point3]:
     return x >= 0.0 and y >= 0.0 and x + y <= 1.0, _along(_along(t.p, u, x), v, y)
 
 
-class Across(NamedTuple):
-    """Bounds on the distance of two triangles from below and above, and whether these are enough."""
+class SlabBounds(NamedTuple):
+    """Lower and upper bound on the distance of two triangles, and whether they suffice."""
 
     low: float
     size: float
@@ -96,51 +101,52 @@ class Across(NamedTuple):
 
 
 @inline
-def _across(s: Facet, t: Facet, found: Nearest, before: Across, most: float) -> Across:
-    """Return what is known once nearer points are found: the slab between the triangles across their line."""
-    gap = minus(found.q, found.p)
+def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, most: float) -> SlabBounds:
+    """Return the bounds after nearer points: the slab between the triangles across their line."""
+    gap = minus(nearest.q, nearest.p)
     largest = largest_of(gap)
     if not largest > 0.0:
-        return Across(0.0, 0.0, True)
+        return SlabBounds(0.0, 0.0, True)
     d = Point3(gap.x / largest, gap.y / largest, gap.z / largest)  # order: squares of small numbers are none
     size, furthest = np.sqrt(dot(d, d)), max(dot(d, s.p), dot(d, s.q), dot(d, s.r))
     low = max(before.low, (min(dot(d, t.p), dot(d, t.q), dot(d, t.r)) - furthest) / size)
-    return Across(low, largest * size, low > most or low >= _AS_GOOD * largest * size)
+    return SlabBounds(low, largest * size, low > most or low >= _AS_GOOD * largest * size)
 
 
 @inline
-def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, Across]:
-    """Return nearly nearest points of two disjoint triangles and bounds; any points beyond `most`."""
-    best, across = Nearest(s.p, t.p, 0, 0, np.inf), Across(-np.inf, np.inf, False)
+def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, SlabBounds]:
+    """Return nearly nearest points of two disjoint triangles and bounds; any points if they are farther apart than
+    `most`."""
+    best, across = Nearest(s.p, t.p, 0, 0, np.inf), SlabBounds(-np.inf, np.inf, False)
     for i in range(3):
         for j in range(3):
-            found = _edges(best, s, i, t, j)
-            if found.square < best.square:
-                best, across = found, _across(s, t, found, across, most)
+            candidate = _nearest_on_edges(best, s, i, t, j)
+            if candidate.square < best.square:
+                best, across = candidate, _bound_by_slab(s, t, candidate, across, most)
                 if across.is_done:
                     return best, across
     for turn in range(6):
         k, is_first = turn % 3, turn < 3
         end = corner(s if is_first else t, k)
-        is_over, foot = _foot(end, t if is_first else s)
+        is_over, foot = _project_to_triangle(end, t if is_first else s)
         gap = minus(foot, end)
         if is_over and dot(gap, gap) < best.square:
             best = Nearest(end, foot, k, FACE, dot(gap, gap)) if is_first else Nearest(
                 foot, end, FACE, k, dot(gap, gap))  # fmt: skip
-            across = _across(s, t, best, across, most)
+            across = _bound_by_slab(s, t, best, across, most)
             if across.is_done:
                 break
     return best, across
 
 
 @inline
-def seen_from(origin: Point3, s: Facet) -> Facet:
-    """Return the triangle with its coordinates counted from a point."""
+def relative_to(origin: Point3, s: Facet) -> Facet:
+    """Return a triangle in coordinates relative to an origin."""
     return Facet(minus(s.p, origin), minus(s.q, origin), minus(s.r, origin))
 
 
 @inline
-def rounding_of(s: Facet, t: Facet) -> float:
-    """Return what rounding may add to a bound of two triangles seen from near them."""
+def rounding_bound(s: Facet, t: Facet) -> float:
+    """Return the rounding error of a bound for two triangles given relative to a point near them."""
     largest = max(largest_of(s.p), largest_of(s.q), largest_of(s.r))
     return _ROUNDING * max(largest, largest_of(t.p), largest_of(t.q), largest_of(t.r)) + _TINY

@@ -1,18 +1,18 @@
-"""What half-lines and neighbours say of a body: is a point inside, how does a face lie among others, which side is in.
+"""Ray parity and self-intersection state of a mesh: point location, states of faces, inner sides of faces.
 
-**Points.** The half-line from q upward along the z axis of the body's own coordinates is moved by (eps, eps^2) in x and
-y, so that it meets no edge and no upright face (orientation.py). A face that the half-line's line meets counts if
-it lies above q (orient3d); a zero there means q lies on it. Caller guarantees that no face holds q where INSIDE or
-OUTSIDE is to be relied on; UNDECIDED is settled with exact posed coordinates (`exact_regions.py`).
+**Points.** The ray from q upward along the z axis of the body's own coordinates is moved by (eps, eps^2) in x and y, so
+that it meets no edge and no upright face (orientation.py). A face on the ray's line counts if it lies above q
+(orient3d); a zero there means that q lies on it. Caller guarantees that no face contains q if INSIDE or OUTSIDE is
+relied on; UNDECIDED is settled with exact posed coordinates (`exact_regions.py`).
 
-**Faces** are clean, crossed or stacked (`mesh_arrays.py`): by exact signs of the coordinates as given, so no pose
-counts; computed on demand and kept with the mesh. A strict crossing of two faces proves that two interiors overlap if
-nothing else of the two bodies cancels or fans out along it. Near a general point of the crossing line a body whose face
-is clean there is a half-space; the other body's face, not stacked, changes its inside on both sides of the first plane:
-so one of its two changes lies in that half-space. Hence the rule `proves_overlap`.
+**Faces** are clean, crossed or stacked (`mesh_arrays.py`), by exact signs of the unposed coordinates; computed on
+demand and cached in the mesh. A strict crossing of two faces proves that two interiors overlap if nothing else of the
+two bodies cancels or fans out along it. Near a general point of the crossing line a body whose face is clean there is a
+half-space; the other body's face, not stacked, flips its inside on both sides of the first plane: so one of its two
+flips lies in that half-space. Hence the rule `proves_overlap`.
 
-**Sides.** Beside a clean face no other one covers it, so its body lies on one side of it, all along but for single
-points. The faces above a point within it, along an axis that crosses it, tell which: an odd number, above.
+**Sides.** No other face covers a clean face, so its body lies on one side of it except at single points. The faces
+above a point within it, along an axis that crosses it, decide which: an odd number, above.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from engine.collision.meshes.placement import (
     orient2d_near,
     place_pair,
     placed,
-    turned_back,
+    rotate_back,
 )
 from engine.collision.meshes.triangle_triangle import (
     CROSSING,
@@ -63,21 +63,22 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array
 OUTSIDE = -1
 INSIDE = 1
 MISSED = 3
-"""`half_line_crosses` beside 0 (on the face), 1 (above), -1 (below) and UNDECIDED: the moved line passes by."""
+"""Result of `ray_crosses` if the perturbed line misses the face; others: 0 on the face, 1 above, -1 below, UNDECIDED.
+"""
 
 
 @inline
-def moved_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
-    """Return the side of the line a b, along z, on which q moved by (eps, eps^2) lies (ties.py); 0 for a = b."""
+def perturbed_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
+    """Return the side of the line a b, along z, on which q moved by (eps, eps^2) lies (orientation.py); 0 for a = b."""
     side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
     return side if side != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
 @inline
-def half_line_crosses(t: Facet, q: Point3, error: float) -> int:
-    """Return where the moved vertical line through q meets t: above q 1, below -1, at q 0; MISSED or UNDECIDED."""
-    p_side, q_side = moved_side(t.p, t.q, q, error), moved_side(t.q, t.r, q, error)
-    r_side = moved_side(t.r, t.p, q, error)
+def ray_crosses(t: Facet, q: Point3, error: float) -> int:
+    """Return where the perturbed vertical line through q meets t: above q 1, below -1, at q 0; MISSED or UNDECIDED."""
+    p_side, q_side = perturbed_side(t.p, t.q, q, error), perturbed_side(t.q, t.r, q, error)
+    r_side = perturbed_side(t.r, t.p, q, error)
     has_left = p_side == 1 or q_side == 1 or r_side == 1
     has_right = p_side == -1 or q_side == -1 or r_side == -1
     if has_left and has_right:
@@ -99,17 +100,17 @@ class OwnPoint(NamedTuple):
 
 
 @inline
-def brought_back(p: Point3, source: Placement, target: Placement, defect: float) -> OwnPoint:
+def to_local_frame(p: Point3, source: Placement, target: Placement, defect: float) -> OwnPoint:
     """Return a point of one placed body in the own coordinates of another one placed with it.
 
-    defect: of the target's rotation, `frames.defect_of`; the transpose stands for the inverse, which is off by 3.1
-    defect of the vector it turns. A turned vector has components up to 1.74 times as large, and so has its error.
+    defect: `frames.defect_of` the target's rotation; the transpose replaces the inverse, with an error of 3.1 defect
+    relative to the vector. A rotated vector has components up to 1.74 times as large, and so has its error.
     """
     q = placed(p, source)
     if not target.is_posed:
         return OwnPoint(q, source.error)
     w = minus(q, target.shift)
-    own = turned_back(target, w)
+    own = rotate_back(target, w)
     if source.error == 0.0 and target.error == 0.0:  # nothing is rounded on a lattice
         return OwnPoint(own, 0.0)
     off = source.error + target.error + 2.0**-50 * (largest_of(q) + largest_of(w))
@@ -117,8 +118,8 @@ def brought_back(p: Point3, source: Placement, target: Placement, defect: float)
 
 
 @merged
-def _last(p: Point3, axis: int) -> Point3:
-    """Return a point with its coordinates turned so that those of an axis come last."""
+def _rotate_axis_last(p: Point3, axis: int) -> Point3:
+    """Return a point with its coordinates permuted cyclically so that those of an axis come last."""
     return p if axis == 2 else (Point3(p.y, p.z, p.x) if axis == 0 else Point3(p.z, p.x, p.y))
 
 
@@ -126,14 +127,14 @@ def _last(p: Point3, axis: int) -> Point3:
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
     """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
     where = locate_along(own, mesh, 2, -1)
-    for axis in range(2 if where == UNDECIDED else 0):  # another half-line may keep clear of edges
+    for axis in range(2 if where == UNDECIDED else 0):  # another ray may miss the edges
         where = locate_along(own, mesh, axis, -1) if where == UNDECIDED else where
     return where
 
 
 @allocating
 def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> int:
-    """Return what `locate_point` does by the half-line along any axis, one face left out."""
+    """Return `locate_point` by the ray along any axis, with one face left out."""
     q, error = own.point, own.error
     local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
@@ -142,13 +143,15 @@ def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> i
         return OUTSIDE
     z = ABOVE_ALL if axis == 2 else local.z
     far = Point3(ABOVE_ALL if axis == 0 else local.x, ABOVE_ALL if axis == 1 else local.y, z)
-    box, q, stack = box_between(local, far, slack), _last(q, axis), np.empty(STACK, np.int32)
+    box, q, stack = box_between(local, far, slack), _rotate_axis_last(q, axis), np.empty(STACK, np.int32)
     stack[0] = 0
     n_above, unsure, on_face = 0, False, False
     face, n = next_face(mesh, stack, 1, box)
     while face >= 0:  # bound: the faces of the body
         t = triangle_of(mesh, face)
-        how = half_line_crosses(Facet(_last(t.p, axis), _last(t.q, axis), _last(t.r, axis)), q, error)
+        how = ray_crosses(
+            Facet(_rotate_axis_last(t.p, axis), _rotate_axis_last(t.q, axis), _rotate_axis_last(t.r, axis)), q, error
+        )
         how = MISSED if face == left_out else how
         unsure |= how == UNDECIDED
         on_face |= how == 0
@@ -162,27 +165,27 @@ def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> i
 @kernel
 def locate_vertices(
     source: MeshArrays, source_pose: PoseArrays, vertices: IntArray, mesh: MeshArrays, pose: PoseArrays,
-    found: Int8Array, flag: FlagArray,
+    locations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill found (n,) int8 for the vertices (n,) of `source` against `mesh`, each under its one pose."""
+    """Fill locations (n,) int8 of the vertices (n,) of `source` in `mesh`, each under its one pose."""
     a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
     defect = defect_of(b)
     for item in range(vertices.shape[0]):
         if flag[0] != 0:
             return
-        own = brought_back(as_point3(source.vertices, vertices[item]), a, b, defect)
-        found[item] = locate_point(own, mesh)
+        own = to_local_frame(as_point3(source.vertices, vertices[item]), a, b, defect)
+        locations[item] = locate_point(own, mesh)
 
 
 SLACK = 2.0**-20
-"""By how much a box in the tree's coordinates is widened for its rounding to float32."""
+"""Enlargement of a box in tree coordinates, for its rounding to float32."""
 ABOVE_ALL = 1e6
-"""In the coordinates of a tree, which are at most 2."""
+"""A bound in tree coordinates above all others, which are at most 2."""
 
 
 @inline
 def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
-    """Return the ends of the box from a to b, widened, as far as it matters, as triples of float32."""
+    """Return the ends of the enlarged box from a to b, as triples of float32."""
     x, y, z = max(a.x - slack, -ABOVE_ALL), max(a.y - slack, -ABOVE_ALL), max(a.z - slack, -ABOVE_ALL)
     p, q, r = min(b.x + slack, ABOVE_ALL), min(b.y + slack, ABOVE_ALL), min(b.z + slack, ABOVE_ALL)
     return (np.float32(x), np.float32(y), np.float32(z)), (np.float32(p), np.float32(q), np.float32(r))
@@ -190,8 +193,10 @@ def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
 
 @inline
 def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
-    """Return a face whose box meets a box, -1 if there is none left, and how much waits on the stack (STACK,) int32,
-    which begins with the root, 0: nodes, and faces as in `MeshArrays.child`."""
+    """Return the next face whose box meets a box, -1 if none is left, and the height of the stack.
+
+    stack (STACK,) int32: nodes, and faces as in `MeshArrays.child`; the root, 0, on entry.
+    """
     while n > 0:  # bound: each node and face enters once
         n -= 1
         child = int(stack[n])
@@ -207,13 +212,14 @@ def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any])
 
 @inline
 def side_of_corner(mesh: MeshArrays, face: int, t: Facet, other: int, k: int, p: Point3) -> int:
-    """Return the side of the plane of a face on which a corner of another one lies, 0 at once for one of its own."""
+    """Return the side of the plane of a face on which a corner of another face lies, 0 without a sign test for a shared
+    corner."""
     return 0 if is_corner(mesh, face, other, k) else orient3d(t.p, t.q, t.r, p)
 
 
 @inline
-def state_by(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> int:
-    """Return what one other face of the body makes of the state of `face` (which has an area)."""
+def update_state(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> int:
+    """Return the state of `face`, which has an area, as far as one other face of the body determines it."""
     if mesh.axis[other] == -1:
         return STATE_CLEAN
     if mesh.axis[other] < 0:
@@ -247,14 +253,14 @@ def state_by(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> int:
 
 @inline
 def is_corner(mesh: MeshArrays, face: int, other: int, k: int) -> bool:
-    """Tell whether a corner of another face is one of this face too."""
+    """Return whether a corner of another face is also one of this face."""
     vertex, corners = mesh.triangles[other, k], mesh.triangles
     return bool(vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2])
 
 
 @inline
 def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return the state of a face, kept once computed; stacked without area. poses: any (n, 12), nothing has a pose."""
+    """Return the cached state of a face; stacked without area. poses: any (n, 12), no body has a pose."""
     if mesh.state[face] == STATE_UNKNOWN:
         mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
     return int(mesh.state[face])
@@ -262,7 +268,7 @@ def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @allocating
 def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return what the other faces of the body make of the state of a face with area."""
+    """Return the state of a face with area as all other faces of the body determine it."""
     t = triangle_of(mesh, face)
     p, q, r = in_tree(mesh, t.p), in_tree(mesh, t.q), in_tree(mesh, t.r)
     low = Point3(min(p.x, q.x, r.x), min(p.y, q.y, r.y), min(p.z, q.z, r.z))
@@ -272,14 +278,14 @@ def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     other, n = next_face(mesh, stack, 1, box)
     while other >= 0 and state != STATE_STACKED:  # bound: the faces of the body
         if other != face:
-            state = max(state, state_by(mesh, face, other, poses))
+            state = max(state, update_state(mesh, face, other, poses))
         other, n = next_face(mesh, stack, n, box)
     return state
 
 
 @inline
 def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: FloatArray) -> bool:
-    """Tell whether a strict crossing of these two faces proves that the open interiors of two solids meet."""
+    """Return whether a strict crossing of these two faces proves that the open interiors of two solids intersect."""
     a = state_of(first, i, poses)
     if a == STATE_STACKED:
         return False
@@ -290,26 +296,26 @@ def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses:
 def states_of(mesh: MeshArrays, faces: IntArray) -> Int8Array:
     """Return the state of each of `faces` (n,)."""
     states = np.empty(len(faces), np.int8)
-    entry_of(_find_states)(mesh, faces, states)
+    entry_of(_fill_states)(mesh, faces, states)
     return states
 
 
 def state_at(mesh: MeshArrays, face: int) -> int:
-    """Return the state of one face, at once where it is known."""
+    """Return the state of one face, from the cache if known."""
     state = mesh.state[face]
     return int(states_of(mesh, np.array([face]))[0] if state == STATE_UNKNOWN else state)
 
 
 @allocating_kernel
-def _find_states(mesh: MeshArrays, faces: IntArray, states: Int8Array) -> None:
+def _fill_states(mesh: MeshArrays, faces: IntArray, states: Int8Array) -> None:
     """Fill states (n,) with the state of each of `faces` (n,)."""
     poses = np.zeros((1, 12))
     for item in range(faces.shape[0]):
         states[item] = state_of(mesh, faces[item], poses)
 
 
-UNTOLD: Final = 2
-"""In place of a side: the face is not clean, or another one comes near each of the points within."""
+SIDE_UNKNOWN: Final = 2
+"""In place of a side: the face is not clean, or another one comes near each sampled point of it."""
 
 
 @called
@@ -326,9 +332,10 @@ def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
 
 @allocating
 def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return the side of a face, 1 that of its normal or -1, on which its body lies; UNTOLD. poses: as `state_of`."""
+    """Return the side of a face that its body lies on, 1 that of its normal or -1; SIDE_UNKNOWN. poses: as
+    `state_of`."""
     if mesh.inner[face] == 0:
-        mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else UNTOLD
+        mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else SIDE_UNKNOWN
     return int(mesh.inner[face])
 
 
@@ -340,4 +347,4 @@ def _side_of_clean(mesh: MeshArrays, face: int) -> int:
         where = locate_along(point_within(mesh, face, item), mesh, axis, face)
         if where in (INSIDE, OUTSIDE):
             return turn * where
-    return UNTOLD
+    return SIDE_UNKNOWN

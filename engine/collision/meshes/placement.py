@@ -1,18 +1,18 @@
 """Poses inside kernels: rounded positions with a proven error, and orientation signs that know it.
 
-A posed vertex is exactly R p + t. Kernels see its rounded value and `error`, a bound on what rounding did to each
+A posed vertex is exactly R p + t. Kernels read its rounded value and `error`, a bound on what rounding did to each
 coordinate; a sign that this error could change is settled by expansions of the exact posed coordinates
 (`triangle_triangle.py`) or UNDECIDED. Two bodies are placed together (`place_pair`): where both are posed, both are
-moved back by the first translation, so that only their distance counts and not where they are. A pose that turns a
-lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so does a body without a pose.
+moved back by the first translation, so that the error depends on their distance, not their position. A pose that turns
+a lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so does a body without a pose.
 
-**error.** Four rounded terms of a coordinate, and the rounded difference of two translations: |rounded - exact| <=
-g4 (|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
+**error.** Four rounded terms of a coordinate, and the rounded difference of two translations: |rounded - exact| <= g4
+(|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
 that is below 2^-50 (3 reach + max |t|) + 2^-1060, with room for the rounding of the bound itself.
 
-**Frames.** From the tree of one placed body to the tree of another, the maps that `box_lanes.meeting` takes, with
-their margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of
-two bodies give
+**Frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with their
+margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of two
+bodies give
 
     a = M b + T,    M = (s_b / s_a) R_a' R_b,    T = (R_a' (R_b o_b + t_b - t_a) - o_a) / s_a
 
@@ -37,7 +37,7 @@ from engine.types import UNDECIDED, Float32Array, FloatArray, Point2, Point3
 
 
 class PoseArrays(NamedTuple):
-    """One or many poses of one body for kernels: rotations (n, 3, 3), translations (n, 3); are there any."""
+    """One or many poses of a body for kernels: rotations (n, 3, 3), translations (n, 3), whether there are any."""
 
     rotations: FloatArray
     translations: FloatArray
@@ -56,7 +56,7 @@ class Placement(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """What bounds need to know of a body's coordinates: the largest magnitude, and a power of two that divides all."""
+    """Extent of a body's coordinates: the largest magnitude, and a power of two that divides all."""
 
     reach: float
     grain: float
@@ -64,7 +64,7 @@ class Extent(NamedTuple):
 
 @merged
 def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Placement:
-    """Load the rotation of pose `item`, with a translation of the caller's."""
+    """Load the rotation of pose `item`, with a translation given by the caller."""
     r, i = pose.rotations, item
     x, y = Point3(r[i, 0, 0], r[i, 0, 1], r[i, 0, 2]), Point3(r[i, 1, 0], r[i, 1, 1], r[i, 1, 2])
     return Placement(x, y, Point3(r[i, 2, 0], r[i, 2, 1], r[i, 2, 2]), shift, pose.is_posed, error)
@@ -72,7 +72,7 @@ def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Pl
 
 @inline
 def is_lattice_rotation(rotation: FloatArray) -> bool:
-    """Tell whether a rotation only permutes axes and turns signs."""
+    """Return whether a rotation only permutes axes and flips signs."""
     for i in range(3):
         for k in range(3):
             if rotation[i, k] != 0.0 and abs(rotation[i, k]) != 1.0:
@@ -81,8 +81,8 @@ def is_lattice_rotation(rotation: FloatArray) -> bool:
 
 
 @inline
-def _grain_of(value: float) -> float:
-    """Return the largest power of two that divides a number but 0."""
+def _largest_power_of_two(value: float) -> float:
+    """Return the largest power of two that divides a nonzero number."""
     mantissa, exponent = frexp(value)
     whole = int(mantissa * 2.0**53)
     return ldexp(float(whole & -whole), exponent - 53)
@@ -92,14 +92,15 @@ def _grain_of(value: float) -> float:
 def place_pair(
     a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
 ) -> tuple[Placement, Placement]:
-    """Return the placements of two bodies, moved together so that a posed first body has no translation if both are."""
+    """Return the placements of two bodies, moved together so that, of two posed bodies, the first has no
+    translation."""
     s, t = as_point3(a_pose.translations, a_item), as_point3(b_pose.translations, b_item)
     none, apart = Point3(0.0, 0.0, 0.0), minus(t, s)
     shift, grain = largest_of(apart), min(a.grain, b.grain)
     is_exact = not (a_pose.is_posed or b_pose.is_posed)
     if not is_exact and is_lattice_rotation(a_pose.rotations[a_item]) and is_lattice_rotation(b_pose.rotations[b_item]):
         for value in (s.x, s.y, s.z, t.x, t.y, t.z):
-            grain = min(grain, _grain_of(value)) if value != 0.0 else grain
+            grain = min(grain, _largest_power_of_two(value)) if value != 0.0 else grain
         is_exact = a.reach + b.reach + shift < 2.0**53 * grain and a.reach + b.reach + shift < 1e300
         is_exact = is_exact and max(largest_of(s), largest_of(t)) < 2.0**53 * grain
     a_error = b_error = 0.0
@@ -114,19 +115,19 @@ def place_pair(
 
 @merged
 def placed(p: Point3, place: Placement) -> Point3:
-    """Return the rounded posed point, the point itself where there is no pose."""
+    """Return the rounded posed point; the point itself if there is no pose."""
     t = place.shift
     return Point3(dot(place.x, p) + t.x, dot(place.y, p) + t.y, dot(place.z, p) + t.z) if place.is_posed else p
 
 
 @merged
-def turned(place: Placement, v: Point3) -> Point3:
+def rotate(place: Placement, v: Point3) -> Point3:
     """Return R v."""
     return Point3(dot(place.x, v), dot(place.y, v), dot(place.z, v))
 
 
 @merged
-def turned_back(place: Placement, v: Point3) -> Point3:
+def rotate_back(place: Placement, v: Point3) -> Point3:
     """Return the product of the transpose of R with v."""
     x, y, z = column(place, 0), column(place, 1), column(place, 2)
     return Point3(dot(x, v), dot(y, v), dot(z, v))
@@ -134,7 +135,7 @@ def turned_back(place: Placement, v: Point3) -> Point3:
 
 @merged
 def column(place: Placement, axis: int) -> Point3:
-    """Return where the pose turns an axis to."""
+    """Return the image of an axis."""
     x, y, z = place.x, place.y, place.z
     return Point3(x.x, y.x, z.x) if axis == 0 else (Point3(x.y, y.y, z.y) if axis == 1 else Point3(x.z, y.z, z.z))
 
@@ -159,7 +160,7 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
 
 @inline
 def axis_at(axis: int, place: Placement) -> int:
-    """Return where the pose turns a coordinate axis to; caller guarantees a pose that permutes axes, or none."""
+    """Return the image of a coordinate axis; caller guarantees a pose that permutes axes, or none."""
     if not place.is_posed or axis < 0:
         return axis
     there = column(place, axis)
@@ -169,7 +170,7 @@ def axis_at(axis: int, place: Placement) -> int:
 WIDEST_RATIO = 2.0**60
 WIDEST_MARGIN = 1e15
 NEVER_APART = 1e20
-"""Margin of a map that is left out: far above all boxes, far below `bvh.UNUSED`, which stays apart from everything."""
+"""Margin of an omitted axis: far above all boxes, far below `bvh.UNUSED`, which stays apart from everything."""
 
 
 @inline
@@ -177,8 +178,8 @@ def defect_of(place: Placement) -> float:
     """Return a bound on the entries of |R' R - I|."""
     if not place.is_posed:
         return 0.0
-    x, y = turned_back(place, column(place, 0)), turned_back(place, column(place, 1))
-    z = turned_back(place, column(place, 2))
+    x, y = rotate_back(place, column(place, 0)), rotate_back(place, column(place, 1))
+    z = rotate_back(place, column(place, 2))
     off = max(abs(x.y), abs(x.z), abs(y.z))
     return max(off, abs(x.x - 1.0), abs(y.y - 1.0), abs(z.z - 1.0)) + 2.0**-50
 
@@ -188,10 +189,10 @@ def set_frame(
     frame: Float32Array, a: Placement, a_origin: FloatArray, a_scale: float, b: Placement, b_origin: FloatArray,
     b_scale: float, defect: float,
 ) -> bool:  # fmt: skip
-    """Fill frame (22, 8) float32 with the map from tree b to tree a; tell whether the two trees are surely apart."""
+    """Fill frame (22, 8) float32 with the map from tree b to tree a; return whether the trees are provably apart."""
     ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
-    there = turned(b, origin)
-    v = turned_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))
+    there = rotate(b, origin)
+    v = rotate_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))
     t = Point3((v.x - a_origin[0]) / a_scale, (v.y - a_origin[1]) / a_scale, (v.z - a_origin[2]) / a_scale)
     a_reach = max(abs(a_origin[0]), abs(a_origin[1]), abs(a_origin[2]))
     sizes = (a_reach + largest_of(origin) + largest_of(shift)) / a_scale + 2.0 + 2.0 * ratio
@@ -202,7 +203,7 @@ def set_frame(
         frame[21, :] = NEVER_APART
         return False
     for k in range(3):
-        m = turned_back(a, column(b, k))
+        m = rotate_back(a, column(b, k))
         frame[k, :], frame[3 + k, :], frame[6 + k, :] = ratio * m.x, ratio * m.y, ratio * m.z
         frame[9 + k, :], frame[12 + k, :], frame[15 + k, :] = ratio * abs(m.x), ratio * abs(m.y), ratio * abs(m.z)
     frame[18, :], frame[19, :], frame[20, :] = t.x, t.y, t.z

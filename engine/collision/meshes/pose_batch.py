@@ -1,4 +1,4 @@
-"""Poses of one mesh against another, one or many, in one kernel call; what it leaves open is settled pose by pose."""
+"""Many poses of one mesh against another in one kernel call; poses left UNSETTLED are settled one by one."""
 
 from __future__ import annotations
 
@@ -6,33 +6,36 @@ from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, S
 from engine.collision.meshes import contact_kinds as contact
 from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.mesh_arrays import MeshArrays
-from engine.collision.meshes.parity import INSIDE, OUTSIDE, brought_back, locate_point
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_point, to_local_frame
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
-from engine.collision.meshes.touching import JUDGED, flush, relate_by_contacts
-from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, beside
+from engine.collision.meshes.touching import DECIDED, flush, relate_by_contacts
+from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, off_plane_point
 from engine.compiling.jit import called, inline, kernel, merged
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED, FlagArray, Int8Array, IntArray
 
 RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)
 N_COLUMNS = 5
-"""Of a row that says how a pair lies: its relation, or UNSETTLED; the kind of the contact that is the witness and its
-faces, the caller's, where one was asked for and compiled signs tell, of a body that lies within the other the least
-face; how many contacts there are, ONE_SETTLES where one is enough."""
+"""| column | meaning |
+|---|---|
+| RELATION | the relation, or UNSETTLED |
+| KIND, FIRST_FACE, SECOND_FACE | the witness, if requested and decided; the least face of a body that is inside |
+| N_CONTACTS | number of contacts, ONE_SETTLES if one decides |
+"""
 ONE_SETTLES = -1
 
 DETAIL = -1
-BESIDE, SAME_SIDE, OPPOSITE = 16, 20, 21
-"""In place of the class of a contact, see `in_detail`."""
+NO_SHARED_AREA, SAME_SIDE, OPPOSITE = 16, 20, 21
+"""In place of the class of a contact, see `classify_in_detail`."""
 
 
 @inline
 def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshArrays, place: Placement) -> int:
-    """Return how many components lie inside a mesh that none of them meets, or UNSETTLED."""
+    """Return how many components lie inside a mesh, without contact to it, or UNSETTLED."""
     n_inside, defect = 0, defect_of(place)
     for item in range(source.components.shape[0] if mesh.has_inside else 0):
         p = as_point3(source.vertices, source.triangles[source.components[item], 0])
-        where = locate_point(brought_back(p, source_place, place, defect), mesh)
+        where = locate_point(to_local_frame(p, source_place, place, defect), mesh)
         if where == INSIDE:
             n_inside += 1
         elif where != OUTSIDE:
@@ -42,7 +45,7 @@ def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshA
 
 @inline
 def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> int:
-    """Return the relation of two bodies without contact, or UNSETTLED: none or all of one lies inside the other."""
+    """Return the relation of two bodies without contact, or UNSETTLED if only some components lie inside."""
     in_second = n_components_inside(first, place.a, second, place.b)
     in_first = n_components_inside(second, place.b, first, place.a)
     if in_second == 0 and in_first == 0:
@@ -53,19 +56,19 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> 
 
 
 @called
-def in_contact(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
-    """Fill the row of a pair by its n contacts, all there are, of which the first name the witness.
+def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
+    """Fill the row of a pair from all its n contacts, the first of which name the witness.
 
-    The first are put in order; unless a class is open all become JUDGED with the corners in the other plane.
+    Sorts the first contacts; unless a class is open, all become DECIDED with the corners in the other plane.
     """
-    pairs, kinds, _ = s.found
+    pairs, kinds, _ = s.contacts
     first, second = s.first, s.second
     has_crossing = False
     for item in range(n):
         if kinds[item] == UNDECIDED:
             return
         has_crossing |= kinds[item] == CROSSING
-    put_in_order(first.faces, second.faces, pairs, kinds, n)
+    sort_named_first(first.faces, second.faces, pairs, kinds, n)
     is_free, is_named, best, face, their_face = True, n_named > 0, contact.VERTEX_VERTEX + 1, 0, 0
     for item in range(n):
         i, j = pairs[item, 0], pairs[item, 1]
@@ -74,7 +77,7 @@ def in_contact(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
             s.descent.signs[contact.FLUSH] = 1 << common // 3 | 8 << common % 3
         else:
             kind, may_cut = kind_of_pair(s, i, j)
-        kinds[item] = JUDGED | s.descent.signs[contact.FLUSH]
+        kinds[item] = DECIDED | s.descent.signs[contact.FLUSH]
         f, g = first.faces[i], second.faces[j]
         if item < n_named and (kind < best or (kind == best and (f < face or (f == face and g < their_face)))):
             best, face, their_face = kind, f, g
@@ -91,20 +94,25 @@ def in_contact(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
 
 
 @called
-def in_detail(s: dual.Search, n: int) -> None:
-    """Write how each of n contacts lies in place of its class, nothing where a class is open: BESIDE and which of the
-    two open faces it may cut (`kind_of`); SAME_SIDE, OPPOSITE: clean faces that share an area."""
-    pairs, kinds, _ = s.found
+def classify_in_detail(s: dual.Search, n: int) -> None:
+    """Replace the class of each of n contacts by its detail; no change where a class is open.
+
+    | detail | meaning |
+    |---|---|
+    | NO_SHARED_AREA + bits | the open faces that it may cut (`classify_contact`) |
+    | SAME_SIDE, OPPOSITE | clean faces that share an area, bodies on the same or on opposite sides |
+    """
+    pairs, kinds, _ = s.contacts
     for item in range(n):
         if kinds[item] == UNDECIDED:
             return
     for item in range(n):
         i, j = pairs[item, 0], pairs[item, 1]
         kind, may_cut = (contact.VERTEX_VERTEX, 0) if kinds[item] >= CORNER else kind_of_pair(s, i, j)
-        kinds[item] = BESIDE | may_cut
+        kinds[item] = NO_SHARED_AREA | may_cut
         if kind == contact.FACE_FACE:
             t, u, axis, _ = dual.exact_faces(s, i, j)
-            how, shares = flush(s, i, j, t, u, axis, beside(t, axis))
+            how, shares = flush(s, i, j, t, u, axis, off_plane_point(t, axis))
             if shares:
                 kinds[item] = SAME_SIDE if how == OVERLAPPING else OPPOSITE
         if s.flag[0] != 0:
@@ -113,17 +121,17 @@ def in_detail(s: dual.Search, n: int) -> None:
 
 @merged
 def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
-    """Return `kind_of` two faces, UNSETTLED where one has no area."""
+    """Return `classify_contact` of two faces, UNSETTLED if one has no area."""
     t, u, axis, their_axis = dual.exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
         s.descent.signs[contact.FLUSH] = 0
         return UNSETTLED, contact.BOTH
-    return contact.kind_of(s.descent.poses, t, axis, u, their_axis, dual.exact_error(s), s.descent.signs)
+    return contact.classify_contact(s.descent.poses, t, axis, u, their_axis, dual.exact_error(s), s.descent.signs)
 
 
 @inline
-def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
-    """Sort the first N_NAMED pairs to the front: coplanar ones, then by the callers' faces, then by numbers."""
+def sort_named_first(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
+    """Sort the first N_NAMED pairs to the front: coplanar ones, then by the callers' faces, then by number."""
     for item in range(1, n):
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
         key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item
@@ -140,27 +148,27 @@ def put_in_order(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds:
 @kernel
 def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
-    descent: dual.Descent, found: dual.Found, n_known: int, rows: IntArray, flag: FlagArray,
+    descent: dual.Descent, contacts: dual.Contacts, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the one of the first.
+    """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the pose of the first.
 
-    n_named: how many contacts name the witness; without any, relations are all that is told, and for DETAIL only how
-    the contacts lie. `descent` and `found` are work space: pairs in contact at more faces than fit into `found`, and
-    those no proof here settles, are UNSETTLED. What is found of the last pose stays there. n_known: how many contacts
-    of one pose are in `found`.
+    n_named: number of contacts from which the witness is chosen; without witness only relations are written, and for
+    DETAIL only the details of the contacts. descent, contacts: work space; pairs with more contacts than fit, or
+    without proof, are UNSETTLED. The contacts of the last pose stay there. n_known: number of contacts of one pose
+    already in `contacts`.
     """
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
         place, is_apart = dual.place_bodies(first, still, 0, second, poses, item, descent)
-        s = dual.Search(first, second, place, descent, seek, found, flag)
+        s = dual.Search(first, second, place, descent, seek, contacts, flag)
         how, n_pairs = (dual.DONE, n_known) if is_apart or n_known > 0 else dual.search(s)
         row[N_CONTACTS] = n_pairs
         if how == dual.INTERRUPTED:
             return
         if how == dual.SETTLED:
             row[RELATION], row[N_CONTACTS] = OVERLAPPING if seek == dual.SEEK_OVERLAP else TOUCHING, ONE_SETTLES
-            i, j = found.pairs[0, 0], found.pairs[0, 1]
+            i, j = contacts.pairs[0, 0], contacts.pairs[0, 1]
             if n_named > 0:
                 row[KIND], _ = kind_of_pair(s, i, j)
                 row[FIRST_FACE], row[SECOND_FACE] = first.faces[i], second.faces[j]
@@ -169,8 +177,8 @@ def relate_poses(
             row[KIND] = contact.CONTAINED
             row[FIRST_FACE] = first.first_face if row[RELATION] == FIRST_INSIDE_SECOND else -1
             row[SECOND_FACE] = second.first_face if row[RELATION] == SECOND_INSIDE_FIRST else -1
-        elif n_known > 0 or n_pairs <= dual.room_of(found):
+        elif n_known > 0 or n_pairs <= dual.capacity_of(contacts):
             if n_named == DETAIL:
-                in_detail(s, n_pairs)
+                classify_in_detail(s, n_pairs)
             else:
-                in_contact(s, n_pairs, n_named, row)
+                write_contact_row(s, n_pairs, n_named, row)

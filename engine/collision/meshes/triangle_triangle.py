@@ -1,16 +1,16 @@
-"""Two triangles in space: how they meet, decided by orientation signs only.
+"""Triangle-triangle intersection in space, by orientation signs only.
 
 Each triangle is compared with the plane of the other. Where both straddle, each plane cuts the other triangle in an
-interval of the common line, and two more signs tell whether the intervals have a common point, strictly or not. Two
+interval of the common line, and two more signs decide whether the intervals have a common point, strictly or not. Two
 stages:
 
 - `classify_near`: float64 with one bound for all signs; answers APART or CROSSING, UNDECIDED where any sign is near 0.
-- `classify`: every sign exact, of points under their poses; answers always but out of exponent range.
+- `classify`: every sign exact, of points under their poses; UNDECIDED out of exponent range only.
 
 Caller guarantees that both triangles have an area (`exact_body.py` takes those without).
 
 Source: P. Guigue, O. Devillers, Fast and robust triangle-triangle overlap test using orientation predicates, 2003.
-Changed: the permutations are replaced by a rule that names the lone vertex; strict and weak contacts are told apart.
+Changed: the permutations are replaced by a rule that names the lone vertex; strict and weak contacts are distinguished.
 """
 
 from __future__ import annotations
@@ -31,8 +31,15 @@ CROSSING = 1
 CONTACT = 3
 COPLANAR = 4
 CORNER = 8
-"""Classes of a pair beside UNDECIDED (2): no common point; crossing strictly; a weaker contact; a contact in one
-plane; from CORNER on 3 k + m more, corner k of the first is corner m of the second, and nothing else is common."""
+"""| class of a pair | meaning |
+|---|---|
+| APART | no common point |
+| CROSSING | strict crossing |
+| UNDECIDED (2) | |
+| CONTACT | weaker contact |
+| COPLANAR | contact in one plane |
+| CORNER + 3 k + m | corner k of the first is corner m of the second, the only common point |
+"""
 
 
 Signs = tuple[int, int, int]
@@ -48,7 +55,7 @@ def facet_at(points: FloatArray, i: int, j: int, k: int) -> Facet:
 
 @inline
 def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
-    """Return the triangle before pose number `pose`, or UNPOSED."""
+    """Return the triangle, to be read under pose number `pose`, or UNPOSED."""
     return Facet(
         PosedPoint3(t.p.x, t.p.y, t.p.z, pose),
         PosedPoint3(t.q.x, t.q.y, t.q.z, pose),
@@ -58,7 +65,7 @@ def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
 
 @inline
 def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
-    """Return the vertex (0, 1, 2) that has one closed side of a plane for itself, and that side (1 or -1).
+    """Return the vertex (0, 1, 2) that is alone on one closed side of a plane, and that side (1 or -1).
 
     p, q, r: sides of the vertices, not all zero, not all on one strict side. The other two lie on the opposite closed
     side, and not both of them on the plane unless the lone one is off it.
@@ -79,19 +86,19 @@ def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
 
 @inline
 def is_one_side(p: int, q: int, r: int) -> bool:
-    """Tell whether three signs are all 1 or all -1."""
+    """Return whether three signs are all 1 or all -1."""
     return (p == 1 and q == 1 and r == 1) or (p == -1 and q == -1 and r == -1)
 
 
 @inline
 def is_straddling(p: int, q: int, r: int) -> bool:
-    """Tell whether vertices lie strictly on both sides."""
+    """Return whether vertices lie strictly on both sides."""
     return (p == 1 or q == 1 or r == 1) and (p == -1 or q == -1 or r == -1)
 
 
 @inline
-def turned(t: Facet, lone: int) -> Facet:
-    """Return the triangle with vertex `lone` first, orientation kept."""
+def rotate_vertices(t: Facet, lone: int) -> Facet:
+    """Return the triangle with vertex `lone` first, orientation preserved."""
     return t if lone == 0 else (Facet(t.q, t.r, t.p) if lone == 1 else Facet(t.r, t.p, t.q))
 
 
@@ -100,7 +107,7 @@ def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[
     """Return two triangles with the lone vertices first, each above the other's plane; sides: of t1, of t2."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
-    a, b = turned(t1, lone1), turned(t2, lone2)
+    a, b = rotate_vertices(t1, lone1), rotate_vertices(t2, lone2)
     if side1 < 0:  # turn b over: now a.p is above b
         b = Facet(b.p, b.r, b.q)
     if side2 < 0:
@@ -119,11 +126,11 @@ def corner(t: Facet, index: int) -> Any:
 
 @merged
 def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: float) -> float:
-    """Return a bound on the error of determinants of differences of six points, five of them given from the sixth.
+    """Return an error bound for determinants of differences of six points, five of them given relative to the sixth.
 
-    All differences of two of the six points are at most M = 2 m, m the largest of these. A determinant of three of them
-    is off by at most 11 u P with P <= 6 M^3 for rounding (7 u P as in `orient3d_filter`; some of the differences are
-    rounded twice), 18 e (M + e)^2 for the error of coordinates (e: twice it), and what underflows (`placement.py`).
+    All differences of two points are at most M = 2 m, m the largest given. A determinant of three of them is off by at
+    most 11 u P with P <= 6 M^3 for rounding (7 u P as in `orient3d_filter`; some differences are rounded twice), 18 e
+    (M + e)^2 for the error of coordinates (e: twice it), plus underflow (`placement.py`).
     """
     m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p), largest_of(q), largest_of(r)))
     e = 2.0 * error
@@ -161,7 +168,7 @@ def classify_near(t1: Facet, t2: Facet, error: float) -> int:
 
 @inline
 def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
-    """Tell whether two points of one pose coincide."""
+    """Return whether two points of one pose coincide."""
     return p.x == q.x and p.y == q.y and p.z == q.z and p.pose == q.pose
 
 
@@ -169,7 +176,7 @@ def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
 def sign_of_four(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
 ) -> int:
-    """Return `orient3d_posed`; 0 at once for a repeated point, or a common coordinate, of one pose."""
+    """Return `orient3d_posed`; 0 without a test for a repeated point, or a common coordinate, of one pose."""
     if is_same(a, d) or is_same(b, d) or is_same(c, d) or is_same(a, b) or is_same(a, c) or is_same(b, c):
         return 0
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
@@ -233,8 +240,8 @@ def projected(p: Point3, axis: int) -> Point2:
 
 
 @inline
-def beside(t: Facet, axis: int) -> PosedPoint3:
-    """Return a point off the plane of t: its first corner moved along `axis`, before its pose; maybe not finite."""
+def off_plane_point(t: Facet, axis: int) -> PosedPoint3:
+    """Return a point off the plane of t: its first corner moved along `axis`, before its pose; may be infinite."""
     p, size = t.p, max(largest_of(minus(t.q, t.p)), largest_of(minus(t.r, t.p)))
     value = p.x if axis == 0 else (p.y if axis == 1 else p.z)
     value = 0.5 * value if abs(value) > size else value + size  # either differs from `value`
@@ -245,7 +252,7 @@ def beside(t: Facet, axis: int) -> PosedPoint3:
 def turn_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return how a, b, c of one plane turn; off: a point off that plane. The sense is the same within a question."""
+    """Return the orientation of a, b, c in their plane; off: a point off it, which fixes the sign within a query."""
     if axis >= 0:
         return orient2d(projected(a, axis), projected(b, axis), projected(c, axis))
     return sign_of_four(poses, a, b, off, c, error)
@@ -253,9 +260,13 @@ def turn_in_plane(
 
 @inline
 def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
-    """Return how an edge of t separates it from u, both in one plane.
+    """Return whether an edge of t separates it from u, both in one plane.
 
-    1: some edge has all of u strictly outside; 0: outside or on it; -1: no edge separates; UNDECIDED.
+    | result | meaning |
+    |---|---|
+    | 1 | some edge has all of u strictly outside |
+    | 0 | outside or on it |
+    | -1 | no edge separates |
     """
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     if turn == UNDECIDED:
@@ -285,7 +296,7 @@ def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axi
 def passes_within(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Tell whether a segment a b in the plane of t meets its open face: 1, or not: 0; UNDECIDED."""
+    """Return 1 if a segment a b in the plane of t meets its open face, 0 if not, or UNDECIDED."""
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     if turn == UNDECIDED:
         return UNDECIDED
@@ -306,21 +317,22 @@ def passes_within(
 
 @called
 def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
-    """Tell whether a point in the plane of t lies on the closed face: 1, or not: 0; UNDECIDED."""
-    found, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
+    """Return 1 if a point in the plane of t lies on the closed face, 0 if not, or UNDECIDED."""
+    result, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     for edge in range(3):
         side = turn_in_plane(poses, corner(t, edge), corner(t, edge + 1), p, off, axis, error)
         if turn == UNDECIDED or side == UNDECIDED:
-            found = UNDECIDED
+            result = UNDECIDED
         elif side == -turn:
             return 0
-    return found
+    return result
 
 
 @inline
 def separation(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
-    """Return how two coplanar triangles with area lie: 1 apart, 0 only their borders meet, -1 interiors meet."""
-    off = beside(t1, axis)
+    """Return the relation of two coplanar triangles with area: 1 apart, 0 only their borders meet, -1 interiors
+    intersect."""
+    off = off_plane_point(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):
         return UNDECIDED
     flat = axis if (t1.p.pose == UNPOSED and t2.p.pose == UNPOSED) else -1

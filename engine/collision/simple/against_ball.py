@@ -1,13 +1,13 @@
 """A body with faces or edges (mesh, box, polygon, triangle) against a ball, by distances.
 
-Is everything strictly inside the ball (the farthest vertex)? Does the boundary meet the ball, and does the part of it
-beside the open interior reach into the open ball (the nearest live face)? Is the centre inside?
+Three tests: is everything strictly inside the ball (farthest vertex)? Does the boundary meet the ball, and does a live
+part of it reach into the open ball (nearest live face)? Is the centre inside?
 
-**Floats** prove most of it for a mesh without a pose. The tree names the faces near the ball; of each nearly nearest
-points and the slab between them and the centre (`near_triangles.py`) prove that it enters the open ball, or keeps clear
-of the closed one; the witness is the one that enters of which the box is nearest. A half-line tells where a centre lies
-that no face comes near to; a face that no other one covers, as the caller asks, has the open interior beside it. Else
-boxes of faces bound the distances; faces whose bounds allow a contact are measured, in rationals, nearest first.
+**Floats** prove most of it for an unposed mesh. The tree selects the faces near the ball; nearly nearest points and the
+slab between a face and the centre (`near_triangles.py`) prove that it enters the open ball, or misses the closed one;
+the witness is the entering face with the nearest box. A ray locates a centre that no face is near; a face that no other
+one covers has the open interior next to it. Else boxes of faces bound the distances; faces whose bounds allow a contact
+are measured, in rationals, nearest first.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, S
 from engine.collision.exact_images import Vector, image_point, rounded
 from engine.collision.meshes import parity
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, MeshBody, in_tree, mesh_body_of, triangle_of
-from engine.collision.meshes.near_triangles import nearest_points, rounding_of, seen_from
+from engine.collision.meshes.near_triangles import nearest_points, relative_to, rounding_bound
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.collision.result import FIRST_WITHIN, NO_CONTACT, SECOND_WITHIN, Collision, Parts, Poses, Witness, Work
 from engine.collision.simple.boundary import Boundary, boundary_of, simplex_distance
@@ -43,7 +43,7 @@ _SPREAD = 64
 
 @inline
 def _box_distance(t: Facet, center: Point3, slack: float) -> float:
-    """Return a lower bound on the square of the distance of a triangle's box, as `box_distance_bounds` does."""
+    """Return a lower bound on the squared distance of a triangle's box, as `box_distance_bounds`."""
     square = 0.0
     for c, p, q, r in (
         (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),
@@ -56,13 +56,13 @@ def _box_distance(t: Facet, center: Point3, slack: float) -> float:
 
 @inline
 def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
-    """Tell whether a triangle surely enters the open ball: 1, surely keeps clear of the closed one: 0; else UNSETTLED.
+    """Return 1 if a triangle provably enters the open ball, 0 if it provably misses the closed one; else UNSETTLED.
 
-    The corners as seen from the centre are off by its error and a rounding, the distances by less than twice that.
+    error: corners relative to the centre are off by its error and a rounding, distances by less than twice that.
     """
-    t, none = seen_from(own.point, t), Point3(0.0, 0.0, 0.0)
+    t, none = relative_to(own.point, t), Point3(0.0, 0.0, 0.0)
     center = Facet(none, none, none)
-    slack = 4.0 * rounding_of(t, center) + 2.0 * own.error + 2.0**-50 * radius
+    slack = 4.0 * rounding_bound(t, center) + 2.0 * own.error + 2.0**-50 * radius
     inner = radius - slack
     if inner > 2.0**-500 and min(dot(t.p, t.p), dot(t.q, t.q), dot(t.r, t.r)) < inner * inner * (1.0 - 2.0**-49):
         return 1
@@ -71,11 +71,15 @@ def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
 
 
 @allocating
-def _first_to_enter(
+def _surface_against_ball(
     own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray
 ) -> tuple[int, int]:
-    """Return the relation of the surface of a mesh and a ball, DISJOINT or TOUCHING (a face enters), where proven, and
-    one of the faces that enter; where it is to be named that of the nearest box, of equal ones the first."""
+    """Classify the surface of a mesh against a ball as far as the filter proves; return the relation and a witness
+    face.
+
+    DISJOINT, TOUCHING (a face enters) or UNSETTLED. The witness, if requested, is the entering face with the nearest
+    box, of equal ones the first.
+    """
     center, error = own
     sizes = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
     local, slack = in_tree(mesh, center), parity.SLACK + (error + 2.0**-48 * sizes) / mesh.scale
@@ -83,19 +87,19 @@ def _first_to_enter(
         return UNSETTLED, -1
     box, stack = parity.box_between(local, local, radius / mesh.scale + slack), np.empty(STACK, np.int32)
     stack[0] = 0
-    best, found, unsure, box_slack = np.inf, -1, np.inf, 2.0**-50 * largest_of(center) + 2.0**-1070
+    best, witness, unsure, box_slack = np.inf, -1, np.inf, 2.0**-50 * largest_of(center) + 2.0**-1070
     reach = (radius + 2.0 * error) * (1.0 + 2.0**-40)
-    beyond = reach * reach + 2.0**-990  # what is as far from the rounded centre keeps clear of the ball
+    beyond = reach * reach + 2.0**-990  # farther from the rounded centre is outside the ball
     face, n = parity.next_face(mesh, stack, 1, box)
     while face >= 0:  # bound: the faces of the body
         t = triangle_of(mesh, face)
         square = _box_distance(t, center, box_slack)
-        if square <= beyond and (square < best or (square == best and face < found)):
+        if square <= beyond and (square < best or (square == best and face < witness)):
             how = _enters_ball(t, own, radius)
             if how == 1:
-                best, found = square, face
+                best, witness = square, face
                 if not is_named:
-                    return TOUCHING, found
+                    return TOUCHING, witness
                 within = np.sqrt(square * (1.0 + 2.0**-40) + 2.0**-990)  # of any box that bounds as near
                 box = parity.box_between(local, local, within / mesh.scale + slack)
             elif how == UNSETTLED:
@@ -105,12 +109,12 @@ def _first_to_enter(
         face, n = parity.next_face(mesh, stack, n, box)
     if unsure <= best and unsure < np.inf:
         return UNSETTLED, -1
-    return (DISJOINT if found < 0 else TOUCHING), found
+    return (DISJOINT if witness < 0 else TOUCHING), witness
 
 
 @inline
-def _holds(vertex: int, own: parity.OwnPoint, radius: float, mesh: MeshArrays) -> int:
-    """Tell whether a vertex of a mesh surely lies in the open ball: 1, surely does not: 0; else UNSETTLED."""
+def _ball_contains_vertex(vertex: int, own: parity.OwnPoint, radius: float, mesh: MeshArrays) -> int:
+    """Return 1 if a vertex of a mesh provably lies in the open ball, 0 if provably not, else UNSETTLED."""
     v = minus(as_point3(mesh.vertices, vertex), own.point)
     size = np.sqrt(dot(v, v))
     slack = 2.0**-49 * (size + radius) + 2.0 * own.error + 2.0**-500
@@ -118,32 +122,32 @@ def _holds(vertex: int, own: parity.OwnPoint, radius: float, mesh: MeshArrays) -
 
 
 @inline
-def _holds_all(own: parity.OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
-    """Tell whether all vertices of a mesh surely lie in the open ball: 1, one surely does not: 0; else UNSETTLED.
+def _ball_contains_mesh(own: parity.OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
+    """Return 1 if all vertices of a mesh provably lie in the open ball, 0 if one provably does not, else UNSETTLED.
 
-    Some that are spread over the mesh are asked first: neighbours are alike.
+    A sample spread over the mesh is tested first, since neighbours give the same result.
     """
     n, result = mesh.vertices.shape[0], 1
     for step in (n // _SPREAD + 1, 1):
         for vertex in range(0, n, step):
-            held = _holds(vertex, own, radius, mesh)
-            if held == 0:
+            location = _ball_contains_vertex(vertex, own, radius, mesh)
+            if location == 0:
                 return 0
-            if held == UNSETTLED or (vertex % _MANY == 0 and flag[0] != 0):
+            if location == UNSETTLED or (vertex % _MANY == 0 and flag[0] != 0):
                 result = UNSETTLED
     return result
 
 
 @inline
 def _relate(own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
-    relation, triangle = _first_to_enter(own, radius, mesh, is_named, flag)
+    relation, triangle = _surface_against_ball(own, radius, mesh, is_named, flag)
     if relation == DISJOINT:
         where = parity.locate_point(own, mesh) if mesh.has_inside else parity.OUTSIDE
         return (
             SECOND_INSIDE_FIRST if where == parity.INSIDE else (DISJOINT if where == parity.OUTSIDE else UNSETTLED)
         ), -1
     if relation == TOUCHING:
-        is_within = _holds_all(own, radius, mesh, flag)
+        is_within = _ball_contains_mesh(own, radius, mesh, flag)
         if is_within != 0:
             return (FIRST_INSIDE_SECOND if is_within == 1 else UNSETTLED), -1
         return (OVERLAPPING if mesh.has_inside else TOUCHING), triangle
@@ -152,18 +156,20 @@ def _relate(own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: boo
 
 @kernel
 def relate_balls(
-    mesh: MeshArrays, centers: FloatArray, radius: float, is_named: bool, found: IntArray, flag: FlagArray
+    mesh: MeshArrays, centers: FloatArray, radius: float, is_named: bool, results: IntArray, flag: FlagArray
 ) -> None:
-    """Fill found (n, 2) int64 with the relation of a mesh (first) and a ball about each of centers (n, 4), a point and
-    how far each of its coordinates may be off, or UNSETTLED; and a triangle that enters it, where the relation is
-    overlapping, unless even-odd cancels that one, or touching; the one that names the contact if `is_named`.
+    """Fill results (n, 2) int64 with the relation of a mesh (first) and a ball about each of centers, or UNSETTLED, and
+    a witness triangle.
+
+    centers (n, 4): a point and the error of its coordinates. The witness enters the ball: for overlapping, unless
+    even-odd cancels it, or touching; it is the one that names the contact if `is_named`.
     """
     for row in range(centers.shape[0]):
         if flag[0] != 0:
-            found[row, 0] = UNSETTLED
+            results[row, 0] = UNSETTLED
         else:
             own = parity.OwnPoint(as_point3(centers, row), float(centers[row, 3]))
-            found[row, 0], found[row, 1] = _relate(own, radius, mesh, is_named, flag)
+            results[row, 0], results[row, 1] = _relate(own, radius, mesh, is_named, flag)
 
 
 Moves = tuple[FloatArray, FloatArray] | None
@@ -171,11 +177,11 @@ Moves = tuple[FloatArray, FloatArray] | None
 
 
 def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
-    """Return the relation of a body with a boundary of faces or edges (first) and a ball or disc (second), exact."""
+    """Return the exact relation of a body with faces or edges (first) and a ball or disc (second)."""
     if poses[0] is None or body.dimension == 3:
         is_posed = poses[0] is not None or poses[1] is not None
         row = centers_in_frame(ball, *map(_as_arrays, poses))[0].tolist() if is_posed else [*ball.center.tolist(), 0.0]
-        if _is_ball_beside(body, row, ball.radius):
+        if _is_ball_clear_of_box(body, row, ball.radius):
             return NO_CONTACT
         if body.dimension == 3:
             answer = _by_floats(body, row, ball.radius, work)
@@ -190,13 +196,14 @@ def _as_arrays(pose: Pose | None) -> Moves:
 
 
 def centers_in_frame(ball: Sphere, body_poses: Moves, ball_poses: Moves) -> FloatArray:
-    """Return the centres of placed balls as seen from a placed body (n, d + 1), and how far each coordinate may be off.
+    """Return the centres of placed balls in the frame of a placed body, and the error of each coordinate: (n, d + 1).
 
     **Placed.** A coordinate is the sum of at most three products and a number: seven roundings of 2^-53 of their
-    magnitudes, below 2^-50 of the sum of these, and what underflows, below 2^-1060.
-    **Seen.** R^T (c - t) for the true R^-1 (c - t). R^T R is the identity but for 1e-12 an entry, so the two differ by
-    less than 2^-38 |c - t|; and R keeps distances but for that part, which for those near the radius is that much of it
-    more. What tells a distance from the radius by twice the error is right about that of the image.
+    magnitudes, below 2^-50 of the sum of these, and underflow below 2^-1060.
+
+    **In the frame.** R^T (c - t) replaces R^-1 (c - t). R^T R is the identity up to 1e-12 an entry, so the two differ
+    by less than 2^-38 |c - t|; and R preserves distances up to that part, which for those near the radius is that much
+    of it more. A comparison of a distance with the radius, with twice the error as margin, is right about the image.
     """
     d = ball.dimension
     centers, error = ball.center[None], np.zeros((1, 1))
@@ -216,8 +223,8 @@ def centers_in_frame(ball: Sphere, body_poses: Moves, ball_poses: Moves) -> Floa
     return placed
 
 
-def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
-    """Tell whether a ball surely keeps clear of the box around a body; three roundings of 2^-53 are below 2^-50."""
+def _is_ball_clear_of_box(body: Solid, center: list[float], radius: float) -> bool:
+    """Return whether a ball provably misses the box around a body; three roundings of 2^-53 are below 2^-50."""
     *center, error = center  # the last is how far the others may be off
     reach = radius * (1.0 + 2.0**-50) + 2.0 * error
     low, high, _ = own_box(body)
@@ -228,18 +235,18 @@ def _is_ball_beside(body: Solid, center: list[float], radius: float) -> bool:
 
 
 def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> Collision | None:
-    """Return the relation of a mesh and a ball about a point, off by the fourth number, where floats prove it."""
-    mesh, found = mesh_body_of(body), np.empty((1, 2), np.int64)
-    entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, found, work.budget.flag)
+    """Return the relation of a mesh and a ball about a point, with its error as fourth number, if floats prove it."""
+    mesh, results = mesh_body_of(body), np.empty((1, 2), np.int64)
+    entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, results, work.budget.flag)
     work.budget.check()
-    relation, triangle = found[0].tolist()
+    relation, triangle = results[0].tolist()
     if relation == UNSETTLED or (relation == OVERLAPPING and parity.state_at(mesh.arrays, triangle) == STATE_STACKED):
         return None
     return named(mesh, relation, triangle)
 
 
 def named(mesh: MeshBody, relation: int, triangle: int) -> Collision:
-    """Return the answer to what `relate_balls` found."""
+    """Return the answer for a result of `relate_balls`."""
     if relation in (OVERLAPPING, TOUCHING):
         face = int(mesh.faces[triangle])
         return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
@@ -274,7 +281,7 @@ def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collis
     face = boundary.number(int(entered[0]) if enters else touched)
     if ball.radius > 0.0 and boundary.has_inside:
         if enters:
-            overlaps = _enters(boundary, entered, center, limit)
+            overlaps = _any_part_enters(boundary, entered, center, limit)
             overlaps = overlaps or _is_within_walls(body, pose, center, ball.radius, work)
         else:
             overlaps = boundary.is_inside(center)
@@ -284,21 +291,21 @@ def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collis
 
 
 def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
-    """Return the faces that may come as near as a squared distance, by lower bounds of theirs, nearest first."""
-    found = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
-    return found[np.argsort(nearest[found], kind="stable")]
+    """Return the faces whose lower bounds do not exceed a squared distance, nearest first."""
+    near = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
+    return near[np.argsort(nearest[near], kind="stable")]
 
 
-def _enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
-    """Tell whether something live of these faces comes nearer to the centre than a squared distance."""
+def _any_part_enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
+    """Return whether some live part of these faces is nearer to the centre than a squared distance."""
     return len(faces) > 0 and boundary.has_live(faces, lambda corners: simplex_distance(center, corners) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
-    """Tell whether a ball into which nothing live reaches, walls that cancel at most, is inside else.
+    """Return whether a ball that no live part reaches into, at most walls that cancel, lies inside the body.
 
-    Off those walls the ball is all inside or all outside, so any point of it will do. The points tried lie on the curve
-    (t, t^2, t^3) from the centre, which meets no plane more than three times: one of them is on no wall.
+    Off those walls the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve
+    (t, t^2, t^3) from the centre, which meets a plane at most three times: one of them is on no wall.
     """
     location = rational_location(center, body, pose, work.budget.check)
     if location != Location.BOUNDARY:
@@ -312,7 +319,7 @@ def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: flo
 
 
 def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, work: Work) -> bool:
-    """Tell whether every vertex lies strictly inside the ball; the farthest by float64 bounds are asked first."""
+    """Return whether every vertex lies strictly inside the ball; the farthest by float64 bounds are tested first."""
     n = int(boundary.ends.max()) + 1 if len(boundary.ends) else 0
     some = boundary.floats(np.arange(4) * n // 4)
     if (boundary.bounds(center, some, some)[0] > rounded(limit) * (1.0 + 2.0**-50)).any():
@@ -329,16 +336,16 @@ def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, wo
 
 @np.errstate(over="ignore", invalid="ignore")
 def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Parts:
-    """Return what of a body (first) and a ball or disc (second) that overlap lies outside the other.
+    """Return which of a body (first) and a ball or disc (second) that overlap has a part outside the other.
 
-    The ball sticks out of the body exactly if a live part of the body's boundary enters the open ball: else the ball is
-    all inside. The body sticks out of the ball exactly if some point of its live boundary does, and then a vertex.
+    The ball has one exactly if a live part of the body's boundary enters the open ball: else the ball is all inside.
+    The body has one exactly if some point of its live boundary, and then a vertex, is outside the ball.
     """
     center, limit = image_point(ball.center, poses[1]), Fraction(ball.radius) ** 2
     boundary = boundary_of(body, poses[0], work)
     nearest, farthest = boundary.face_bounds(center)
     candidates = _candidates(nearest, limit)
-    ball_sticks_out = _enters(boundary, candidates, center, limit)
+    ball_sticks_out = _any_part_enters(boundary, candidates, center, limit)
     beyond = np.flatnonzero(farthest >= rounded(limit) * (1.0 - 2.0**-50) - 2.0**-1000)
     beyond = beyond[np.argsort(-nearest[beyond], kind="stable")]
     body_sticks_out = boundary.has_live(beyond, lambda corners: _farthest(center, corners) > limit)

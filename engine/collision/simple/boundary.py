@@ -1,7 +1,8 @@
-"""The boundary of one placed body as balls and half-spaces see it: the faces of a mesh, or the edges of an outline.
+"""Boundary of one placed body for balls and half-spaces: the faces of a mesh, or the edges of an outline.
 
-Only beside what even-odd does not cancel of a face lies the body's open interior. Most faces are whole: no other face
-of the body covers a part of them. A stacked one (`parity.py`) is cut into cells (`exact_regions.py`), live or not.
+The body's open interior is next to exactly the live part of a face, which even-odd does not cancel. Most faces are
+whole: no other face of the body covers a part of them. A stacked one (`parity.py`) is cut into cells
+(`exact_regions.py`), live or not.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Location
 
 
 def box_distance_bounds(point: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds of the squared distance from `point` to anything that fills the boxes ``(n, d)``.
+    """Return lower and upper bounds of the squared distance from `point` to the content of the boxes ``(n, d)``.
 
     The lower bound is the distance to the box, the upper one that to its farthest corner, both widened by 2^-48 of
-    themselves and 2^-1000: at most d + 3 roundings of relative size u enter each, and d underflows of 2^-1074.
-    Overflow makes them infinite or NaN; NaN lower bounds become 0, NaN upper bounds infinity.
+    themselves and 2^-1000: at most d + 3 roundings of relative size u enter each, and d underflows of 2^-1074. Overflow
+    makes them infinite or NaN; NaN lower bounds become 0, NaN upper bounds infinity.
     """
     with np.errstate(all="ignore"):
         gap = np.maximum(np.maximum(low - point, point - high), 0.0)
@@ -53,13 +54,19 @@ _ALL = slice(None)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boundary:
-    """What both kinds have in common.
+    """Interface of both kinds of boundaries.
 
-    ends: (n, d) the vertices of each face or edge. floats: of a place in it the rounded posed vertices, each number
-    within `error` of the exact one. near: all faces that come as near to a point as a radius, ascending, and maybe
-    others. exact: the position of a vertex. number, number_at: the caller's number of a face, and of one at a vertex.
-    signs: of a plane at each vertex. live: what even-odd leaves of faces, corners of triangles; ends of edges, maybe of
-    others too. is_inside: is a point on no face in the body. has_inside: False for surfaces, flat boxes.
+    | field | meaning |
+    |---|---|
+    | ends | (n, d) vertices of each face or edge |
+    | floats | rounded posed vertices at given indices, each number within `error` |
+    | near | superset of the faces within a radius of a point, ascending |
+    | exact | position of a vertex |
+    | number, number_at | the caller's number of a face, and of one at a vertex |
+    | signs | of a plane at each vertex |
+    | live | live parts of faces, as corners of triangles; as ends of edges, maybe with others |
+    | is_inside | whether a point on no face is inside |
+    | has_inside | False for surfaces and flat boxes |
     """
 
     ends: IntArray
@@ -79,29 +86,29 @@ class Boundary:
         return tuple(self.exact(vertex) for vertex in self.ends[face].tolist())
 
     def face_bounds(self, center: Vector, faces: IntArray | slice = _ALL) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the squared distances from a point to what the boxes of faces hold."""
+        """Return bounds of the squared distances from a point to the content of the boxes of faces."""
         ends = self.ends[faces]
         points = self.floats(ends.reshape(-1))
         corners = points.reshape(*ends.shape, points.shape[1]).transpose(1, 0, 2)  # numpy is slow along short axes
         return self.bounds(center, reduce(np.minimum, corners), reduce(np.maximum, corners))
 
     def bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the squared distances from a point to what boxes of rounded posed coordinates hold."""
+        """Return bounds of the squared distances from a point to the content of boxes of rounded posed coordinates."""
         around = np.array([rounded(value) for value in center])
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
 
     def faces_at(self, is_chosen: BoolArray) -> IntArray:
-        """Return the faces with a corner among the vertices chosen."""
+        """Return the faces with a corner among the chosen vertices."""
         return np.flatnonzero(reduce(np.logical_or, is_chosen[self.ends.T]))
 
     def has_live(self, faces: IntArray, condition: Callable[[tuple[Vector, ...]], bool]) -> bool:
-        """Tell whether a condition holds for a live part of these faces, given by its corners."""
+        """Return whether a condition on its corners holds for a live part of these faces."""
         return any(map(condition, self.live(faces.tolist())))
 
 
 def boundary_of(body: Solid, pose: Pose | None, work: Work) -> Boundary:
-    """Return the boundary of a body that is no ball and no half-space."""
+    """Return the boundary of a body other than a ball or a half-space."""
     return (_mesh_boundary if body.dimension == 3 else _outline_boundary)(body, pose, work)
 
 
@@ -182,8 +189,8 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
 
 
 def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImage, FloatArray, float]:
-    """Return the function of points before the pose whose value is that of a plane at their images; and rounded, times
-    a number that makes the largest magnitude about 1."""
+    """Return the function of unposed points whose value is that of a plane at their images; and the same rounded,
+    scaled to a largest magnitude of about 1."""
     normal, offset = plane
     if pose is not None:
         offset += dot(normal, as_vector(pose.translation.tolist()))
@@ -218,7 +225,7 @@ def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
 
 
 def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vector, ...]]:
-    """Yield triangles, in own coordinates, that fill what even-odd leaves of a face; of a whole face its own."""
+    """Yield triangles, in own coordinates, that fill the live part of a face; for a whole face the face itself."""
     if mesh.arrays.axis[face] == NO_AREA:
         return
     if state_at(mesh.arrays, face) != STATE_STACKED:

@@ -1,12 +1,12 @@
-"""Boxes that no pose turns, balls and half-spaces by a few exact comparisons; a body against a half-space by signs.
+"""Closed forms: axis-aligned boxes, balls and half-spaces by a few exact comparisons; a half-space and a body by signs.
 
 Boxes that are not flat and balls: compiled (`form_relations.py`), or in rationals: the nearest and the farthest point
 of a box, or of another ball's centre, from the centre of a ball, against the sum and the difference of the radii. A
 half-space and a ball: the signed distance of the centre against the radius, both sides squared. Two half-spaces overlap
 unless their planes are parallel; then their thresholds along one normal decide.
 
-A linear function is largest and smallest over a body with faces or edges at vertices. What of the body lies beyond a
-half-space is told by its faces with vertices there; the half-space always sticks out of the body.
+A linear function attains its extremes over a body with faces or edges at vertices. The faces with vertices beyond a
+half-space are the part of the body outside it; the half-space always has a part outside the body.
 """
 
 from __future__ import annotations
@@ -57,21 +57,21 @@ def _form(solid: Solid) -> FloatArray | None:
     return None
 
 
-def by_forms_or(otherwise: result.PairFunction) -> result.PairFunction:
-    """Return the function that asks `relate_forms` first, then another one for what that leaves open."""
+def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:
+    """Return a function that tries `relate_forms` first and calls `otherwise` for what is left open."""
 
     def collide_forms(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
         d = first.dimension
-        told = told_by_forms(first, second, motion_of(poses[0], d), motion_of(poses[1], d), work)
-        return otherwise(first, second, poses, work) if told is None else told
+        answer = relation_closed_form(first, second, motion_of(poses[0], d), motion_of(poses[1], d), work)
+        return otherwise(first, second, poses, work) if answer is None else answer
 
     return collide_forms
 
 
-def told_by_forms(
+def relation_closed_form(
     first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: result.Work
 ) -> result.Collision | None:
-    """Return what `relate_forms` tells of a box and a box or ball, or of two balls; None where that is not all."""
+    """Return the relation of a box and a box or ball, or of two balls, by `relate_forms`; None if it is incomplete."""
     form, other, d = form_of(first), form_of(second), first.dimension
     if form is None or other is None:
         return None
@@ -92,7 +92,7 @@ _BY_BALL = result.NO_CONTACT, result.FIRST_WITHIN, result.SECOND_WITHIN, result.
 
 @lru_cache(4096)
 def _named(code: int) -> result.Collision:
-    """Return what the code of two boxes says."""
+    """Return the answer for the code of two boxes."""
     relation, kind = code & _RELATION, code >> relations.KIND_AT & _RELATION
     if relation < OVERLAPPING:
         return _BY_BALL[relation]
@@ -101,7 +101,7 @@ def _named(code: int) -> result.Collision:
 
 
 def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the relation of a box (2D or 3D) or a ball and a ball, exact, in rationals; a posed box is any body.
+    """Return the exact relation of a box (2D or 3D) or a ball and a ball, in rationals; a posed box is any body.
 
     Flat boxes and balls of radius 0 have no interior and never overlap.
     """
@@ -129,9 +129,9 @@ def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: result.Poses,
 def collide_half_spaces(
     first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work
 ) -> result.Collision:
-    """Return the relation of two half-spaces (half-planes in 2D), exact.
+    """Return the exact relation of two half-spaces (half-planes in 2D).
 
-    Equal ones overlap; opposite ones that share their plane touch. One is inside if its plane lies strictly inside.
+    Equal ones overlap; opposite ones with a common plane touch. One is inside if its plane lies strictly inside.
     """
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
@@ -147,7 +147,7 @@ def collide_half_spaces(
 def collide_half_space_sphere(
     space: HalfSpace, ball: Sphere, poses: result.Poses, work: result.Work
 ) -> result.Collision:
-    """Return the relation of a half-space (first) and a ball (second), exact; a half-space is never inside."""
+    """Return the exact relation of a half-space (first) and a ball (second); a half-space is never inside."""
     plane = image_half_space(space, poses[0])
     value = value_at(plane, image_point(ball.center, poses[1]))
     reach = Fraction(ball.radius) ** 2 * squared_length(plane[0])
@@ -158,15 +158,15 @@ def collide_half_space_sphere(
 
 
 _Function = tuple[FloatArray, FloatArray, float, float]
-"""Of points: weights of the coordinates, their sizes, which bound their errors, an offset, and its size."""
+"""Linear function of points: weights of the coordinates, their error sizes, an offset, and its size."""
 _FEW_UNSURE = 16
-"""Vertices whose side of a plane is asked one by one; more are asked together."""
+"""Number of vertices whose side of a plane is decided one by one; more are decided in one call."""
 _BLOCK = 64
 _MANY = 64 * _BLOCK
 
 
 def collide_half_space_body(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the relation of a half-space (first) and a body with vertices (second), exact."""
+    """Return the exact relation of a half-space (first) and a body with vertices (second)."""
     function = _function_in_frame(space, poses)
     if (side := _side_of_box(function, body)) != 0:
         return result.SECOND_WITHIN if side > 0 else result.NO_CONTACT
@@ -190,9 +190,10 @@ def collide_half_space_body(space: HalfSpace, body: Solid, poses: result.Poses, 
 def _by_scan(
     function: _Function, space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work
 ) -> result.Collision | None:
-    """Return the relation of a half-space and a mesh where floats tell the sides of nearly all vertices, else None.
+    """Return the relation of a half-space and a mesh if floats decide the sides of nearly all vertices, else None.
 
-    The face at the first vertex beyond the plane, or on it, is named. Nothing cancels: open interior lies beside.
+    The witness is the face at the first vertex beyond the plane, or on it. Nothing cancels, so the open interior is
+    next to it.
     """
     mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
     normal, sizes, offset, size = function
@@ -227,7 +228,7 @@ def _by_scan(
 
 @inline
 def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
-    """Return 1 or -1 where that is sure, else 0.
+    """Return 1 or -1 if proven, else 0.
 
     Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three
     products and a number by 2^-50 of the sum of magnitudes more.
@@ -242,21 +243,21 @@ def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
 
 @kernel
 def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: FlagArray) -> tuple[int, int, int]:
-    """Look along the vertices of a mesh until one lies surely beyond a plane and one surely before it.
+    """Scan the vertices of a mesh until one is provably beyond a plane and one provably before it.
 
     plane: (3, 3), the weights of the coordinates; their sizes, which bound their errors; the offset and its size.
-    Returns: the first vertex surely beyond, and surely before, -1 where there is none; and how many passed on the way
-    are unsure: the first of them are listed in `unsure` (n,) int64. One more than fit there where the flag was raised.
+    Returns: the first vertex beyond, the first before (-1 if there is none), and the number of unsure vertices passed,
+    the first of which are listed in `unsure` (n,) int64; one more than fit if the flag was set.
     """
     beyond, before, n_unsure, n = -1, -1, 0, mesh.vertices.shape[0]
-    for start in range(0, n, _BLOCK):  # many vertices at once, without branches
+    for start in range(0, n, _BLOCK):  # many vertices in one pass, without branches
         stop, n_beyond, n_before = min(start + _BLOCK, n), 0, 0
         for vertex in range(start, stop):
             side = _side(mesh, vertex, plane)
             n_beyond += side > 0
             n_before += side < 0
-        is_sure = n_beyond + n_before == stop - start
-        if is_sure and (n_beyond == 0 or beyond >= 0) and (n_before == 0 or before >= 0):
+        is_proven = n_beyond + n_before == stop - start
+        if is_proven and (n_beyond == 0 or beyond >= 0) and (n_before == 0 or before >= 0):
             continue
         for vertex in range(start, stop):
             side = _side(mesh, vertex, plane)
@@ -276,10 +277,10 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
 
 
 def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
-    """Return the function of a half-space in the frame of a body, rounded.
+    """Return the linear function of a half-space in the frame of a body, rounded.
 
     Under a pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of
-    2^-53 of their magnitudes, whose sum is the size, and what underflows, below 2^-1070. Under its own pose: rationals.
+    2^-53 of their magnitudes, whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals.
     """
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
@@ -295,10 +296,10 @@ def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
 
 
 def _side_of_box(function: _Function, body: Solid) -> int:
-    """Return the side of a plane, 1 or -1, on which the box around a body surely lies, 0 where it may meet it.
+    """Return the side of a plane, 1 or -1, on which the box around a body provably lies, 0 if it may meet the plane.
 
-    The largest and the smallest of n . p + d over a box are sums of products of its bounds: seven roundings of 2^-53
-    of the sum of magnitudes at most, and as much for what weights and offset are off by, far below 2^-48 of it.
+    error: the extremes of dot(n, p) + d over a box are sums of products of its bounds: at most seven roundings of 2^-53
+    of the sum of magnitudes, and as much for the errors of weights and offset, far below 2^-48 of it.
     """
     weights, sizes, offset, size = function
     low, high, _ = own_box(body)
@@ -313,12 +314,12 @@ def _side_of_box(function: _Function, body: Solid) -> int:
 
 
 def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
-    """Tell whether something live of these faces lies on one side, 1 or -1, of a plane."""
+    """Return whether some live part of these faces lies on one side, 1 or -1, of a plane."""
     return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 
 def half_space_body_parts(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return what of a half-space and a body with vertices (second) that overlap lies outside the other."""
+    """Return which of a half-space and a body with vertices (second) that overlap has a part outside the other."""
     boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
     signs = boundary.signs(plane)
     sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)
@@ -333,7 +334,8 @@ def sphere_sphere_parts(first: Sphere, second: Sphere, poses: result.Poses, work
 
 
 def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Overlapping half-spaces are equal, or their planes cross, or each holds the plane of the other."""
+    """Return the parts of overlapping half-spaces: they are equal, or their planes cross, or each contains the other's
+    plane."""
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]
@@ -342,7 +344,7 @@ def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: result.Poses, 
 
 
 def half_space_sphere_parts(space: HalfSpace, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Parts:
-    """A ball that overlaps a half-space reaches its plane."""
+    """Return the parts of a half-space and a ball; a ball that overlaps a half-space reaches its plane."""
     plane = image_half_space(space, poses[0])
     height, reach = value_at(plane, image_point(ball.center, poses[1])), squared_length(plane[0])
     return result.Parts(True, height < 0 or height**2 < Fraction(ball.radius) ** 2 * reach, True)

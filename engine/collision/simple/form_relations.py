@@ -1,9 +1,9 @@
-"""Compiled: how two boxes along the axes, or balls, lie to each other under poses, exactly.
+"""Exact relations of axis-aligned boxes and balls under poses; compiled.
 
-A pose that moves, permutes axes and turns signs leaves a box a box. Its bounds are then sums of two doubles, held as
-pairs without error; of these only the order on each axis counts, so they are replaced by their ranks. A ball stays one
-under every pose; of a box, or of another ball's centre as a box without extent, a point is nearest to its centre and a
-point farthest. Their squared distances are compared with the sum and difference of radii, squared.
+A pose that moves, permutes axes and flips signs maps a box to a box. Its bounds are then sums of two doubles, stored
+exactly as pairs; only their order on each axis matters, so they are replaced by their ranks. A ball stays a ball under
+every pose; a box, or another ball's centre as a box without extent, has a nearest and a farthest point from its centre.
+Their squared distances are compared with the sum and difference of radii, squared.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ HIGH: Final = 3
 RADIUS: Final = 6
 IS_BALL: Final = 7
 N_NUMBERS: Final = 8
-"""Of a form: low and high on three axes, the radius, and whether it is a ball (1.0)."""
+"""Numbers of a form: low and high on three axes, the radius, and whether it is a ball (1.0)."""
 KIND_AT: Final = 3
 FACE_AT: Final = 6
 THEIR_FACE_AT: Final = 9
-"""Where in the code of an answer the kind of the contact and the faces of two boxes stand, above the relation."""
+"""Bit positions, above the relation, of the kind of the contact and the faces of two boxes."""
 _LARGEST: Final = 2.0**1022
 _N_PAIRS: Final = 24
 _N_RANKS: Final = 12
@@ -46,19 +46,19 @@ class Placed(NamedTuple):
 
 @inline
 def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
-    """Return the axis that a rotation turns to another one, and with which sign; -1 where it mixes axes."""
-    found, factor = -1, 0.0
+    """Return the axis that a rotation maps to another one, and with which sign; -1 if it mixes axes."""
+    source, factor = -1, 0.0
     for m in range(turn.shape[0]):
         if turn[axis, m] != 0.0:
-            if found >= 0 or abs(turn[axis, m]) != 1.0:
+            if source >= 0 or abs(turn[axis, m]) != 1.0:
                 return -1, 0.0
-            found, factor = m, turn[axis, m]
-    return found, factor
+            source, factor = m, turn[axis, m]
+    return source, factor
 
 
 @inline
 def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
-    """Return the bound of a box on one side of an axis as a rotation of the lattice places it."""
+    """Return the bound of a box on one side of an axis as a lattice rotation places it."""
     source, factor = source_of(turn, axis)
     return factor * form[source + (HIGH if (side == 1) == (factor > 0.0) else 0)]
 
@@ -68,7 +68,7 @@ def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
 
 @inline
 def _place(a: Placed, w: Any, first: int) -> bool:
-    """Write the bounds of a placed box as pairs, low and high of each axis; tell whether it still is a box."""
+    """Write the bounds of a placed box as pairs, low and high of each axis; return whether it still is a box."""
     form, turn, move = a
     for axis in range(turn.shape[0]):
         if source_of(turn, axis)[0] < 0:
@@ -83,7 +83,7 @@ def _place(a: Placed, w: Any, first: int) -> bool:
 
 @inline
 def _rank(w: Any, d: int, ranks: Any) -> None:
-    """Write of each bound how many of the four on its axis are less: rounded sums tell, then what they lack."""
+    """Write for each bound the number of smaller ones of the four on its axis: by rounded sums, then by errors."""
     for axis in range(d):
         for i in range(4):
             ranks[3 * i + axis] = 0.0
@@ -117,7 +117,7 @@ _relate = inline(relate_boxes)
 def relate_box_pairs(
     low: FloatArray, high: FloatArray, is_box: BoolArray, pairs: IntArray, relations: Int8Array
 ) -> None:
-    """Fill relations (n,) int8 for the pairs (n, 2) of which both are boxes without pose."""
+    """Fill relations (n,) int8 for the pairs (n, 2) of which both are unposed boxes."""
     for item in range(pairs.shape[0]):
         i, j = pairs[item, 0], pairs[item, 1]
         if is_box[i] and is_box[j]:
@@ -126,14 +126,14 @@ def relate_box_pairs(
 
 @inline
 def _face(turn: FloatArray, axis: int, side: int) -> int:
-    """Return the face of a box that a pose turns to one side of an axis."""
+    """Return the face of a box that a pose maps to one side of an axis."""
     source, factor = source_of(turn, axis)
     return 2 * source + (side if factor > 0.0 else 1 - side)
 
 
 @inline
 def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
-    """Tell whether a rank lies strictly between those of the bounds of a body."""
+    """Return whether a rank lies strictly between those of the bounds of a body."""
     return bool(ranks[_THEIRS * body + axis] < rank < ranks[_THEIRS * body + 3 + axis])
 
 
@@ -141,8 +141,8 @@ def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
 def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind and faces of a contact of two boxes of space that overlap, or UNSETTLED.
 
-    Faces in one plane on one side share an area. Where there are none, an edge of one box passes through a face of the
-    other: of each axis either both ends of one box lie within the other, or one of each.
+    Faces in one plane on one side share an area. If there are none, an edge of one box passes through a face of the
+    other: on each axis either both ends of one box lie within the other, or one of each.
     """
     for face in range(6):
         axis, side = face >> 1, face & 1
@@ -167,7 +167,8 @@ def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind and faces of the contact of two boxes of space that touch.
 
-    They share a part of a face, an edge or a vertex, by on how many axes they only touch; faces: on the first of these.
+    They share a part of a face, an edge or a vertex, by the number of axes on which they only touch; faces: on the
+    first of these.
     """
     n, faces = -1, 0
     for axis in range(3):
@@ -181,7 +182,7 @@ def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 
 @inline
 def _axis(a: Placed, k: int) -> Point3:
-    """Return where the pose turns an axis to."""
+    """Return the image of an axis under the pose."""
     return Point3(a.turn[0, k], a.turn[1, k], a.turn[2, k])
 
 
@@ -195,13 +196,14 @@ def _middle(a: Placed) -> Point3:
 
 
 @called
-def _are_parted(a: Placed, b: Placed) -> bool:
-    """Tell whether a direction surely parts two boxes of space under any poses: an axis of either, or one across two.
+def _has_separating_axis(a: Placed, b: Placed) -> bool:
+    """Return whether a direction provably separates two posed boxes of space: an axis of either, or a cross product of
+    two.
 
-    Along a direction d, as it is computed, a box reaches from its centre as far as half its sides times |d . axis|.
-    With S for the magnitudes of translations and 3.1 times those of coordinates, as the entries of a column of a
-    rotation add up to at most 1.75, d . (centre - centre) is off by less than 10 u |d|_1 S (u = 2^-53), six products by
-    20 u and their sum by 12 u of that: below 2^-46 |d|_1 S in all; what underflows is below 2^-1060 S, or 2^-1000.
+    Along a direction d, as computed, a box reaches from its centre by half its sides times |d . axis|. With S for the
+    magnitudes of translations and 3.1 times those of coordinates, as the entries of a column of a rotation add up to at
+    most 1.75, d . (centre - centre) is off by less than 10 u |d|_1 S (u = 2^-53), six products by 20 u and their sum by
+    12 u of that: below 2^-46 |d|_1 S in all; underflow is below 2^-1060 S, or 2^-1000.
     """
     between, size = minus(_middle(b), _middle(a)), 0.0
     for k in range(3):
@@ -224,10 +226,10 @@ def _are_parted(a: Placed, b: Placed) -> bool:
 
 @inline
 def _relate_boxes(a: Placed, b: Placed) -> int:
-    """Return the code of two boxes, UNSETTLED where one is turned otherwise than by the lattice."""
+    """Return the code of two boxes, UNSETTLED if one has a pose off the lattice."""
     w, ranks, d = workspace(_N_PAIRS), workspace(_N_RANKS), a.turn.shape[0]
     if not (_place(a, w, 0) and _place(b, w, 12)):
-        return DISJOINT if d == 3 and _are_parted(a, b) else UNSETTLED
+        return DISJOINT if d == 3 and _has_separating_axis(a, b) else UNSETTLED
     _rank(w, d, ranks)
     relation = _relate(ranks[:d], ranks[3 : 3 + d], ranks[_THEIRS : _THEIRS + d], ranks[_THEIRS + 3 : _THEIRS + 3 + d])
     if d == 2 or relation < OVERLAPPING:
@@ -242,7 +244,7 @@ def _relate_boxes(a: Placed, b: Placed) -> int:
 
 @inline
 def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: float) -> int:
-    """Add a bound of a placed box or a coordinate of a placed centre, times 1 or -1, to an expansion."""
+    """Add +-1 times a bound of a placed box, or a coordinate of a placed centre, to an expansion."""
     form, turn, move = a
     if form[IS_BALL] == 0.0:
         n = grow(e, n, factor * bound_at(form, turn, axis, side))
@@ -254,7 +256,7 @@ def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: fl
 
 @inline
 def _are_safe(a: Placed) -> bool:
-    """Tell whether expansions of degree four are exact for a form, and that no box is turned off the lattice."""
+    """Return whether expansions of degree four are exact for a form, and no box has a pose off the lattice."""
     form, turn, move = a
     safe = is_safe(form[RADIUS])
     for axis in range(turn.shape[0]):
@@ -267,7 +269,7 @@ def _are_safe(a: Placed) -> bool:
 
 @inline
 def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
-    """Set e to how far the centre of a ball lies outside a form on one side of an axis; return its length."""
+    """Set e to the excess of the centre of a ball beyond a form on one side of an axis; return its length."""
     factor = 1.0 if side == 0 else -1.0
     n = _grow_coordinate(e, 0, a, axis, side, factor)
     return _grow_coordinate(e, n, ball, axis, 0, -factor)
@@ -296,7 +298,7 @@ def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
 
 @called
 def _is_within(a: Placed, ball: Placed) -> bool:
-    """Tell whether a ball lies within the open interior of a box."""
+    """Return whether a ball lies within the open interior of a box."""
     e = workspace(_N_COORDINATE)
     for axis in range(a.turn.shape[0]):
         for side in range(2):
@@ -328,7 +330,10 @@ def relate_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray,
 ) -> int:  # fmt: skip
-    """Return the relation of two forms, the first a box where one is, each with rotation (d, d) and translation (d,);
-    above it, of two boxes of space that meet, the kind of their contact and their faces. UNSETTLED where not told."""
+    """Return the code of two forms, the first a box if one is, each with rotation (d, d) and translation (d,).
+
+    The code is the relation; for two intersecting boxes of space with the kind of their contact and their faces above
+    it. UNSETTLED if not decided.
+    """
     a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)
     return _relate_boxes(a, b) if other[IS_BALL] == 0.0 else _relate_to_ball(a, b)

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.bvh import UNUSED, Bvh, build_bvh, on_lines
+from engine.bounding.bvh import UNUSED, Bvh, build_bvh, cache_aligned
 from engine.containment.methods.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
 from engine.lanes.faces import CORNER_ROWS
@@ -141,7 +141,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
-        on_lines(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, tree.origin,
+        cache_aligned(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, tree.origin,
         1.0 / tree.scale, n_inner, corners_of(tree, n_inner, elements),
     )  # fmt: skip
 
@@ -154,7 +154,7 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
     place[order] = np.arange(len(order))
     child = tree.child[order]
     child = np.where(child >= 0, place[np.maximum(child, 0)], child)
-    return Bvh(on_lines(tree.boxes[order]), on_lines(child), tree.origin, tree.scale), int((~is_block).sum())
+    return Bvh(cache_aligned(tree.boxes[order]), cache_aligned(child), tree.origin, tree.scale), int((~is_block).sum())
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
@@ -170,4 +170,4 @@ def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
     with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
         local = elements[-1 - child[is_item]] * inverse - tree.origin * inverse
     corners[block, :, lane] = local.reshape(-1, CORNER_ROWS)
-    return on_lines(corners)
+    return cache_aligned(corners)

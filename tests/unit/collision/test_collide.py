@@ -108,8 +108,8 @@ def test_thousands_of_contacts_end_and_are_told() -> None:
         for ends in ((number[0, k + 1], number[0, k]), (number[n, k], number[n, k + 1])):
             quads.append([ends[0][0], ends[1][0], ends[1][1], ends[0][1]])
     lower, upper = Polyhedron(corners, quads), Polyhedron(np.add(corners, [0, 0, 1]), quads)
-    beside = Polyhedron(np.add(corners, [0.25, 0.5, 1]), quads)
-    for other in (upper, beside):  # more contacts than one turn of the search has room for
+    off_plane_point = Polyhedron(np.add(corners, [0.25, 0.5, 1]), quads)
+    for other in (upper, off_plane_point):  # more contacts than one turn of the search has room for
         assert collide(lower, other, deadline=60.0).relation == Relation.TOUCHING
 
 

@@ -11,7 +11,7 @@ import pytest
 from engine import Aabb, Polyhedron, Pose, Relation, Solid, Sphere, collide, collide_poses
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import collide_pair
-from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, convex_body_of, pooled
+from engine.collision.convex_body import ASIDE, CENTER, RADIUS, REACH, ROUND, convex_body_of, pool_bodies
 from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Work
@@ -69,7 +69,7 @@ def short_answers(
     pairs = np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
     rows, found = np.append(0, np.ones(n, np.int64)), np.full(n, UNSETTLED, np.int8)
     with np.errstate(all="ignore"):
-        pool = pooled([body for body in bodies if body is not None])
+        pool = pool_bodies([body for body in bodies if body is not None])
         relate_convex_pairs(pool, rows, PoseArrays(rotations, translations, True), pairs, boolean, False, found, flag)
     return found.tolist()
 
@@ -200,7 +200,7 @@ def test_bodies_without_interior_or_not_convex_have_no_place() -> None:
 def test_pooled_arrays_describe_each_body() -> None:
     solids: list[Solid] = [Aabb([0, 1, 2], [3, 4, 6]), Sphere([1, 2, 3], 2), ball_of_belts(6, 3)]
     bodies = [body for body in map(convex_body_of, solids) if body is not None]
-    pool = pooled(bodies)
+    pool = pool_bodies(bodies)
     assert pool.firsts[0].tolist() == [0, 8, 9, 29]
     for k, body in enumerate(bodies):
         first, stop = pool.firsts[0, k], pool.firsts[0, k + 1]

@@ -9,8 +9,8 @@ import pytest
 
 from engine import Aabb, Pose, Relation, collide
 from engine.collision.codes import UNSETTLED
-from engine.collision.convex_body import ASIDE, CENTER, ConvexArrays, convex_body_of, pooled
-from engine.collision.convex_pair import APART, MEETING, inner_point, meet_or_apart, placed_body
+from engine.collision.convex_body import ASIDE, CENTER, ConvexArrays, convex_body_of, pool_bodies
+from engine.collision.convex_pair import APART, MEETING, interior_point, placed_body, refine_portal
 from engine.collision.meshes.placement import PoseArrays
 from engine.compiling.jit import kernel
 from engine.predicates.vectors import minus
@@ -21,15 +21,15 @@ from tests.unit.collision.test_convex_pair import poses
 def ask(pool: ConvexArrays, placed: PoseArrays, found: Any) -> None:
     for item in range(found.shape[0]):
         a, b = placed_body(pool, 0, placed, 0), placed_body(pool, 1, placed, item)
-        start = minus(inner_point(pool.numbers, 0, a, CENTER), inner_point(pool.numbers, 1, b, ASIDE))
-        found[item] = meet_or_apart(pool.points, a, b, start)
+        start = minus(interior_point(pool.numbers, 0, a, CENTER), interior_point(pool.numbers, 1, b, ASIDE))
+        found[item] = refine_portal(pool.points, a, b, start)
 
 
 def claims(second: Aabb, placed: list[Pose]) -> list[int]:
     bodies = [body for body in (convex_body_of(Aabb([0, 0, 0], [1, 1, 1])), convex_body_of(second)) if body is not None]
     arrays = np.array([pose.rotation for pose in placed]), np.array([pose.translation for pose in placed])
     found = np.empty(len(placed), np.int64)
-    ask(pooled(bodies), PoseArrays(*arrays, True), found)
+    ask(pool_bodies(bodies), PoseArrays(*arrays, True), found)
     return found.tolist()
 
 

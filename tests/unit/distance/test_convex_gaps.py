@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Pose, Sphere, clearance
-from engine.collision.convex_body import convex_body_of, pooled
+from engine.collision.convex_body import convex_body_of, pool_bodies
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.simple.form_relations import N_NUMBERS
 from engine.distance.convex_gaps import gaps_of_pairs
@@ -37,7 +37,7 @@ def turns(draw: np.random.Generator) -> Any:
 @pytest.mark.parametrize("size", [1.0, 1e-12, 1e40, 1e-150, 1e290])
 def test_what_is_sure_is_what_clearance_says(size: float) -> None:
     draw, some = np.random.default_rng(5), bodies(size)
-    pool = pooled([found for solid in some if (found := convex_body_of(solid)) is not None])
+    pool = pool_bodies([found for solid in some if (found := convex_body_of(solid)) is not None])
     forms, numbers = np.full((len(some), N_NUMBERS), np.nan), np.arange(len(some))
     n_sure = n = 0
     for first in range(len(some)):
@@ -68,7 +68,7 @@ def test_what_is_sure_is_what_clearance_says(size: float) -> None:
 
 def test_the_gap_itself_is_left_open() -> None:
     box, other = Aabb([0, 0, 0], [1, 1, 1]), Aabb([4, 5, 0], [5, 6, 1])  # 5 apart
-    pool = pooled([body for solid in (box, other) if (body := convex_body_of(solid)) is not None])
+    pool = pool_bodies([body for solid in (box, other) if (body := convex_body_of(solid)) is not None])
     still = PoseArrays(np.eye(3)[None], np.zeros((1, 3)), True)
     for gap, expected in ((5.0, np.nan), (np.nextafter(5.0, 6.0), 5.0), (np.nextafter(5.0, 4.0), np.inf)):
         found = np.empty(1)

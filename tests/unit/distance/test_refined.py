@@ -11,7 +11,7 @@ from engine import Aabb, Polyhedron, Sphere, Triangle
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.result import Feature
 from engine.distance.spreads import SpreadPair, in_space
-from engine.distance.traversal import TOLD, Asked
+from engine.distance.traversal import ANSWERED, Query
 from engine.running.budget import Budget
 
 FACES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
@@ -44,12 +44,12 @@ def test_a_sure_distance_is_that_of_integers(size: float, gap: float) -> None:
             pair = SpreadPair(first, second, STILL, in_space(turns, moves), budget)
             answers, sure = np.full(n, np.nan), np.full(n, np.nan)
             pair.fill(0, n, answers)
-            asked = Asked(np.inf, -1.0, *pair._radii, pair._reach, True)
-            for how, item, rows in pair._left(0, n, sure, asked):
+            asked = Query(np.inf, -1.0, *pair._radii, pair._reach, True)
+            for how, item, rows in pair._unanswered(0, n, sure, asked):
                 points = pair._room.points[:, :d].tolist()
                 least = pair._least(item, rows)[0]
                 exact = least.distance()
-                if how == TOLD:
+                if how == ANSWERED:
                     n_told += 1
                     assert points == least.clearance((Feature("ball"), Feature("ball")), d).points.tolist()  # type: ignore[union-attr]
                     assert [[least.gap.first, least.gap.second]] == [row[2:] for row in rows]

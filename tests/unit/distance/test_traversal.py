@@ -10,7 +10,7 @@ import pytest
 
 import engine.distance.spreads as spreads
 from engine import DeadlineExceededError, Polyhedron, Pose, clearance
-from engine.collision.meshes.near_triangles import FACE, nearest_points, rounding_of, seen_from
+from engine.collision.meshes.near_triangles import FACE, nearest_points, relative_to, rounding_bound
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import kernel
 from engine.distance.exact import nearest_of_triangles
@@ -107,9 +107,9 @@ def test_the_deadline_holds_where_every_pair_of_triangles_is_a_candidate() -> No
 @kernel
 def bounds(s: Facet, t: Facet) -> tuple[float, float]:
     origin = s.p
-    s, t = seen_from(origin, s), seen_from(origin, t)
+    s, t = relative_to(origin, s), relative_to(origin, t)
     _, across = nearest_points(s, t, np.inf)
-    slack = rounding_of(s, t)
+    slack = rounding_bound(s, t)
     return across.low - slack, across.size + slack
 
 

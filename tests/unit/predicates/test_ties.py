@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from engine.collision.meshes.exact_regions import _moved_line_meets
+from engine.collision.meshes.exact_regions import _perturbed_line_hits
 from engine.collision.meshes.parity import MISSED as PASSED_BY
-from engine.collision.meshes.parity import half_line_crosses
+from engine.collision.meshes.parity import ray_crosses
 from engine.collision.meshes.triangle_triangle import Facet
 from engine.containment.methods import rational_locate
 from engine.containment.methods.polyhedron_ray_parity import CROSSED, meet_upwards
@@ -60,10 +60,10 @@ def test_all_that_count_crossings_decide_alike(corners: list[Corner]) -> None:
         low, high = Point3(float(x), float(y), 0.0), Point3(float(x), float(y), 3.0)
         assert (meet_upwards(*points, low) & 3 == CROSSED) == is_over
         assert (rational_locate._cross_upwards(*above, q) == rational_locate.CROSSED) == is_over
-        assert (half_line_crosses(Facet(*points), low, 0.0) != PASSED_BY) == is_over
+        assert (ray_crosses(Facet(*points), low, 0.0) != PASSED_BY) == is_over
         assert is_crossed(q, top, above) == is_over
         if has_area:  # others are upright, and not asked
-            assert _moved_line_meets(above, 0, 1, x, y, 1) == is_over
+            assert _perturbed_line_hits(above, 0, 1, x, y, 1) == is_over
             kind = exact_contact(*points, low, high)
             assert kind != Kind.DEGENERATE
             assert (kind == Kind.PROPER or (kind > Kind.DEGENERATE and kind & Bit.CROSSES != 0)) == is_over

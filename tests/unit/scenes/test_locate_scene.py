@@ -15,7 +15,7 @@ from engine.running.budget import Budget
 from engine.scenes import locate as locate_module
 from engine.scenes.bodies import Bodies
 from engine.scenes.locate import locate_all
-from engine.scenes.standing import Standing
+from engine.scenes.placements import Placements
 from engine.solids.registry import BodyKind
 from engine.types import read_only
 from tests.reference.containment import locate as reference
@@ -234,9 +234,9 @@ def test_points_get_their_locations(fewest: int, monkeypatch: pytest.MonkeyPatch
     random = np.random.default_rng(2)
     points = read_only(random.integers(-1, 10, (200, 3)) / 2.0)
     with Budget() as budget:
-        standing = Standing(Bodies((*solids, solid), (*poses, None)), {3: TURN})
-        found, accuracy = locate_all(points, standing, budget, None, None)
-        few, _ = locate_all(points[:9], standing, budget, None, None)
+        placements = Placements(Bodies((*solids, solid), (*poses, None)), {3: TURN})
+        found, accuracy = locate_all(points, placements, budget, None, None)
+        few, _ = locate_all(points[:9], placements, budget, None, None)
     expected = [
         (item, body, location == 0)
         for item, point in enumerate(points.tolist())

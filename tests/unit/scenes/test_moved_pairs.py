@@ -10,7 +10,7 @@ from engine.containment.methods.rational_locate import no_check, to_world_frame
 from engine.running.budget import Budget
 from engine.scenes.bodies import body_box
 from engine.scenes.near_boxes import scratch_for
-from engine.scenes.standing import PairRows, Placed, list_pairs
+from engine.scenes.placements import PairRows, Placed, list_pairs
 from tests.unit.containment.scenes import box_mesh, made
 
 
@@ -23,7 +23,7 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
     before = [Pose(turn, place) for place in places]
     moved = {int(body): Pose(turn, places[body] + 1.5) for body in rng.choice(n, 9, replace=False)}
     for poses in ({}, moved):
-        standing = Scene([box] * n, before).moved(poses)._standing
+        placements = Scene([box] * n, before).moved(poses)._placements
         named = np.unique(rng.integers(0, n, 12))
         rows = PairRows(
             np.empty(room, np.int64),
@@ -32,14 +32,14 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
             np.empty((2 * room + 1, dimension)),
         )
         with Budget() as budget:
-            arrays = standing.base.arrays(budget)
+            arrays = placements.base.arrays(budget)
             still = Placed(arrays.kinds, arrays.rotations, arrays.translations)
-            moves = Placed(arrays.kinds, *standing.placed_numbers(budget)[1:])
-            scratch, where = scratch_for(standing.n_rows), standing.where(budget)
+            moves = Placed(arrays.kinds, *placements.placed_numbers(budget)[1:])
+            scratch, where = scratch_for(placements.n_rows), placements.where(budget)
             n_pairs = list_pairs(
                 named, reach, where, still, moves, rows, scratch, np.empty((2, dimension)), budget.flag
             )
-            low, high = standing.boxes(budget).transpose(1, 0, 2)
+            low, high = placements.boxes(budget).transpose(1, 0, 2)
         meet = ((low[:, None] <= high + reach) & (low <= high[:, None] + reach)).all(axis=2)
         expected = {(min(i, j), max(i, j)) for i in named.tolist() for j in range(n) if i != j and meet[i, j]}
         pairs = [divmod(key, n) for key in rows.keys[:n_pairs].tolist()]
@@ -52,7 +52,7 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
         }
         assert not far
         for row, body in enumerate(np.array(pairs).ravel().tolist(), 1):
-            assert rows.translations[row].tolist() == standing.pose(body).translation.tolist()  # type: ignore[union-attr]
+            assert rows.translations[row].tolist() == placements.pose(body).translation.tolist()  # type: ignore[union-attr]
         assert rows.rotations[0].tolist() == np.eye(dimension).tolist()
 
 

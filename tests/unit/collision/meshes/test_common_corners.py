@@ -7,7 +7,7 @@ import pytest
 
 from engine import Polyhedron, Pose, Relation, Surface, collide
 from engine.collision.meshes.contact_kinds import common_corner
-from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_found
+from engine.collision.meshes.dual_traversal import SEEK_OVERLAP, new_contacts
 from engine.collision.meshes.exact_body import kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, relate
@@ -59,5 +59,5 @@ def test_few_pairs_say_all() -> None:
     assert row[N_CONTACTS] <= 32 + 30 + 25
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 0])) == 30
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 1])) == 25
-    assert len(SPACE.found.met) == 0
-    assert len(new_found(4, 9).met) == 9
+    assert len(SPACE.contacts.met) == 0
+    assert len(new_contacts(4, 9).met) == 9

@@ -8,11 +8,11 @@ import pytest
 from engine import Pose, Surface
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.contact_kinds import STRENGTH
-from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, Found
+from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, Contacts
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import relate
-from engine.collision.meshes.pose_batch import BESIDE, DETAIL, KIND
+from engine.collision.meshes.pose_batch import DETAIL, KIND, NO_SHARED_AREA
 from engine.collision.meshes.triangle_triangle import APART, CONTACT
 from engine.collision.result import Work
 from tests.unit.collision.meshes.bodies import TURN
@@ -32,7 +32,7 @@ def test_agrees_with_exact_integers(size: int, pose: Pose | None) -> None:
         faces = a.corners(0), b.corners(0)
         if classify_exact(*faces) == APART:
             continue
-        found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
+        found = Contacts(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
         with np.errstate(all="ignore"):
             row, _ = relate(first, second, (first.posed(pose), second.posed(pose)), SEEK_CONTACT, Work(), found)
         if min(first.arrays.axis[0], second.arrays.axis[0]) < 0:
@@ -59,7 +59,7 @@ def test_which_open_face_is_cut(other: tuple[tuple[int, int, int], ...], cut: in
     for face in (((0, 0, 0), (9, 0, 0), (0, 9, 0)), ((0, 9, 0), (9, 0, 0), (0, 0, 0))):
         bodies = [mesh_body_of(Surface(corners, [[0, 1, 2]])) for corners in (face, other)]
         for first, second, bits in ((*bodies, cut), (*bodies[::-1], (0, 2, 1, 3)[cut])):
-            found = Found(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
+            found = Contacts(np.zeros((1, 2), np.int64), np.full(1, CONTACT, np.int8), np.empty(0, np.bool_))
             with np.errstate(all="ignore"):
                 relate(first, second, (STILL, STILL), SEEK_OVERLAP, Work(), found, DETAIL)
-            assert found.kinds.tolist() == [BESIDE | bits]
+            assert found.kinds.tolist() == [NO_SHARED_AREA | bits]

@@ -18,9 +18,9 @@ from engine.collision.meshes.mesh_arrays import (
     mesh_body_of,
     mesh_body_of_triangles,
 )
-from engine.collision.meshes.mesh_mesh import look_at_regions
+from engine.collision.meshes.mesh_mesh import inspect_regions
 from engine.collision.meshes.mesh_pair import MeshPair
-from engine.collision.meshes.parity import UNTOLD, inner_side, locate_vertices, states_of
+from engine.collision.meshes.parity import SIDE_UNKNOWN, inner_side, locate_vertices, states_of
 from engine.collision.meshes.triangle_triangle import APART, COPLANAR
 from engine.collision.result import Work
 from engine.types import UNDECIDED
@@ -83,7 +83,7 @@ def test_a_cavity_turned_outward_has_its_body_on_the_other_side() -> None:
 
 
 def test_of_faces_that_cancel_nothing_is_told() -> None:
-    assert sides(union_of(CUBE, CUBE)) == {UNTOLD}
+    assert sides(union_of(CUBE, CUBE)) == {SIDE_UNKNOWN}
 
 
 # --- Regions of faces in contact: where both insides come up to one side ---
@@ -97,7 +97,7 @@ def test_flush_boxes(at: tuple[float, float, float], overlaps: bool, pose: Pose 
         pair.find_contacts()
         found = False
         for face in np.unique(pair.contacts[:, 0]).tolist():
-            is_overlap, pierces = look_at_regions(pair, 0, face)
+            is_overlap, pierces = inspect_regions(pair, 0, face)
             found |= is_overlap
             assert not pierces or overlaps
         assert found == overlaps

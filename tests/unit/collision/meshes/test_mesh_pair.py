@@ -9,7 +9,7 @@ import pytest
 
 from engine import Pose, Surface, collide
 from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_descent, new_found
+from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, new_contacts, new_descent
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import SPACE, MeshPair, relate, unless_identity
@@ -35,9 +35,9 @@ def test_patches_inside_and_outside(pose: Pose | None) -> None:
     assert [len(patch) for patch in pair.patches(0, none, INSIDE)] == [12]
     assert [len(patch) for patch in pair.patches(1, none, OUTSIDE)] == [108]
     assert pair.patches(0, none, OUTSIDE) == []
-    beside = list(pair.sides_beside(0, np.arange(12)))
-    assert beside
-    assert all(sides.above != sides.below for sides in beside)
+    off_plane_point = list(pair.patch_sides(0, np.arange(12)))
+    assert off_plane_point
+    assert all(sides.above != sides.below for sides in off_plane_point)
 
 
 # --- Polyhedra, surfaces and boxes of space against each other ---
@@ -85,7 +85,7 @@ def test_agrees_with_single_questions(size: int, room: int) -> None:
                 seek,
                 0,
                 new_descent(),
-                new_found(room),
+                new_contacts(room),
                 0,
                 rows,
                 np.zeros(1, np.uint8),
@@ -106,7 +106,7 @@ def test_agrees_with_single_questions(size: int, room: int) -> None:
 def test_finds_what_looking_at_all_pairs_finds(
     room: int, pose: Pose | None, at: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(SPACE, "found", new_found(room))
+    monkeypatch.setattr(SPACE, "contacts", new_contacts(room))
     a, b = mesh(2), mesh(1, at)
     row, found = relate(a, b, (a.posed(pose), b.posed(pose)), SEEK_OVERLAP, Work())
     pairs = set(map(tuple, found.pairs[: row[N_CONTACTS]].tolist()))

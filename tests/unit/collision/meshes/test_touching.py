@@ -10,7 +10,7 @@ import pytest
 from engine import Aabb, Polyhedron, Pose, Relation, collide
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.mesh_arrays import mesh_body_of
-from engine.collision.meshes.mesh_pair import relate, what_to_seek
+from engine.collision.meshes.mesh_pair import relate, search_goal
 from engine.collision.meshes.pose_batch import RELATION
 from engine.collision.result import Collision, Witness, Work
 from engine.solids.base import Solid
@@ -26,7 +26,7 @@ def compiled(first: Solid, second: Solid, pose: Pose | None, their_pose: Pose | 
     """Return the relation that compiled proofs find."""
     a, b, work = mesh_body_of(first), mesh_body_of(second), Work()
     with np.errstate(all="ignore"):
-        return relate(a, b, (a.posed(pose), b.posed(their_pose)), what_to_seek(a, b, work), work)[0][RELATION]
+        return relate(a, b, (a.posed(pose), b.posed(their_pose)), search_goal(a, b, work), work)[0][RELATION]
 
 
 @pytest.mark.parametrize("pose", [None, TURN])

@@ -1,7 +1,6 @@
-"""Where the bodies of a scene stand: as they were when they were last prepared together, but for a few that moved; and
-pairs of which a body is named, by their boxes.
+"""Placements of the bodies of a scene: prepared together, except for a few moved since; pairs of selected bodies.
 
-Kernels take both: of n bodies those that stay go by their index, those that moved count from n on.
+Kernels take both: of n bodies, unmoved ones are numbered by index, moved ones from n on.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.locators import Locator
 from engine.running.budget import UNLIMITED, Budget
 from engine.scenes.bodies import NO_BODIES, NOBODY, Bodies, body_tree, words_of
-from engine.scenes.located import LocateTables, both
+from engine.scenes.location_tables import LocateTables, concatenated
 from engine.scenes.near_boxes import PLACED, Where, bodies_in, place_in, scratch_at, scratch_for
 from engine.scenes.table import unready
 from engine.solids.base import Preparing, Solid
@@ -27,14 +26,14 @@ from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 
 _FEW: Final = 64
 _PART: Final = 4
-"""Bodies up to `_FEW`, or the scene's size divided by `_PART`, that moved are kept beside the others."""
+"""Up to `_FEW` moved bodies, or 1 / `_PART` of the scene, are stored apart from the others."""
 _LISTED: Final = 128
-"""Bodies that moved whose boxes are looked at one by one: as soon done as a tree over them built."""
+"""Number of moved bodies up to which their boxes are tested one by one, as fast as building a tree."""
 _NO_WORDS: Final = [0] * (PLACED + 1)
 
 
-class Standing(Preparing):
-    """Bodies, and those that moved since: safe to share between threads, as `Bodies` are."""
+class Placements(Preparing):
+    """Bodies, and those moved since; safe to share between threads, as `Bodies` are."""
 
     __slots__ = ("_lock", "_placed", "_prepared", "_words", "base", "moved", "names")
 
@@ -55,32 +54,32 @@ class Standing(Preparing):
         return tuple(poses)
 
     @property
-    def all_kept(self) -> list[Any]:
-        """What is prepared."""
+    def all_cached(self) -> list[Any]:
+        """All cached structures."""
         others = (self.kept("few"), self.kept("whole"))
         return [self.base._prepared, self._placed, *(each._prepared for each in others if each is not None)]
 
-    def after(self, poses: Mapping[int, Pose | None]) -> Standing:
-        """Return where bodies stand after some, which are there and ascend, moved."""
+    def after(self, poses: Mapping[int, Pose | None]) -> Placements:
+        """Return the placements after some bodies, given in ascending order, were moved."""
         given = dict(sorted({**self.moved, **poses}.items())) if self.moved else dict(poses)
         if len(given) <= max(_FEW, len(self.base.solids) // _PART):
-            return Standing(self.base, given)
+            return Placements(self.base, given)
         everywhere = list(self.base.poses)
         for body, pose in given.items():
             everywhere[body] = pose
-        return Standing(Bodies(self.base.solids, tuple(everywhere)), {})
+        return Placements(Bodies(self.base.solids, tuple(everywhere)), {})
 
     @property
     def n_rows(self) -> int:
-        """How many bodies kernels tell apart."""
+        """Number of bodies as kernels count them, unmoved and moved."""
         return len(self.base.solids) + len(self.names)
 
     def whole(self) -> Bodies:
-        """Return all bodies where they are."""
+        """Return all bodies at their current poses."""
         return self.prepared("whole", lambda: Bodies(self.base.solids, self.poses)) if self.moved else self.base
 
     def few(self) -> Bodies:
-        """Return those that moved, where they are; at least one."""
+        """Return the moved bodies at their current poses; at least one."""
         solids, poses = tuple(self.base.solids[body] for body in self.moved), tuple(self.moved.values())
         owners = self.base.arrays(UNLIMITED).kinds[self.names]
         return self.prepared("few", lambda: Bodies(solids, poses, self.base, owners))
@@ -90,23 +89,23 @@ class Standing(Preparing):
         return self.moved[body] if body in self.moved else self.base.poses[body]
 
     def placed(self, body: int) -> tuple[Solid, Pose | None]:
-        """Return a body's solid, and its pose unless that leaves it where it is."""
+        """Return a body's solid, and its pose, None for an identity."""
         pose = self.pose(body)
         return self.base.solids[body], None if pose is None or pose.is_identity else pose
 
     def names_of(self, bodies: IntArray) -> IntArray:
-        """Return what bodies are called in the scene of which those that moved count from n on."""
+        """Return the indices in the scene of bodies, of which moved ones are numbered from n on."""
         n = len(self.base.solids)
         if not self.moved or not len(bodies):
             return bodies
         return np.where(bodies < n, bodies, self.names.take(bodies - n, mode="clip"))
 
     def where(self, budget: Budget) -> Where:
-        """Return where all bodies are, for kernels."""
+        """Return the positions of all bodies, for kernels."""
         return (self._placed or self.placed_numbers(budget))[0]
 
     def placed_numbers(self, budget: Budget) -> tuple[Where, FloatArray, FloatArray]:
-        """Return also the rotations and translations of those that moved, the identity for None."""
+        """Return also the rotations and translations of the moved bodies, the identity for None."""
         if self._placed is None:  # who comes second makes the same
             tree, names = self.base.tree(budget), self.names
             if self.moved:
@@ -118,18 +117,18 @@ class Standing(Preparing):
         return self._placed
 
     def words(self, budget: Budget) -> IntArray:
-        """Return what kernels for segments read of all bodies, and of those that moved."""
+        """Return the rows of numbers that kernels for segments read of all bodies, and of the moved ones."""
         if self._words is None:
-            together, moved, kept = self.base.words(budget), _NO_WORDS, ()
+            together, moved, arrays = self.base.words(budget), _NO_WORDS, ()
             if self.moved:
-                moved, kept = words_of(self.where(budget).moved, self.names, unready(len(self.names)))
-            found = np.array([together[0], moved]), (together[1], kept)  # and what its addresses are of
+                moved, arrays = words_of(self.where(budget).moved, self.names, unready(len(self.names)))
+            made = np.array([together[0], moved]), (together[1], arrays)  # and what its addresses are of
             with self._lock:
-                self._words = self._words or found
+                self._words = self._words or made
         return self._words[0]
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
-        """Make ready what kernels want of a body."""
+        """Prepare the kernel inputs named by `wanted` for one body."""
         n = len(self.base.solids)
         if body < n:
             self.base.prepare(body, wanted, budget)
@@ -139,17 +138,17 @@ class Standing(Preparing):
             self.words(budget)[1, PLACED] = few.table(budget).rows.ctypes.data
 
     def boxes(self, budget: Budget) -> FloatArray:
-        """Return the boxes of all bodies where they are."""
+        """Return the boxes of all bodies at their current poses."""
         where = self.where(budget)
         boxes = np.stack([where.together.low, where.together.high], axis=1)
         boxes[self.names, 0], boxes[self.names, 1] = where.moved.low, where.moved.high
         return boxes
 
     def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
-        """Return the pairs of a body named and another whose boxes, grown by `reach`, meet, by first * n + second and
-        in no order, and how the batch of convex bodies relates them, UNSETTLED where it does not.
+        """Return the keys first * n + second, unordered, of the pairs of a named body and another whose boxes, enlarged
+        by `reach`, meet; and their relations by the batch of convex bodies, UNSETTLED if it cannot decide.
 
-        Raises: as `collide_scene` where it does not take a body.
+        Raises: as `collide_scene` for an unsupported body.
         """
         batches, (where, *moves), room = self.base.batches(budget), self.placed_numbers(budget), 16 + 6 * len(named)
         arrays, d = batches.bodies, batches.bodies.dimension
@@ -166,26 +165,27 @@ class Standing(Preparing):
             room = n
 
     def locator(self, body: int) -> Locator:
-        """Return how points are located in a body."""
+        """Return the point locator of a body."""
         if body not in self.moved:
             return self.base.locator(body)
         return self.few().locator(int(np.searchsorted(self.names, body)))
 
     def tables(self, budget: Budget) -> LocateTables:
-        """Return what points are located in, those that moved last."""
+        """Return the location tables, moved bodies last."""
         if not self.moved:
             return self.base.tables(budget)
         few = self.few()
-        return self.prepared("tables", lambda: both(self.base.tables(budget), few.tables(budget)), budget.check)
+        return self.prepared("tables", lambda: concatenated(self.base.tables(budget), few.tables(budget)), budget.check)
 
     def rows_of(self, bodies: IntArray) -> IntArray:
-        """Return where bodies stand of which those that moved count from n on: the inverse of `names_of`."""
+        """Return the numbers of bodies, where moved ones count from n on: the inverse of `names_of`."""
         rows = np.arange(len(self.base.solids))
         rows[self.names] = len(rows) + np.arange(len(self.names))
         return rows[bodies]
 
     def has_new_trees(self, solids: list[Polyhedron]) -> bool:
-        """Tell whether tables lack what is prepared of some solids by now; then they are made again when asked for."""
+        """Return whether tables lack a structure of some solids that is cached by now; then the tables are rebuilt on
+        next use."""
         known: set[int] = self.base.prepared("trees", lambda: set())
         new = {2 * id(solid) + (solid.kept("sides") is not None) for solid in solids} - known
         if new:
@@ -197,15 +197,15 @@ class Standing(Preparing):
 
 
 Placed = namedtuple("Placed", "kinds rotations translations")
-"""What `SceneBodies` says of where bodies stand: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""
+"""Placements of bodies as in `SceneBodies`: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""
 PairRows = namedtuple("PairRows", "keys kinds rotations translations")
-"""Pairs by the keys first * n + second (room,), and their bodies (2 room + 1, ...): those of pair i are rows 2 i + 1
-and 2 i + 2, row 0 is the identity."""
+"""Pairs by keys first * n + second (room,), and their bodies (2 room + 1, ...): pair i has rows 2 i + 1 and 2 i + 2,
+row 0 is the identity."""
 
 
 @inline
 def _put_row(rows: PairRows, row: int, still: Placed, moved: Placed, body: int, name: int) -> None:
-    """Fill a row with a body where it stands."""
+    """Fill a row with a body at its current pose."""
     n = still.kinds.size
     rows.kinds[row] = still.kinds[name]
     for i in range(rows.translations.shape[1]):
@@ -221,11 +221,11 @@ def list_pairs(
     named: IntArray, reach: float, where: Where, still: Placed, moved: Placed, rows: PairRows, room: IntArray,
     box: FloatArray, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill `rows` with the pairs of a named body and another whose boxes, grown by `reach`, meet, each once, in no
-    order; return how many there are, more than there is room for where that is less.
+    """Fill `rows` with the pairs of a named body and another whose boxes, enlarged by `reach`, meet, each once,
+    unordered; return their number, which may exceed the room.
 
     named: ascending. where: a `Where` of n bodies and m that moved; still, moved: `Placed` of both, moved without its
-    row 0. Room to work in: that of `scratch_for`, box (2, dim).
+    row 0. Work space: that of `scratch_for`, box (2, dim).
     """
     n, n_pairs, scratch = still.kinds.size, 0, scratch_at(room)
     rows.kinds[0] = 0

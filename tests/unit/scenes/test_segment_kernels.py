@@ -11,9 +11,9 @@ from engine import Aabb, Convex, HalfSpace, Polyhedron, Pose, Scene, Solid, Sphe
 from engine.running.budget import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.near_boxes import MOST_MET, scratch_for
+from engine.scenes.placements import Placements
 from engine.scenes.posed_mesh import WANTS_BODY
-from engine.scenes.standing import Standing
-from engine.scenes.through import cut_near
+from engine.scenes.segment_kernels import cut_near
 from engine.segment_clipping.exact_pieces import compare
 from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
 from engine.segment_clipping.profiles import exact_pieces
@@ -34,7 +34,7 @@ BODIES: list[Solid] = [
 
 def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]:
     """Return the pieces of segments within a placed solid that are settled, and whether each segment is."""
-    standing, m = Standing(Bodies((solid,), (pose,)), {}), len(segments)
+    placements, m = Placements(Bodies((solid,), (pose,)), {}), len(segments)
     n, order, parts, is_settled = np.zeros(7, np.int64), np.arange(m), [], np.ones(m, np.bool_)
     out, names = room_for(MOST_MET + 2 * m, solid.dimension), np.empty((2, MOST_MET + 2 * m), np.int64)
     left = np.empty((m, 2), np.int64)
@@ -42,12 +42,12 @@ def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]
         each.setflags(write=False)
     with Budget() as budget:
         while n[0] < m:
-            words = standing.words(budget)
+            words = placements.words(budget)
             cut_near(segments, order, m, words, scratch_for(1), budget.flag, out, names, left, n)
             parts.append(Pieces(*(each.copy() for each in first_of(out, int(n[2])))))
             is_settled[left[: n[3], 0]] = False
             if n[4] < 0:
-                standing.prepare(0, int(n[4]), budget)
+                placements.prepare(0, int(n[4]), budget)
     return joined(parts), is_settled
 
 

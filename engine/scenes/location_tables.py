@@ -1,6 +1,6 @@
-"""What points are located in: the bodies of a scene in flat tables, with array operations over all bodies of a kind.
+"""Location tables: the bodies of a scene in flat arrays, with array operations over all bodies of a kind.
 
-A solid that stands for many bodies stands once in the table of its kind; its row there is the slot of each.
+A solid shared by many bodies has one row in the table of its kind; that row is the slot of each.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from engine.solids.registry import BodyKind, row_of
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point3, read_only
 
 _MOST_EDGES: Final = 128
-"""Of a polygon whose edges are all looked at: above it the lists of single solids are better."""
+"""Number of edges up to which all edges of a polygon are tested; above it the index of the solid is faster."""
 _CHECK_EVERY: Final = 256
 
 
 class LocateTables(NamedTuple):
-    """What kernels read of bodies, those that moved last (n + m,), and of their solids."""
+    """What kernels read of bodies, the moved ones last (n + m,), and of their solids."""
 
     kinds: Int8Array
     """See `BodyKind`; of OTHER the locator of the body decides."""
@@ -98,8 +98,8 @@ def locate_in_body(
     return location, False
 
 
-class Kinds:
-    """The tables of the distinct solids of some bodies, by kind, each in its own frame."""
+class Tables:
+    """Tables of the distinct solids of some bodies, by kind, each in its own frame."""
 
     def __init__(self, solids: Sequence[Solid], owners: IntArray, poses: Sequence[Pose | None], budget: Budget) -> None:
         n, self.dimension = len(solids), solids[0].dimension
@@ -130,12 +130,12 @@ class Kinds:
         self._fixed = lows, highs, *rows, *rings, *_meshes(self.meshes)
 
     def _chosen(self, indices: list[int], kind: int) -> list[Any]:
-        """Return solids that get a kind, their slots in the order given."""
+        """Return the solids of a kind, and set their slots in the given order."""
         self.kinds[indices], self.slots[indices] = kind, np.arange(len(indices))
         return [self._solids[index] for index in indices]
 
     def _vectors(self, values: list[FloatArray]) -> FloatArray:
-        """Return vectors as (n, 3); 0 in the third place in the plane."""
+        """Return vectors as (n, 3), with third coordinate 0 in the plane."""
         vectors = np.zeros((len(values), 3))
         if values:
             vectors[:, : self.dimension] = values
@@ -159,7 +159,7 @@ class Kinds:
         return summed([len(each) for each in planes]), rows_in_space(rows)
 
     def placed(self, owners: IntArray, poses: Sequence[Pose | None]) -> LocateTables:
-        """Return the tables of bodies, of each its solid and its pose."""
+        """Return the tables of bodies, given the solid and the pose of each."""
         frames, kinds, slots = frames_of(poses, self.dimension), self.kinds[owners], self.slots[owners]
         bodies = np.flatnonzero(kinds == BodyKind.BALL)
         low, high = moved_boxes(*(self._centers[slots[bodies]],) * 2, frames, frames.rows[bodies])
@@ -176,7 +176,7 @@ class Kinds:
 
 
 def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
-    """Return of polyhedra the sides of their cells and the trees, of those that have them by now."""
+    """Return the cells and the trees of polyhedra, where they are cached."""
     cells, trees = [solid.kept("sides") for solid in solids], [solid.kept("tree") for solid in solids]
     lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_line(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())
@@ -188,8 +188,8 @@ def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def both(first: LocateTables, then: LocateTables) -> LocateTables:
-    """Return the tables of bodies and of others behind them, all of the same solids."""
+def concatenated(first: LocateTables, then: LocateTables) -> LocateTables:
+    """Return the tables of bodies followed by others of the same solids."""
     rows, slots = np.where(then.frames < 0, -1, then.frames + len(first.inverses)), then.slots.copy()
     slots[then.kinds == BodyKind.BALL] += len(first.balls)
     then = then._replace(frames=rows.astype(np.int32), slots=slots)
@@ -200,7 +200,7 @@ def both(first: LocateTables, then: LocateTables) -> LocateTables:
 
 
 def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> tuple[FloatArray, FloatArray]:
-    """Return boxes (n, 2 or 3) around the images of finite boxes under poses, of each its row; -1 for none."""
+    """Return boxes (n, 2 or 3) around the images of finite boxes under poses; rows: of each its pose, -1 for none."""
     low, high, n = np.empty_like(lows), np.empty_like(highs), len(rows)
     boxes, moves = np.stack([lows, highs], axis=1), (frames.rotations, frames.translations)
     with np.errstate(all="ignore"):
