@@ -14,7 +14,7 @@ import numpy as np
 
 from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import TAKEN, check_pose, details_of_boxes, details_where_proven, pair_function
+from engine.collision.collide import TAKEN, details_of_boxes, details_where_proven, pair_function, posed
 from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
 from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
@@ -28,6 +28,7 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose, motions_of
 from engine.solids.primitives import Aabb
 from engine.solids.registry import own_box
+from engine.solids.shapes import as_pose, as_solid
 from engine.types import BoolArray, FloatArray, Int8Array, IntArray
 
 _LEAST_POSES: Final = 32
@@ -189,11 +190,15 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):
             raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))
-    bodies = list(solids)
-    given: list[Pose | None] = [None] * len(bodies) if poses is None else list(poses)
+    bodies = [as_solid(each, "solids", index) for index, each in enumerate(solids)]
+    given: list[Any] = [None] * len(bodies) if poses is None else list(poses)
     if len(given) != len(bodies):
         raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(given)}", ("poses",))
-    return bodies_of(bodies, given, *check_collidable(bodies))
+    kinds = check_collidable(bodies)
+    for index, each in enumerate(given):
+        if each is not None:
+            given[index] = as_pose(each, bodies[index].dimension, "poses", index)
+    return bodies_of(bodies, given, *kinds)
 
 
 def bodies_of(
@@ -216,7 +221,7 @@ def _place_bodies(
         rotations, translations = motions_of([None, *poses], dimension)
     except (AttributeError, TypeError, ValueError):  # one is no pose, or of another dimension
         for index, pose in enumerate(poses):
-            check_pose(pose, solids[index], f"poses[{index}]")
+            posed(pose, solids[index], "poses", index)
         raise
     is_posed = np.frombuffer(bytes([pose is not None for pose in poses]), np.bool_)  # of a list it takes as long again
     pose_rows = np.where(is_posed, np.arange(1, n + 1), -1)

@@ -23,7 +23,6 @@ from engine.collision.simple import closed_forms as forms
 from engine.collision.simple.against_ball import body_sphere_parts, collide_body_sphere
 from engine.collision.simple.boundary import live_parts
 from engine.errors import (
-    InvalidArrayError,
     InvalidInputError,
     UnsupportedPairError,
     UnsupportedSolidError,
@@ -36,6 +35,7 @@ from engine.solids.checks import spell
 from engine.solids.mesh import Surface
 from engine.solids.pose import Pose
 from engine.solids.primitives import Aabb, HalfSpace, Sphere
+from engine.solids.shapes import as_pose, as_solid
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, Rcc8, Relation
 
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
@@ -94,15 +94,16 @@ def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, res
     )
 
 
-def check_pose(pose: object, solid: Solid, name: str) -> None:
-    """Raise unless `pose` is None or a pose of the solid's dimension."""
-    if pose is None:
-        return
-    if not isinstance(pose, Pose):
-        raise InvalidArrayError(f"{name} must be a Pose or None, got {type(pose).__name__}", (name,))
+def posed(given: object, solid: Solid, *where: str | int) -> Pose | None:
+    """Return a pose of the solid's dimension, or None; a matrix or a pair (rotation, translation) is read."""
+    if given is None:
+        return None
+    pose = as_pose(given, solid.dimension, *where)
     if pose.dimension != solid.dimension:
-        message = f"{name} has dimension {pose.dimension}, the {solid.type} it moves has {solid.dimension}"
-        raise WrongDimensionError(message, (name,))
+        raise WrongDimensionError(
+            f"{spell(where)} has dimension {pose.dimension}, the {solid.type} it moves has {solid.dimension}", where
+        )
+    return pose
 
 
 def collide_pair(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
@@ -231,10 +232,11 @@ def collide(
     >>> collide(Aabb([0, 0, 0], [1, 1, 1]), Aabb([0, 0, 0], [2, 2, 2]), detail=True).detail.label
     'TPP'
     """
+    if not (isinstance(first, Solid) and isinstance(second, Solid)):
+        first, second = as_solid(first, "first"), as_solid(second, "second")
     if first_pose is not None or second_pose is not None:
         pair_function(first, second)
-        check_pose(first_pose, first, "first_pose")
-        check_pose(second_pose, second, "second_pose")
+        first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")
     are_plain = type(report) is type(boolean) is type(witness) is type(detail) is bool
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, boolean=boolean, witness=witness, detail=detail)

@@ -30,6 +30,7 @@ from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
 from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of
 from engine.solids.primitives import Sphere
+from engine.solids.shapes import as_pose_arrays, as_solid
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 
 _Answers = (
@@ -42,7 +43,7 @@ def collide_poses(
     first: Solid,
     second: Solid,
     rotations: object,
-    translations: object,
+    translations: object = None,
     *,
     witnesses: bool = False,
     boolean: bool = False,
@@ -60,8 +61,9 @@ def collide_poses(
     first, second : Solid
         As for `collide`.
     rotations : array_like, shape (n_poses, d, d)
-        Row-major; vertices map exactly to R p + t.
-    translations : array_like, shape (n_poses, d)
+        Row-major; vertices map exactly to R p + t. Without translations: a list of `Pose` (or of matrices), or matrices
+        (n_poses, d + 1, d + 1).
+    translations : array_like, shape (n_poses, d), optional
         Of the second body.
     witnesses : bool, default False
         Also return the witness of every pose.
@@ -109,6 +111,8 @@ def collide_poses(
     are_plain = type(report) is type(witnesses) is type(boolean) is type(detail) is bool
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
+    if not (isinstance(first, Solid) and isinstance(second, Solid)):
+        first, second = as_solid(first, "first"), as_solid(second, "second")
     one_pair.pair_function(first, second)
     if detail:
         one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)
@@ -164,6 +168,8 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
 
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
     """Return checked rotations (n, d, d) and translations (n, d), read-only."""
+    if translations is None:
+        rotations, translations = as_pose_arrays(rotations, dimension)
     turn: Any = rotations
     move: Any = translations
     if is_ready(turn, dimension, dimension) and is_ready(move, dimension) and len(turn) == 1 == len(move):

@@ -76,6 +76,14 @@ class Collision:
     witness: Witness | None = None
     detail: Rcc8 | None = None
 
+    @property
+    def collides(self) -> bool:
+        """Whether the bodies have a common point; so is the result itself, as a condition."""
+        return self.relation != Relation.DISJOINT
+
+    def __bool__(self) -> bool:
+        return self.collides
+
     def swapped(self) -> Collision:
         """Return the answer for the two bodies in the other order.
 

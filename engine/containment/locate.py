@@ -27,6 +27,7 @@ from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.registry import row_of
+from engine.solids.shapes import as_solid
 from engine.types import UNDECIDED, Accuracy, BoolArray, FloatArray, Int8Array
 
 MOST: Final = 1024
@@ -195,6 +196,7 @@ def locate(
         if found is not None:
             return (found[0], Accuracy("exact", None, len(found[0]), *found[1:])) if report else found[0]
     check_options(workers, progress, report=report)
+    solid = as_solid(solid, "solid")
     choice = locator_of(solid)
     array = as_points(points, solid.dimension, must_be_finite=False)
     locations = np.empty(len(array), np.int8)

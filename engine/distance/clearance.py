@@ -8,7 +8,7 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
-from engine.collision.collide import Answers, check_pose, collide_pair, pair_function
+from engine.collision.collide import Answers, collide_pair, pair_function, posed
 from engine.collision.collide_poses import as_poses, batch_of
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
@@ -21,6 +21,7 @@ from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.pose import Pose
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, BoolArray, FloatArray, Relation, read_only
 
 
@@ -119,10 +120,11 @@ def clearance(
     >>> clearance(box, Aabb([1.5, 0, 0], [2, 1, 1]), at_least=0.5)
     True
     """
+    if not (isinstance(first, Solid) and isinstance(second, Solid)):
+        first, second = as_solid(first, "first"), as_solid(second, "second")
     pair_function(first, second)
     if first_pose is not None or second_pose is not None:
-        check_pose(first_pose, first, "first_pose")
-        check_pose(second_pose, second, "second_pose")
+        first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")
     if workers is not None or progress is not None or type(report) is not bool:
         check_options(workers, progress, report=report)
     least = None if at_least is None else checked_distance(at_least)
@@ -188,7 +190,7 @@ def clearance_poses(
     first: Solid,
     second: Solid,
     rotations: object,
-    translations: object,
+    translations: object = None,
     *,
     at_least: float | None = None,
     workers: int | None = None,
@@ -205,7 +207,7 @@ def clearance_poses(
         As for `collide`.
     rotations : array_like, shape (n_poses, d, d)
         As for `collide_poses`.
-    translations : array_like, shape (n_poses, d)
+    translations : array_like, shape (n_poses, d), optional
         As for `collide_poses`.
     at_least : float, optional
         A distance that every pose is compared with.
@@ -242,6 +244,8 @@ def clearance_poses(
     [0.0, 0.25, 5.0]
     """
     check_options(workers, progress, report=report)
+    if not (isinstance(first, Solid) and isinstance(second, Solid)):
+        first, second = as_solid(first, "first"), as_solid(second, "second")
     pair_function(first, second)
     least = None if at_least is None else checked_distance(at_least)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)

@@ -1,11 +1,14 @@
-"""Meshes from files, through trimesh, which is installed with the extra ``formats``."""
+"""Meshes from files: STL, OBJ and OFF by the readers here, PLY and GLB through trimesh (extra ``formats``)."""
 
 from __future__ import annotations
 
 import io
 import logging
+import os
 import re
 from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
 from typing import IO, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
@@ -19,7 +22,11 @@ from engine.types import FloatArray, IntArray
 
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 _SOUPS: Final = ("stl",)
-"""Formats of triangles without vertex numbers."""
+"""Formats of triangles without numbers of vertices."""
+_BY_TRIMESH: Final = ("ply", "glb")
+_STL_HEAD: Final = 84
+_STL_TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+_STL_VERTEX: Final = re.compile(rb"^[ \t]*vertex\b([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 M = TypeVar("M", bound=Mesh)
 _ELEMENT: Final = re.compile(rb"^[ \t]*([vf])(?=\s|\Z)([^\n#]*)", re.MULTILINE)
 """The lines of an OBJ file that define vertices and faces."""
@@ -69,15 +76,15 @@ class MeshOfFile(_Arrays):
         return f"face {number // 3}, corner {number % 3}" if self._is_soup else f"vertices[{number}]"
 
 
-def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
+def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str | None = None) -> MeshOfFile:
     r"""Return the vertices and the triangles of a mesh file, for `Polyhedron` or `Surface`, which check them.
 
     Parameters
     ----------
-    file : file object or bytes
-        Open for reading bytes, or the bytes.
-    file_format : {"stl", "obj", "ply", "off", "glb"}
-        Needs trimesh (extra `formats`).
+    file : path, file object or bytes
+        A path as a string or `pathlib.Path`; or open for reading bytes, or the bytes.
+    file_format : {"stl", "obj", "ply", "off", "glb"}, optional
+        By default that of the path's ending, else told by the first bytes. ply and glb need trimesh (extra `formats`).
 
     Returns
     -------
@@ -88,7 +95,7 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
     Raises
     ------
     InvalidInputError
-        Another format, a file that cannot be read, or trimesh is not installed.
+        Another format, a file that is not there or cannot be read, or trimesh is not installed.
     EmptyGeometryError
         A file without faces.
     IndexOutOfRangeError
@@ -108,37 +115,48 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
     double. The meshes of a GLB scene are put together; a node's transform is applied in floating point, so that its
     coordinates are rounded once.
 
-    Cost: that of trimesh's reader, and linear.
+    Cost: linear.
 
     References
     ----------
-    trimesh reads the formats.
+    trimesh reads PLY and GLB; the STL format is that of 3D Systems, 1989.
 
     Examples
     --------
     >>> from engine import read_mesh
     >>> lines = b"OFF", b"4 4 0", b"0 0 0", b"1 0 0", b"0 1 0", b"0 0 1", b"3 0 2 1", b"3 0 1 3", b"3 1 2 3", b"3 0 3 2"
-    >>> vertices, faces = read_mesh(b"\n".join(lines), "off")
+    >>> vertices, faces = read_mesh(b"\n".join(lines))
     >>> vertices.shape, faces.shape
     ((4, 3), (4, 3))
     """
-    if not isinstance(file_format, str) or file_format not in FORMATS:
-        raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {shown(file_format)}", ("format",))
+    if isinstance(file, (str, os.PathLike)):
+        path = Path(file)
+        try:
+            octets = path.read_bytes()
+        except OSError as error:
+            raise InvalidInputError(f"{path}: {error.strerror or error}", ("file",)) from None
+        suffix = path.suffix.lower().removeprefix(".")
+        return read_mesh(octets, suffix if file_format is None and suffix in FORMATS else file_format)
     if isinstance(file, (bytes, bytearray, memoryview)):
         file = io.BytesIO(file)
     if not callable(getattr(file, "read", None)):
-        raise InvalidInputError(f"file must be open for reading bytes, or be bytes, got {shown(file)}", ("file",))
+        raise InvalidInputError(f"file must be a path, open for reading bytes, or bytes, got {shown(file)}", ("file",))
+    if file_format is None:
+        octets = file.read()
+        return read_mesh(octets, _format_of(octets))
+    if not isinstance(file_format, str) or file_format not in FORMATS:
+        raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {shown(file_format)}", ("format",))
     try:
-        import trimesh
+        trimesh = import_module("trimesh") if file_format in _BY_TRIMESH else None
     except ImportError:
         raise InvalidInputError(
-            "mesh files need the package trimesh: pip install 'exact-geometry[formats]'", ("format",)
+            f"{file_format} files need the package trimesh: pip install 'exact-geometry[formats]'", ("format",)
         ) from None
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
     try:
         if file_format in _READERS:
             vertices, faces = _READERS[file_format](file)
-        else:
+        elif trimesh is not None:
             with np.errstate(all="ignore"):
                 scene = trimesh.load_scene(
                     file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
@@ -154,6 +172,38 @@ def read_mesh(file: IO[bytes] | bytes, file_format: str) -> MeshOfFile:
     if not len(faces):
         raise EmptyGeometryError(f"the {file_format} file holds no faces", ("file",))
     return _merge_vertices(vertices, *_triangulate(vertices, faces), file_format)
+
+
+def _format_of(octets: bytes) -> str:
+    """Return the format that the first bytes of a file tell, obj for a text that is none of the others."""
+    head = octets[:512].lstrip()
+    if octets[:4] == b"glTF":
+        return "glb"
+    if head[:3] == b"ply":
+        return "ply"
+    if re.match(rb"(\s*#[^\n]*\n)*\s*C?OFF\b", octets[:512]):
+        return "off"
+    is_text = b"\0" not in octets[:512]
+    return "stl" if head[:5] == b"solid" or not is_text else "obj"
+
+
+def _read_stl(file: IO[bytes]) -> tuple[FloatArray, IntArray]:
+    """Return the corners of the triangles of an STL file, three each, and these triangles.
+
+    A binary file has as many bytes as its number of triangles says, whatever its header begins with.
+    """
+    octets = file.read()
+    n = int.from_bytes(octets[80:84], "little")
+    if len(octets) == _STL_HEAD + n * _STL_TRIANGLE.itemsize:
+        vertices = np.frombuffer(octets, _STL_TRIANGLE, n, _STL_HEAD)["corners"].reshape(-1, 3).astype(np.float64)
+    else:
+        if not octets.lstrip()[:5].lower() == b"solid":
+            raise ValueError(f"a binary file of {n} triangles has {_STL_HEAD + 50 * n} bytes, this one {len(octets)}")
+        rows = [row.split() for row in _STL_VERTEX.findall(octets)]
+        if len(rows) % 3 or not all(len(row) == 3 for row in rows):
+            raise ValueError("a triangle has three lines `vertex x y z`")
+        vertices = np.array(rows, np.bytes_).astype(np.float64).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
 def _read_obj(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
@@ -211,9 +261,10 @@ def _read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
 _READERS: Final[dict[str, Callable[[IO[bytes]], tuple[FloatArray, Any]]]] = {
     "obj": _read_obj,
     "off": _read_off,
+    "stl": _read_stl,
     "ply": _read_ply,
 }
-"""Readers of formats with polygons: trimesh cuts them as fans, also those that are not convex."""
+"""Formats that are not left to trimesh, which cuts polygons as fans, also those that are not convex."""
 
 
 def _triangulate(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:

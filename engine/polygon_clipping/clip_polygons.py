@@ -24,8 +24,10 @@ from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
+from engine.solids.geometries import geometry_of
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import Ragged, summed
+from engine.solids.shapes import as_solid, as_solids
 from engine.types import OPEN, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 
@@ -37,7 +39,7 @@ class PolygonStatus(IntEnum):
     """An exact vertex would need more than 131,072 bits; nothing of the polygon is returned."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ClippedPolygons(Ragged):
     """What is left of a batch of polygons, polygon by polygon, ring by ring.
 
@@ -57,6 +59,7 @@ class ClippedPolygons(Ragged):
         Whether edges along a plane may run there and back, or along another contour.
     """
 
+    _rows: ClassVar[str] = "polygons"
     _levels: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets", "polygon_offsets")
     vertices: FloatArray
     ring_offsets: IntArray
@@ -179,7 +182,9 @@ def clip_polygons(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     if not is_free or report is not False:
         check_options(workers, progress, report=report)
-    plan = region.kept("clipping_plan") if isinstance(region, Solid) else None
+    if not isinstance(region, Solid):
+        region = as_solid(region, "region")
+    plan = region.kept("clipping_plan")
     if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
@@ -258,13 +263,17 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
             check_finite(array, ("polygons",))
         return Contours(dimension, flat, *_equal_rings(n, size), largest)
     if not isinstance(polygons, (list, tuple)):
-        raise InvalidArrayError(
-            f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
-            ("polygons",),
-        )
+        if geometry_of(polygons) is None:
+            raise InvalidArrayError(
+                f"polygons must be a list of polygons, got {type(polygons).__name__}; put a single one into a list",
+                ("polygons",),
+            )
+        polygons = as_solids(polygons, "polygons")
     rings: list[FloatArray] = []
     counts: list[int] = []
     for i, polygon in enumerate(polygons):
+        if not isinstance(polygon, (Polygon, list, tuple, np.ndarray)) and geometry_of(polygon) is not None:
+            polygon = as_solid(polygon, "polygons", i)
         if isinstance(polygon, Polygon):
             if polygon.dimension != dimension:
                 check_dimension(polygon.dimension, dimension, ("polygons", i))

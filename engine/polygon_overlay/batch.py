@@ -12,7 +12,14 @@ from engine.errors import InvalidArrayError, NotRepresentableError
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.implicit_rings import ImplicitRings, areas_of, check_sources
-from engine.polygon_overlay.overlay import accuracy_of, check_operation, overlay_rings, rings_of, ulps_moved
+from engine.polygon_overlay.overlay import (
+    accuracy_of,
+    check_operation,
+    overlay_rings,
+    polygons_in,
+    rings_of,
+    ulps_moved,
+)
 from engine.polygon_overlay.pair_arrays import (
     NO_PAIRS,
     PairResults,
@@ -43,7 +50,7 @@ _DOUBTFUL: Final = 256
 """Pairs whose rings are arranged again together: the overhead of a call is that of some hundred of them."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class OverlayBatch(Ragged):
     """Results of many overlays, as flat arrays; `overlays` and indexing make objects from them.
 
@@ -74,6 +81,7 @@ class OverlayBatch(Ragged):
     | `_apart` | objects made already, by pair |
     """
 
+    _rows: ClassVar[str] = "pairs"
     _levels: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets", "piece_offsets", "pair_offsets")
     status: Int8Array
     vertices: FloatArray
@@ -162,6 +170,11 @@ class OverlayBatch(Ragged):
         return tuple(self)
 
 
+def _polygons_in(solids: Any, name: str) -> Sequence[Solid]:
+    """Return polygons as a tuple, or as they are chosen from arrays; other shapes are read (`shapes.as_solid`)."""
+    return solids if isinstance(solids, PolygonSelection) else tuple(polygons_in(solids, name))
+
+
 def _n_vertices(solids: Sequence[Solid]) -> int:
     return (
         solids.n_vertices
@@ -232,18 +245,11 @@ def overlay_batch(
     """
     check_operation(operation)
     check_options(workers, progress, report=report)
-    for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, (list, tuple, PolygonSelection)):
-            raise InvalidArrayError(f"{name} must be a list of polygons, got {type(solids).__name__}", (name,))
-    subjects, clips = (each if isinstance(each, PolygonSelection) else tuple(each) for each in (subjects, clips))
+    subjects, clips = _polygons_in(subjects, "subjects"), _polygons_in(clips, "clips")
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
-    for solids, name in ((subjects, "subjects"), (clips, "clips")):
-        if not isinstance(solids, PolygonSelection) and set(map(type, solids)) - {Polygon}:
-            for i_pair, solid in enumerate(solids):
-                rings_of(solid, name, i_pair)
     parts: dict[int, PairResults] = {}
     selected = SELECTED_ARRAYS[operation]
     with Budget(deadline, cancel) as budget:

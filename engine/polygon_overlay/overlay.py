@@ -23,7 +23,7 @@ from typing import Final, Literal, Unpack, cast, overload
 
 import numpy as np
 
-from engine.errors import InvalidArrayError, InvalidOperationError, UnsupportedSolidError
+from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
 from engine.polygon_overlay.grid import from_units, grid_of
@@ -45,6 +45,7 @@ from engine.running.parallel import Progress, check_options, is_unlimited
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
+from engine.solids.shapes import as_solid, as_solids
 from engine.types import Accuracy, IntArray
 
 
@@ -144,7 +145,7 @@ def overlay(
             if few is not None:
                 return few
     check_operation(operation)
-    first, second = rings_of(subject, "subject"), rings_of(clip, "clip")
+    first, second = (rings_of(as_solid(each, name), name) for each, name in ((subject, "subject"), (clip, "clip")))
     check_options(workers, progress, report=report)
     with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
         result, n_exact, n_rational = overlay_rings(first, second, operation, budget, UNNAMED, grid)
@@ -161,6 +162,15 @@ def check_operation(operation: str) -> None:
         raise InvalidOperationError(
             f"operation must be one of {', '.join(SELECTED)}; got {shown(operation)}", ("operation",)
         )
+
+
+def polygons_in(solids: Sequence[Solid], name: str) -> Sequence[Solid]:
+    """Return polygons as they are, other shapes read; refuse anything else, by its place."""
+    read = as_solids(solids, name)
+    if set(map(type, read)) - {Polygon}:
+        for k, each in enumerate(read):
+            rings_of(each, name, k)
+    return read
 
 
 def rings_of(solid: object, *where: str | int) -> RingArrays:
@@ -281,8 +291,6 @@ def union_all(
     [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]]
     """
     check_options(workers, progress, report=report)
-    if not isinstance(polygons, (list, tuple)):
-        raise InvalidArrayError(f"polygons must be a list of polygons, got {type(polygons).__name__}", ("polygons",))
     with Budget(deadline, cancel) as budget:
         result, accuracy = _arrange_all(polygons, Rule.ANY, budget, grid)
     if progress is not None:
@@ -364,10 +372,7 @@ def _rings_of_all(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntA
 
     Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
     """
-    if set(map(type, polygons)) - {Polygon}:
-        for k, polygon in enumerate(polygons):
-            rings_of(polygon, "polygons", k)
-    each = cast("Sequence[Polygon]", polygons)
+    each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
     if not each:
         return NO_RINGS, np.zeros(0, np.int64), np.zeros(0, np.int64)
     flat = polygon_arrays_of(each)

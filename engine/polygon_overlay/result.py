@@ -48,6 +48,12 @@ class OverlayPiece(NamedTuple):
     shell: FloatArray
     holes: tuple[FloatArray, ...]
 
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The piece as a GeoJSON Polygon, its rings closed."""
+        rings = [np.concatenate([ring, ring[:1]]).tolist() for ring in (self.shell, *self.holes)]
+        return {"type": "Polygon", "coordinates": rings}
+
 
 @dataclass(frozen=True, slots=True)
 class Collapse:
@@ -131,7 +137,7 @@ def nearest(value: Fraction) -> float:
     return nearest_quotient(*value.as_integer_ratio())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Overlay:
     """The result of a Boolean operation on polygons.
 
@@ -193,6 +199,12 @@ class Overlay:
     holes_parted: int = 0
     vertices_moved: int = 0
     snapped: bool = False
+
+    def __repr__(self) -> str:
+        counts = (
+            f"{self.n_pieces:,} piece{'s' * (self.n_pieces != 1)}, {self.n_holes:,} hole{'s' * (self.n_holes != 1)}"
+        )
+        return f"<Overlay: {counts}, {len(self.vertices):,} vertices>"
 
     def __getattr__(self, name: str) -> Any:
         """Return a field that is computed on first access; only missing attributes come here."""

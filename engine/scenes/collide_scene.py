@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
+from engine.solids.columns import Columns
 from engine.solids.pose import Pose
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
 
@@ -42,8 +43,8 @@ _BYTES_OF_WITNESS: Final = 150
 """Memory of a colliding pair with witness: in its block, concatenated, and sorted."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ScenePairs:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ScenePairs(Columns):
     """The colliding pairs of a scene, sorted by first, then second; with a gap also the pairs nearer than that.
 
     Attributes
@@ -60,12 +61,17 @@ class ScenePairs:
         As `clearance` gives it, 0.0 where they meet; where a gap was given and boolean was not.
     """
 
+    _rows: ClassVar[str] = "pairs"
     first: IntArray
     second: IntArray
     relation: Int8Array
     witnesses: tuple[Witness | None, ...] | None = None
     detail: Int8Array | None = None
     distance: FloatArray | None = None
+
+    def __iter__(self) -> Iterator[tuple[int, int, Relation]]:
+        """Yield both bodies of each pair, and how the first relates to the second."""
+        return zip(self.first.tolist(), self.second.tolist(), map(Relation, self.relation.tolist()))
 
 
 def collide_scene(

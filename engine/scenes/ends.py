@@ -10,18 +10,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cmp_to_key
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.running.budget import UNLIMITED, Budget, concatenated
 from engine.segment_clipping.exact_pieces import ONE, ZERO, Parameter, compare
+from engine.solids.columns import Columns
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ScenePieces:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ScenePieces(Columns):
     """The pieces of segments within bodies, by source, then by where they start, then by body.
 
     Attributes
@@ -39,6 +40,7 @@ class ScenePieces:
         touch or leave a gap exactly as their ranks do.
     """
 
+    _rows: ClassVar[str] = "pieces"
     source: IntArray
     body: IntArray
     start: FloatArray
@@ -46,9 +48,6 @@ class ScenePieces:
     t: FloatArray
     faces: IntArray
     ranks: IntArray
-
-    def __len__(self) -> int:
-        return len(self.source)
 
 
 class LoosePieces(NamedTuple):

@@ -40,7 +40,7 @@ _FEWEST_FOR_TREES: Final = 64
 """Number of points from which a tree is built; fewer are located as a small batch of `locate`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SceneLocations(Ragged):
     """The bodies that contain each point: those of point i are ``indices[offsets[i]:offsets[i + 1]]``, ascending.
 
@@ -55,12 +55,21 @@ class SceneLocations(Ragged):
     """
 
     _levels: ClassVar[tuple[str, ...]] = ("indices", "offsets")
+    _rows: ClassVar[str] = "points"
     offsets: IntArray
     """``(n_points + 1,)`` int64."""
     indices: IntArray
     """``(n_held,)`` int64: positions in the list of solids."""
     on_boundary: BoolArray
     """``(n_held,)``: True where the point is on the body's boundary, False where it is inside."""
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __getitem__(self, point: int) -> IntArray:
+        """Return the bodies that contain one point, ascending."""
+        start, stop = self.offsets[point : point + 2] if point >= 0 else self.offsets[len(self) + point :][:2]
+        return self.indices[start:stop]
 
 
 @kernel

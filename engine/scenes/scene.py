@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final, Literal, Unpack, cast, overload
 import numpy as np
 
 from engine.collision.codes import TOUCHING, UNSETTLED
-from engine.collision.collide import check_pose
+from engine.collision.collide import posed
 from engine.distance.clearance import checked_distance
 from engine.errors import (
     EngineError,
@@ -30,6 +30,7 @@ from engine.segment_clipping.exact_pieces import ONE, ZERO
 from engine.solids.base import Immutable, Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, as_points, shown
 from engine.solids.pose import Pose
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, BoolArray, FloatArray
 
 _BYTES_OF_POSE: Final = 1000
@@ -74,8 +75,7 @@ class Scene(Immutable):
     _placements: Placements
 
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None] | None = None) -> None:
-        check_bodies(solids, poses)
-        bodies = Bodies(tuple(solids), (None,) * len(solids) if poses is None else tuple(poses))
+        bodies = Bodies(*checked_bodies(solids, poses))
         object.__setattr__(self, "_placements", Placements(bodies, {}))
 
     def __len__(self) -> int:
@@ -143,7 +143,7 @@ class Scene(Immutable):
         given = {body: poses[body] for body in bodies}
         for body, pose in given.items():
             if type(pose) is not Pose or len(pose.translation) != solids[0].dimension:
-                check_pose(pose, solids[body], f"poses[{body}]")
+                given[body] = posed(pose, solids[body], "poses", body)
         scene = object.__new__(Scene)
         object.__setattr__(scene, "_placements", self._placements.after(given))
         return scene
@@ -374,32 +374,23 @@ class Scene(Immutable):
         return sorted(indices)
 
 
-def check_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> None:
-    """Raise unless all solids have one dimension and each has a pose or None; the error names the first wrong one."""
+def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Pose | None, ...]]:
+    """Return solids of one dimension and a pose or None for each; other shapes are read (`engine.solids.shapes`)."""
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
+    solids = tuple(as_solid(each, "solids", index) for index, each in enumerate(solids))
     for index, solid in enumerate(solids):
-        if not isinstance(solid, Solid):
-            raise InvalidArrayError(f"solids[{index}] must be a solid, got {type(solid).__name__}", ("solids", index))
         if solid.dimension != solids[0].dimension:
             raise WrongDimensionError(
                 f"solids[{index}] is {solid.dimension}D, solids[0] {solids[0].dimension}D; use one dimension",
                 ("solids", index),
             )
     if poses is None:
-        return
+        return solids, (None,) * len(solids)
     if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):
         given = f"{len(poses)}" if isinstance(poses, (list, tuple)) else type(poses).__name__
         raise InvalidArrayError(f"poses must be a list of {len(solids)}, one for each solid, got {given}", ("poses",))
-    for index, pose in enumerate(poses):
-        if pose is not None and not isinstance(pose, Pose):
-            raise InvalidArrayError(
-                f"poses[{index}] must be a Pose or None, got {type(pose).__name__}", ("poses", index)
-            )
-        if pose is not None and pose.dimension != solids[index].dimension:
-            raise WrongDimensionError(
-                f"poses[{index}] is {pose.dimension}D, its solid {solids[index].dimension}D", ("poses", index)
-            )
+    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(zip(poses, solids)))
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Unpack, overload
+from typing import Any, ClassVar, Literal, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +19,15 @@ from engine.segment_clipping.decide_then_cut import Method, Plan, Scaled, clip_o
 from engine.segment_clipping.planes_cut import fill_on_boxes, fill_on_rows
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
+from engine.solids.columns import Columns
 from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, rows_between, rows_of
 from engine.solids.registry import refused, row_of
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray, IntArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SegmentPieces:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SegmentPieces(Columns):
     """The pieces of a batch of segments within a region, by source and then by t.
 
     Attributes
@@ -39,14 +42,21 @@ class SegmentPieces:
         The plane or face crossed at either end, -1 where the end is the segment's own.
     """
 
+    _rows: ClassVar[str] = "pieces"
     source: IntArray
     start: FloatArray
     end: FloatArray
     t: FloatArray
     faces: IntArray
 
-    def __len__(self) -> int:
-        return len(self.source)
+    def __iter__(self) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+        """Yield of each piece the segment that it is a part of, its start and its end."""
+        return zip(self.source.tolist(), self.start, self.end)
+
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The pieces as a GeoJSON MultiLineString."""
+        return {"type": "MultiLineString", "coordinates": np.stack([self.start, self.end], axis=1).tolist()}
 
 
 @overload
@@ -134,6 +144,7 @@ def clip_segments(
     plan: Plan | None = region.kept("segment_plan") if isinstance(region, Solid) else None
     array: Any = segments
     if plan is None or not is_ready(array, 2, region.dimension):
+        region = as_solid(region, "region")
         plan = plan_for(region)
         array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks at it
     if is_free and len(array) <= plan.few:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal, Unpack, overload
+from typing import Any, ClassVar, Final, Literal, Unpack, overload
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.on_boundary.contacts import are_same
 from engine.segment_clipping.pieces import Pieces
 from engine.solids.base import Solid
+from engine.solids.geometries import lines_in
 from engine.solids.ragged import Ragged, as_lines
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
 
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
@@ -30,7 +32,7 @@ _AT_ONCE: Final = 1 << 20
 """Pieces whose columns are gathered without a look at the clock."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LinePieces(Ragged):
     """The pieces of a batch of polylines within a region, by source and then along the line.
 
@@ -51,6 +53,7 @@ class LinePieces(Ragged):
         The plane or face crossed at either end, -1 where the end is the line's own.
     """
 
+    _rows: ClassVar[str] = "pieces"
     _levels: ClassVar[tuple[str, ...]] = ("vertices", "offsets")
     source: IntArray
     vertices: FloatArray
@@ -59,8 +62,10 @@ class LinePieces(Ragged):
     t: FloatArray
     faces: IntArray
 
-    def __len__(self) -> int:
-        return len(self.source)
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """The pieces as a GeoJSON MultiLineString."""
+        return {"type": "MultiLineString", "coordinates": [self[piece].tolist() for piece in range(len(self))]}
 
     def __getitem__(self, piece: int) -> FloatArray:
         """Return the positions of one piece, (k, dim) with k of at least 2, a view of `vertices`."""
@@ -143,8 +148,10 @@ def clip_lines(
     """
     check_options(workers, progress, report=report)
     is_free = is_unlimited(workers, deadline, cancel, progress)
+    region = as_solid(region, "region")
     plan = plan_for(region)
-    vertices, offsets = as_lines(lines, region.dimension)
+    held = lines_in(lines)
+    vertices, offsets = as_lines(lines if held is None else held, region.dimension)
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, region.dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]

@@ -1,6 +1,6 @@
 """What every solid has in common: immutable fields, a place for prepared structures, pickling, memory.
 
-A solid is checked once, in its constructor, and never changes; it is compared by identity and may be shared between
+A solid is checked once, in its constructor, and never changes; it is compared by value and may be shared between
 threads. Structures that speed up queries are built lazily by `prepared` and are left out of pickles.
 """
 
@@ -12,6 +12,8 @@ from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar, Final, TypeVar, cast
 
 import numpy as np
+
+from engine.solids.columns import are_equal, key_of
 
 T = TypeVar("T")
 
@@ -123,6 +125,17 @@ class Solid(Preparing, Immutable):
     def restored(cls, *values: Any) -> Solid:
         """Return the solid of a pickle, checked as any other: kernels read what offsets and indices say."""
         return cls(*values)
+
+    def __eq__(self, other: object) -> bool:
+        if self is other:
+            return True
+        if type(self) is not type(other) or not self._pickled:
+            return NotImplemented
+        return all(are_equal(getattr(self, name), getattr(other, name)) for name in self._pickled)
+
+    def __hash__(self) -> int:
+        values = (getattr(self, name) for name in self._pickled or ("_lock",))
+        return Preparing.prepared(self, "hash", lambda: hash((self.type, *map(key_of, values))))
 
     def __copy__(self) -> Solid:
         return self

@@ -20,6 +20,7 @@ from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, Sphere, Triangle
 from engine.solids.registry import Box, refused, row_of, unbounded
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray
 
 Check: TypeAlias = Callable[[], object] | None
@@ -110,8 +111,7 @@ def bounds(
     >>> box.aabb, box.sphere
     (Aabb(min=[0.0, 0.0], max=[4.0, 3.0]), Sphere(center=[2.0, 1.5], radius=2.5))
     """
-    if not isinstance(solid, Solid):
-        raise refused(solid, "bounds does not take", lambda row: row.bounds, where=("solid",))
+    solid = as_solid(solid, "solid")
     check_options(workers, progress, report=report)
     with Budget(deadline, cancel) as budget:
         budget.check()

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
 from engine.running.budget import poll, polled
+from engine.solids.geometries import positions_in
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 Where = tuple[str | int, ...]
@@ -257,6 +258,8 @@ def as_points(
     dimension: 2 or 3, or None to take either (no points: 2). must_be_finite: as in `as_floats`.
     Raises: InvalidArrayError, WrongDimensionError, NotFiniteError.
     """
+    if not isinstance(points, np.ndarray) and (held := positions_in(points)) is not None:
+        points = held
     array = as_floats(points, 2, where, must_be_finite)
     if array.size == 0 and array.shape[0] == 0 and array.shape[1] in (0, dimension or 0):
         return array.reshape((0, dimension or 2))

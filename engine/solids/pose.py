@@ -112,15 +112,19 @@ class Pose(Immutable):
         return cls(np.eye(dimension), np.zeros(dimension))
 
     @classmethod
-    def from_quaternion(cls, quaternion: object, translation: object) -> Pose:
+    def from_quaternion(
+        cls, wxyz: object = None, translation: object = (0.0, 0.0, 0.0), *, xyzw: object = None
+    ) -> Pose:
         """Return the pose of a quaternion and a translation; 3D.
 
         Parameters
         ----------
-        quaternion : array_like, shape (4,)
+        wxyz : array_like, shape (4,)
             ``(w, x, y, z)`` of any length but 0.
-        translation : array_like, shape (3,)
+        translation : array_like, shape (3,), optional
             Added after the rotation.
+        xyzw : array_like, shape (4,), optional
+            In place of `wxyz`, in the order of scipy and ROS: ``(x, y, z, w)``.
 
         Returns
         -------
@@ -132,9 +136,12 @@ class Pose(Immutable):
         >>> Pose.from_quaternion([1, 0, 0, 1], [0, 0, 5]).rotation.tolist()  # a quarter turn around z
         [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
         """
-        numbers = as_floats(quaternion, 1, ("quaternion",))
+        if (wxyz is None) == (xyzw is None):
+            raise InvalidArrayError("give a quaternion as wxyz or as xyzw", ("quaternion",))
+        numbers = as_floats(xyzw if wxyz is None else wxyz, 1, ("quaternion",))
         if len(numbers) != 4:
             raise InvalidArrayError(f"quaternion must hold w, x, y, z, got {len(numbers)} numbers", ("quaternion",))
+        numbers = np.roll(numbers, 1) if wxyz is None else numbers
         w, x, y, z = scaled_integers(numbers.tolist())
         square = w * w + x * x + y * y + z * z
         if square == 0:

@@ -11,11 +11,12 @@ import numpy as np
 
 from engine.errors import EngineError, InvalidArrayError
 from engine.solids.checks import Where, as_nested_offsets, as_offsets, as_point_groups, as_points, frozen, shown, spell
+from engine.solids.columns import Columns
 from engine.solids.polygon import Polygon
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
-class Ragged:
+class Ragged(Columns):
     """Base of results that are ragged arrays: a pickle of one is checked as it is read, since kernels, and whoever
     goes by offsets, trust these."""
 

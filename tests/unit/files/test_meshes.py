@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import pickle
 import re
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,9 +109,46 @@ def test_bytes_and_open_files_are_taken_and_nothing_else() -> None:
     for bad in (None, "ball.stl", 3, [octets], np.zeros(3), b""):
         with pytest.raises(engine.InvalidInputError):
             engine.read_mesh(bad, "stl")  # type: ignore[arg-type]
-    for bad in (None, b"stl", ["stl"], np.zeros(3), {}):
+    for bad in ("dae", b"stl", ["stl"], np.zeros(3), {}):
         with pytest.raises(engine.InvalidInputError, match="format must be one of"):
             engine.read_mesh(octets, bad)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "off", "ply", "glb"])
+def test_a_path_and_the_first_bytes_tell_the_format(ending: str, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box()
+    for text in (False, True):
+        path = tmp_path / f"box.{ending}"
+        kind = {"stl": "stl_ascii"}.get(ending, ending) if text else ending
+        octets = box.export(file_type=kind)
+        path.write_bytes(octets.encode() if isinstance(octets, str) else octets)
+        meshes = [
+            engine.read_mesh(given) for given in (path, str(path), path.read_bytes(), io.BytesIO(path.read_bytes()))
+        ]
+        assert all(mesh.solid() == meshes[0].solid() for mesh in meshes)
+        assert sorted(map(tuple, meshes[0].vertices.tolist())) == sorted(map(tuple, box.vertices.tolist()))
+        assert engine.locate([(0, 0, 0), (0.5, 0, 0), (9, 9, 9)], meshes[0].solid()).tolist() == [1, 0, -1]
+    path.rename(tmp_path / "box.data")
+    assert engine.read_mesh(tmp_path / "box.data").solid() == meshes[0].solid()
+    with pytest.raises(engine.InvalidInputError, match="No such file"):
+        engine.read_mesh(path)
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "off"])
+def test_these_formats_need_no_other_package(ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    octets = pytest.importorskip("trimesh").creation.box().export(file_type=ending)
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    assert engine.read_mesh(octets.encode() if isinstance(octets, str) else octets).solid().n_faces == 12
+    with pytest.raises(engine.InvalidInputError, match="ply files need the package trimesh"):
+        engine.read_mesh(b"ply\n")
+
+
+def test_damaged_stl_files_are_refused() -> None:
+    octets = binary(ball(8))
+    for damaged in (octets[:-1], octets + b"\0", octets[:50], b"solid x\n vertex 1 2\n", b"solid x\n vertex 1 2 3\n"):
+        with pytest.raises(engine.InvalidInputError):
+            engine.read_mesh(damaged, "stl")
 
 
 def test_the_command_line_says_how_many_are_left_out(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:

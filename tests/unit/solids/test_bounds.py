@@ -84,8 +84,8 @@ def test_unbounded_and_implicit_ones_are_refused(solid: engine.Solid) -> None:
 
 
 def test_no_solid_and_empty_convex_are_refused() -> None:
-    with pytest.raises(engine.UnsupportedSolidError, match="ndarray"):
-        engine.bounds(np.zeros((3, 3)))  # type: ignore[call-overload]
+    with pytest.raises(engine.UnsupportedSolidError, match="must be a solid"):
+        engine.bounds(np.zeros(3))  # type: ignore[call-overload]
     with pytest.raises(engine.EmptyGeometryError, match="no point satisfies") as info:
         engine.bounds(engine.Convex([[1, 0, -1], [-1, 0, 0]]))
     assert info.value.where == ("solid", "planes")

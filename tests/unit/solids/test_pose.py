@@ -192,3 +192,12 @@ def test_matrices_of_homogeneous_coordinates() -> None:
     for wrong in (np.eye(2), np.eye(5), np.zeros((3, 4))):
         with pytest.raises(engine.WrongDimensionError):
             engine.Pose.from_matrix(wrong)
+
+
+def test_quaternions_in_either_order_by_name() -> None:
+    turn = engine.Pose.from_quaternion((1, 2, 3, 4), (5, 6, 7))
+    assert engine.Pose.from_quaternion(xyzw=(2, 3, 4, 1), translation=(5, 6, 7)) == turn
+    assert engine.Pose.from_quaternion(wxyz=(1, 2, 3, 4)).translation.tolist() == [0, 0, 0]
+    for wrong in ({}, {"wxyz": (1, 0, 0, 0), "xyzw": (0, 0, 0, 1)}):
+        with pytest.raises(engine.InvalidArrayError, match="wxyz or as xyzw"):
+            engine.Pose.from_quaternion(**wrong)

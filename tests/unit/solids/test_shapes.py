@@ -1,0 +1,199 @@
+"""What people hold in place of our classes: GeoJSON, shapely, geopandas, trimesh and other meshes, matrices."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from engine.solids import shapes
+
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
+HOLE = [[0.5, 0.5], [0.5, 1.5], [1.5, 1.5], [1.5, 0.5], [0.5, 0.5]]
+BESIDE = [[1, 1], [3, 1], [3, 3], [1, 3], [1, 1]]
+POLYGON = {"type": "Polygon", "coordinates": [SQUARE, HOLE]}
+CORNERS = np.array([(x, y, z) for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])
+TRIANGLES = np.array([
+    (0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2),
+    (1, 3, 7), (1, 7, 5),
+])  # fmt: skip
+
+
+def feature(geometry: Any) -> dict[str, Any]:
+    return {"type": "Feature", "properties": {}, "geometry": geometry}
+
+
+def area(solid: Any) -> float:
+    return engine.union_all([solid]).area
+
+
+@pytest.mark.parametrize(("held", "expected"), [
+    (POLYGON, 3.0),
+    ({"type": "MultiPolygon", "coordinates": [[SQUARE], [BESIDE]]}, 7.0),  # united, not xor-ed: 4 + 4 - 1
+    (feature(POLYGON), 3.0),
+    ({"type": "FeatureCollection", "features": [feature({"type": "Polygon", "coordinates": [ring]})
+                                                for ring in (SQUARE, BESIDE)] + [feature(None)]}, 7.0),
+    ({"type": "GeometryCollection", "geometries": [POLYGON, {"type": "Polygon", "coordinates": [HOLE]}]}, 4.0),
+    ({"type": "Polygon", "coordinates": [[[*at, 99.5] for at in SQUARE]]}, 4.0),  # altitude
+    (SimpleNamespace(__geo_interface__=POLYGON), 3.0),
+    (np.array(SQUARE), 4.0),
+    ([SQUARE, HOLE], 3.0),
+    ([(0, 0), (2, 0), (2, 2)], 2.0),
+])  # fmt: skip
+def test_a_polygon_from_what_people_hold(held: Any, expected: float) -> None:
+    assert area(held) == expected
+
+
+def test_shapely_and_geopandas_are_taken() -> None:
+    shapely, geopandas = pytest.importorskip("shapely"), pytest.importorskip("geopandas")
+    boxes = [shapely.box(0, 0, 2, 2), shapely.box(1, 1, 3, 3)]
+    assert area(boxes[0]) == 4.0
+    assert area(shapely.MultiPolygon([boxes[0], shapely.box(5, 5, 6, 6)])) == 5.0
+    assert area(geopandas.GeoSeries(boxes)) == area(geopandas.GeoDataFrame(geometry=boxes)) == 7.0
+    assert engine.locate([(0.5, 0.5), (2.0, 1.0), (9, 9)], boxes[0]).tolist() == [1, 0, -1]
+    assert engine.overlay(*boxes, "intersection").area == 1.0
+    assert engine.collide(boxes[0], shapely.box(2, 0, 3, 1)).relation == engine.Relation.TOUCHING
+
+
+def test_lists_of_polygons_from_what_people_hold() -> None:
+    rings = [{"type": "Polygon", "coordinates": [ring]} for ring in (SQUARE, BESIDE)]
+    collection = {"type": "FeatureCollection", "features": [*map(feature, rings), feature(None)]}
+    assert engine.union_all(collection).area == 7.0
+    assert engine.union_all([POLYGON, np.array(BESIDE)]).area == 6.25  # of the hole a quarter is covered
+    areas = engine.overlay_batch(collection, [[SQUARE], [SQUARE], [SQUARE]], "intersection").areas
+    assert areas.tolist() == [4.0, 1.0, 0.0]
+    box = engine.Aabb((0, 0), (1, 1))
+    whole = engine.clip_polygons([engine.Polygon([SQUARE]), engine.Polygon([SQUARE, HOLE])], box)
+    assert engine.clip_polygons([{"type": "Polygon", "coordinates": [SQUARE]}, feature(POLYGON)], box) == whole
+    with pytest.raises(engine.UnsupportedSolidError, match=r"polygons\[1\] must be a solid") as error:
+        engine.union_all([POLYGON, 7])
+    assert error.value.where == ("polygons", 1)
+    geopandas = pytest.importorskip("geopandas")
+    shapely = pytest.importorskip("shapely")
+    series = geopandas.GeoSeries([shapely.box(0, 0, 2, 2), shapely.box(1, 1, 3, 3), None])
+    assert engine.union_all(series).area == 7.0
+
+
+class Block:
+    def __init__(self, kind: str, data: Any) -> None:
+        self.type, self.data = kind, data
+
+
+class Tensor:
+    def __init__(self, values: Any) -> None:
+        self.values = values
+
+    def numpy(self) -> Any:
+        return self.values
+
+
+MESHES = {
+    "trimesh": SimpleNamespace(vertices=CORNERS, faces=TRIANGLES),
+    "open3d": SimpleNamespace(vertices=CORNERS, triangles=TRIANGLES),
+    "open3d tensors": SimpleNamespace(
+        vertex={"positions": Tensor(CORNERS.astype(np.float32))}, triangle={"indices": Tensor(TRIANGLES)}
+    ),
+    "pyvista": SimpleNamespace(points=CORNERS, faces=np.insert(TRIANGLES, 0, 3, axis=1).ravel()),
+    "meshio": SimpleNamespace(points=CORNERS, cells=[Block("vertex", [[0]]), Block("triangle", TRIANGLES)]),
+    "pair": (CORNERS, TRIANGLES),
+    "pair of lists": (CORNERS.tolist(), TRIANGLES.tolist()),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_from_what_people_hold(name: str) -> None:
+    solid = shapes.as_solid(MESHES[name], "solid")
+    assert engine.locate([(0.5, 0.5, 0.5), (1, 0.5, 0.5), (2, 2, 2)], solid).tolist() == [1, 0, -1]
+    assert engine.locate([(0.5, 0.5, 0.5)], MESHES[name]).tolist() == [1]
+
+
+def test_trimesh_itself_is_taken() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box()
+    assert engine.contains([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], box).tolist() == [True, True, False]
+    assert engine.collide(box, engine.Sphere((1, 0, 0), 0.5)).relation == engine.Relation.TOUCHING
+
+
+@pytest.mark.parametrize(("held", "kind", "where", "words"), [
+    (None, engine.UnsupportedSolidError, ("solid",), "solid must be a solid"),
+    ("nonsense", engine.UnsupportedSolidError, ("solid",), "got 'nonsense'"),
+    ({"type": "sphere"}, engine.UnsupportedSolidError, ("solid",), "solid must be a solid"),
+    ({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, engine.UnsupportedSolidError, ("solid", "type"),
+     "clip_lines"),
+    ({"type": "Polygon"}, engine.InvalidArrayError, ("solid", "coordinates"), "nested lists"),
+    ({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, float("nan")]]]}, engine.NotFiniteError, None, "nan"),
+    ({"type": "FeatureCollection", "features": 7}, engine.InvalidInputError, None, "must be GeoJSON"),
+    (SimpleNamespace(points=CORNERS, faces=np.array([3, 0, 1])), engine.InvalidArrayError, ("solid", "faces"), "is 3"),
+    (SimpleNamespace(points=CORNERS, cells=[Block("tetra", [[0, 1, 2, 3]])]), engine.UnsupportedSolidError,
+     ("solid", "cells"), "tetra"),
+    ((CORNERS, TRIANGLES[:-1]), engine.NotClosedError, None, "edge"),
+])  # fmt: skip
+def test_what_is_none_of_these_is_refused_by_name(held: Any, kind: type, where: Any, words: str) -> None:
+    with pytest.raises(kind, match=words) as error:
+        shapes.as_solid(held, "solid")
+    assert where is None or error.value.where == where
+    assert error.value.where[:1] == ("solid",)
+
+
+def test_a_collection_nested_too_deep_is_refused() -> None:
+    deep: Any = POLYGON
+    for _ in range(100):
+        deep = {"type": "GeometryCollection", "geometries": [deep]}
+    with pytest.raises(engine.InvalidInputError):
+        shapes.as_solid(deep, "solid")
+
+
+POINTS = {"type": "MultiPoint", "coordinates": [[1, 1], [2, 1]]}
+LINES = {"type": "MultiLineString", "coordinates": [[[-1, 1], [3, 1]], [[0, 0], [2, 2], [4, 2]]]}
+
+
+def test_points_and_lines_of_geojson() -> None:
+    assert engine.locate(POINTS, POLYGON).tolist() == [-1, 0]
+    assert engine.locate(feature({"type": "Point", "coordinates": [0, 1]}), POLYGON).tolist() == [0]
+    pieces, same = (
+        engine.clip_lines(LINES, POLYGON),
+        engine.clip_lines(LINES["coordinates"], engine.Polygon([SQUARE, HOLE])),
+    )
+    assert pieces.vertices.tolist() == same.vertices.tolist()
+    with pytest.raises(engine.InvalidInputError, match="where Points are expected"):
+        engine.locate(LINES, POLYGON)
+
+
+STEP = engine.Pose(np.eye(3), (1.0, 0.0, 0.0))
+MATRIX = np.array([[1.0, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    "held", [STEP, MATRIX, MATRIX.tolist(), (np.eye(3), (1.0, 0, 0)), [np.eye(3).tolist(), [1, 0, 0]]]
+)
+def test_a_pose_from_what_people_hold(held: Any) -> None:
+    assert shapes.as_pose(held, 3, "pose") == STEP
+    cube = engine.Aabb((0, 0, 0), (1, 1, 1))
+    assert engine.collide(cube, cube, second_pose=held).relation == engine.Relation.TOUCHING
+    assert engine.clearance(cube, cube, second_pose=held).distance == 0.0
+
+
+def test_a_rotation_of_scipy_is_taken() -> None:
+    turn = SimpleNamespace(as_matrix=lambda: np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
+    assert shapes.as_pose(turn, 3, "pose").rotation.tolist() == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+
+
+@pytest.mark.parametrize("many", [[STEP, MATRIX], np.array([MATRIX, MATRIX]), (STEP, STEP)])
+def test_many_poses_in_one_argument(many: Any) -> None:
+    cube = engine.Aabb((0, 0, 0), (1, 1, 1))
+    expected = engine.collide_poses(cube, cube, np.broadcast_to(np.eye(3), (2, 3, 3)), [(1, 0, 0)] * 2)
+    assert engine.collide_poses(cube, cube, many).tolist() == expected.tolist()
+    assert engine.clearance_poses(cube, cube, many).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(("many", "words"), [
+    (7, "list of poses"), ([7], r"poses\[0\] must be a Pose"), (np.zeros((1, 4, 4)), "must be 0 ... 0 1"),
+    ([np.diag([2.0, 1, 1, 1])], "is no rotation"),
+])  # fmt: skip
+def test_wrong_poses_are_named(many: Any, words: str) -> None:
+    cube = engine.Aabb((0, 0, 0), (1, 1, 1))
+    with pytest.raises(engine.EngineError, match=words):
+        engine.collide_poses(cube, cube, many)
