@@ -29,7 +29,7 @@ import engine
 from benchmarks import errors, machine, table, web_page
 from benchmarks.bodies import Pair
 from benchmarks.contenders import NotApplicable, Placed, Prepared, rings_of
-from benchmarks.contest import ASKED, Contender, Contest, Row, field_of, hold, refusing
+from benchmarks.contest import LISTENERS, Contender, Contest, Row, field_of, refusing, run_contest
 from benchmarks.fields import collision as in_collision
 from benchmarks.fields import containment as in_containment
 from benchmarks.fields import overlay as in_overlay
@@ -95,15 +95,15 @@ def books(of: Callable[..., methods.Methods], *solids: engine.Solid) -> Iterator
         yield Contender(f"textbook: {name}, float32", partial(in_float32, name, steps))
 
 
-def telling(judge: Callable[[Any, Any], dict[str, Any]]) -> Callable[[Any, Any], dict[str, Any]]:
+def listing_wrong(judge: Callable[[Any, Any], dict[str, Any]]) -> Callable[[Any, Any], dict[str, Any]]:
     """Return a judge that also lists the items that are wrong."""
 
-    def told(answers: Any, exact: Any) -> dict[str, Any]:
+    def judged(answers: Any, exact: Any) -> dict[str, Any]:
         each = (item for item in range(len(exact)) if judge(answers[item : item + 1], exact[item : item + 1])["wrong"])
         found = judge(answers, exact)
         return found | {"where": [item for item, _ in zip(each, range(min(found["wrong"], MOST_NAMED)), strict=False)]}
 
-    return told
+    return judged
 
 
 def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
@@ -112,7 +112,7 @@ def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
     peers = MESHES if isinstance(subject, Mesh) else POLYGONS if isinstance(subject, Rings) else ()
     asked = [*field_of("points", subject, peers, 1), *books(methods.of_points, solid)]
     exact = engine.contains(points, solid)
-    return Contest("yours", "contains", True, points, exact, telling(errors.same), asked, "your points",
+    return Contest("yours", "contains", True, points, exact, listing_wrong(errors.same), asked, "your points",
                    request=partial(in_containment.request, subject, points))  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def segments(region: engine.Solid, items: np.ndarray) -> Contest:
     asked = [*field_of("segments", subject, peers, 1), *books(methods.of_segments, region)]
     ours = asked[0].make()
     exact = ours.answer(ours.ask(items))
-    judge = telling(errors.coordinates)
+    judge = listing_wrong(errors.coordinates)
     return Contest("yours", "segments", True, items, exact, judge, asked, "your segments",
                    request=partial(in_segments.request, subject, items))  # fmt: skip
 
@@ -147,13 +147,13 @@ def collide(first: engine.Solid, second: engine.Solid, poses: np.ndarray | None)
                   for body, solid in zip(bodies, (first, second))]  # fmt: skip
         made = in_collision.on_couples("collide", True, [couple], np.array([is_met]), ABOUT, BODIES)
         own = [replace(each, make=partial(_for_one, each)) for each in books(methods.of_pairs, first, second)]
-        return replace(made, operation="yours", contenders=[*made.contenders, *own], judge=telling(errors.same))
+        return replace(made, operation="yours", contenders=[*made.contenders, *own], judge=listing_wrong(errors.same))
     is_closed = all(isinstance(solid, engine.Polyhedron) for solid in (first, second))
     pair = Pair("yours", bodies[0], bodies[1], is_closed, poses[:, :, :3], poses[:, :, 3])
     exact = engine.collide_poses(first, second, pair.rotations, pair.translations, boolean=True)
     rows, asked = np.arange(len(poses)), field_of("poses", pair, BODIES[:2], 1)
     met = np.asarray(exact) != engine.Relation.DISJOINT
-    return Contest("yours", "collide", True, rows, met, telling(errors.same), asked, ABOUT,
+    return Contest("yours", "collide", True, rows, met, listing_wrong(errors.same), asked, ABOUT,
                    request=partial(in_collision.request, pair))  # fmt: skip
 
 
@@ -172,7 +172,7 @@ def overlay(subjects: Sequence[engine.Solid], clips: Sequence[engine.Solid]) -> 
     pairs = list(zip(*sides, strict=True))
     exact = np.array([in_overlay.by_ours(pair) for pair in pairs])
     asked = field_of("overlay", "intersection", LAYERS, 1)
-    return Contest("yours", "overlay", True, pairs, exact, telling(errors.areas), asked, "your layers",
+    return Contest("yours", "overlay", True, pairs, exact, listing_wrong(errors.areas), asked, "your layers",
                    request=partial(in_overlay.request, pairs))  # fmt: skip
 
 
@@ -292,12 +292,12 @@ def main(words: Sequence[str] | None = None) -> int:
     given = options(words)
     files = [given.file, *([given.items] if given.items else [])]
     contest = contest_of(given.question, files, given.poses)
-    kept = [replace(each, make=_left_out) if each.name in given.without else each for each in contest.contenders]
-    ASKED[:] = [Path(given.asked).write_text] if given.asked else []
+    remaining = [replace(each, make=_left_out) if each.name in given.without else each for each in contest.contenders]
+    LISTENERS[:] = [Path(given.asked).write_text] if given.asked else []
     facts = machine.facts(0, machine.cores())
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # what a peer says of its arithmetic
-        rows = hold(replace(contest, contenders=kept), 3, given.seconds, has_latency=True)
+        rows = run_contest(replace(contest, contenders=remaining), 3, given.seconds, has_latency=True)
     print("\n".join(lines_of(rows)))
     found = facts | {"load_after": machine.load(), "seconds": given.seconds, "quick": False}
     found["rows"] = [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]

@@ -25,7 +25,7 @@ from benchmarks.fields import Figure
 CUBE = """engine.Polyhedron([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)],
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])"""
 TRIANGLE = "engine.Polygon([[[{0}, {0}], [{1}, {0}], [{0}, {1}]]])"
-ASKED = {
+OPERATIONS = {
     "locate, sphere": "engine.locate(np.zeros((4, 3)), engine.Sphere([0, 0, 0], 1))",
     "locate, polyhedron": f"engine.locate(np.linspace(-0.5, 1.5, 36).reshape(-1, 3), {CUBE})",
     "locate, polygon": f"engine.locate(np.linspace(-0.5, 1.5, 24).reshape(-1, 2), {TRIANGLE.format(0, 4)})",
@@ -76,7 +76,7 @@ def main(words: list[str] | None = None) -> int:
     """Print and store all rows."""
     given = table.options(words, __doc__ or "")
     with tempfile.TemporaryDirectory() as text:
-        folder, asked = Path(text), dict(list(ASKED.items())[: 1 if given.quick else None])
+        folder, asked = Path(text), dict(list(OPERATIONS.items())[: 1 if given.quick else None])
         rows = [Task(name, partial(ask, name, code, folder / name)) for name, code in asked.items()]
         rows += [Task(f"{name}, seed", partial(seeded, f"{name}, seed", code, folder))
                  for name, code in asked.items() if not given.quick]  # fmt: skip

@@ -37,7 +37,7 @@ QUESTIONS = 200
 """At most, for each of these sizes."""
 NAMED: list[str] = []
 """Contenders that no contest knows and the command names."""
-ASKED: list[Callable[[str], None]] = []
+LISTENERS: list[Callable[[str], None]] = []
 """Who wants to know which package is asked next, "" for our own code: one may end the process."""
 Goals = tuple[float | None, float | None]
 """What the ratio against a peer must be, and what it aims at."""
@@ -64,7 +64,7 @@ def contender(
     """Return a contender; spec: module[:kind][@setting]; is_new: from the subject's arrays at every question."""
     spec, _, setting = spec.partition("@")
     module, _, own = spec.partition(":")
-    build = contenders.anew if is_new else contenders.make
+    build = contenders.rebuilt_each_call if is_new else contenders.make
     knob = (float(setting),) if setting else ()
     return Contender(
         contenders.shown(module, own or kind), partial(build, module, own or kind, subject, threads, *knob),
@@ -209,14 +209,14 @@ class _Entry:
     taken: float
 
 
-def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = False) -> list[Row]:
+def run_contest(contest: Contest, rounds: int, seconds: float, has_latency: bool = False) -> list[Row]:
     """Return one row for each contender; each is timed for about `seconds`."""
     rows, entries = [], []
     for each in contest.contenders:
         row = Row(contest.operation, contest.name, contest.is_hard, each.name, each.package, each.setting,
                   contest.about, goals=each.goals)  # fmt: skip
         rows.append(row)
-        _tell(row)
+        _announce(row)
         if (entry := _entered(contest, each, row, seconds / rounds)) is not None:
             entries.append(entry)
     _judge(contest, entries)
@@ -225,21 +225,21 @@ def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = Fals
     for round_ in range(rounds):
         for entry in entries if round_ % 2 == 0 else reversed(entries):
             gc.collect()
-            _tell(entry.row)
+            _announce(entry.row)
             wall, cpu, _ = clocked(partial(_repeat, entry))
             entry.row.seconds.append(wall / entry.times)
             entry.row.cpu.append(cpu / entry.times)
     gc.unfreeze()
     if has_latency and not contest.count:
         for entry in entries:
-            _tell(entry.row)
+            _announce(entry.row)
             _ask_few(contest, entry, seconds / 8)
     return rows
 
 
-def _tell(row: Row) -> None:
-    for told in ASKED:
-        told(row.contender if row.package else "")
+def _announce(row: Row) -> None:
+    for listener in LISTENERS:
+        listener(row.contender if row.package else "")
 
 
 def _repeat(entry: _Entry) -> None:
@@ -331,7 +331,7 @@ def _judge(contest: Contest, entries: list[_Entry]) -> None:
         answers, n_items = entry.answers, len(contest.exact)
         if n_items > entry.row.n_items and not contest.count:
             n_items = min(n_items, max(entry.row.n_items, int(JUDGING * entry.row.n_items / max(entry.taken, 1e-9))))
-            _tell(entry.row)
+            _announce(entry.row)
             answers = entry.prepared.answer(entry.prepared.ask(entry.prepared.native(contest.items[:n_items])))
         _note(contest, entry, answers[:n_items], contest.exact[:n_items], np.arange(n_items))
 
@@ -377,20 +377,20 @@ def sketch(value: Any) -> Any:
 
 
 def _judge_differing(contest: Contest, entries: list[_Entry]) -> None:
-    told = [entry for entry in entries if entry.answers is not None]
-    if len(told) < 1 + (contest.exact is None):
+    answered = [entry for entry in entries if entry.answers is not None]
+    if len(answered) < 1 + (contest.exact is None):
         return
-    n_items = min(len(entry.answers) for entry in told)
+    n_items = min(len(entry.answers) for entry in answered)
     differs = np.zeros(n_items, bool)
-    first = np.asarray(told[0].answers[:n_items])
-    for entry in told[1:]:
+    first = np.asarray(answered[0].answers[:n_items])
+    for entry in answered[1:]:
         other = np.asarray(entry.answers[:n_items])
         differs |= ((first != other) & ~((first != first) & (other != other))).reshape(n_items, -1).any(axis=1)
     chosen = np.flatnonzero(differs)[: contest.most]
     sample = np.random.default_rng(0).choice(n_items, min(contest.n_sample, n_items), replace=False)
     chosen = np.union1d(chosen, sample)
     exact = None if contest.exact is None or errors.REASON else contest.exact(chosen)
-    for entry in told:
+    for entry in answered:
         if exact is not None:
             _note(contest, entry, np.asarray(entry.answers)[chosen], exact, chosen)
         entry.row.errors["differ"] = int(differs.sum())

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import contenders, machine
-from benchmarks.contest import NAMED, Contest, Row, Size, Task, hold
+from benchmarks.contest import NAMED, Contest, Row, Size, Task, run_contest
 from benchmarks.fields import FIELDS, Figure, tasks
 from benchmarks.measure import Spread, spread
 from benchmarks.workloads import MissingDataError
@@ -138,15 +138,15 @@ def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_l
             if isinstance(made, Contest) and given.contender:
                 asked = [each for each in made.contenders if each.name in names or given.contender in each.name]
                 made = replace(made, contenders=asked)
-            held = hold(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
+            outcome = run_contest(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
         except MissingDataError as error:
             print(f"{task.name}: skipped: {error}", flush=True)
             continue
-        if isinstance(held, Figure):
-            figures.append(held)
+        if isinstance(outcome, Figure):
+            figures.append(outcome)
         else:
-            rows += held
-        for line in lines_of(held):
+            rows += outcome
+        for line in lines_of(outcome):
             missed += " MISS" in line
             print(line, flush=True)
         del made

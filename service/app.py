@@ -105,14 +105,14 @@ def create_router(settings: Settings | None = None) -> APIRouter:
             "GEOMETRY_API_KEYS is not looked at within another application: whoever reaches it may call; guard the "
             "calls yourself: app.include_router(service.router(), dependencies=[Depends(check_key)])"
         )
-    guest = _Guest(settings)
+    guest = _EmbeddedService(settings)
     router = APIRouter(lifespan=guest.lifespan, dependencies=[Depends(guest.start_once)])
     for each in ROUTERS:
         router.include_router(each)
     return router
 
 
-class _Guest:
+class _EmbeddedService:
     """The service within somebody else's application."""
 
     def __init__(self, settings: Settings) -> None:

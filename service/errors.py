@@ -187,7 +187,7 @@ def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
     return faults[:MAX_ERRORS]
 
 
-def _meant(given: Any) -> str:
+def _api_name_of(given: Any) -> str:
     """Return what a word that is used elsewhere is called here."""
     meant = _CALLED_HERE.get(given) if isinstance(given, str) else None
     return "" if meant is None else f" ({meant})"
@@ -202,12 +202,12 @@ def _sentence(item: Any, parent: Any) -> str:
         return f"the field {name!r} is not known here; leave it out"
     if item["type"] == "union_tag_invalid":
         tag, tags = item["ctx"]["tag"], item["ctx"]["expected_tags"]
-        return f"there is no solid of type {tag!r:.60}{_meant(tag)}; the types are {tags}"
+        return f"there is no solid of type {tag!r:.60}{_api_name_of(tag)}; the types are {tags}"
     if item["type"] == "string_pattern_mismatch":
         return "expected the id of a stored solid, 64 hexadecimal digits: POST /v1/solids answers with it"
     if item["type"] == "literal_error":
         got = _child(parent, name)
-        return f"expected {item['ctx']['expected']}, got {got!r:.60}{_meant(got)}"
+        return f"expected {item['ctx']['expected']}, got {got!r:.60}{_api_name_of(got)}"
     if item["type"] == "union_tag_not_found":
         return "a solid is an object with a field 'type' that names what it is, for example 'sphere'"
     if item["type"] in ("model_type", "model_attributes_type"):

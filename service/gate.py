@@ -117,8 +117,8 @@ class Gate:
             raise ServiceError(
                 "missing_key", "send a key of this service: Authorization: Bearer KEY, or X-API-Key: KEY"
             )
-        found = [hmac.compare_digest(_digest(given), key) for key in self._keys]
-        if not any(found):
+        matches = [hmac.compare_digest(_digest(given), key) for key in self._keys]
+        if not any(matches):
             raise ServiceError("wrong_key", "the key is none of this service's; GEOMETRY_API_KEYS holds them")
 
 

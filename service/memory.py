@@ -23,7 +23,7 @@ SMALL: Final = 2**16
 """Bytes that a request is given whatever others hold: there are no more requests than fit into the queue."""
 LATER: Final = 0.05
 """Seconds after which what an answer was made of is gone."""
-_KEPT: Final = 16
+_UNRETURNED: Final = 16
 """Of what requests may hold, one part in so many may have been freed before the system gets it back."""
 _LEAST: Final = 2**12
 """Bytes that a request is taken to free at least."""
@@ -71,7 +71,7 @@ class Memory:
         """Count the end of a request that holds, or held at most, so much: it is free once the system has it back."""
         with self.lock:
             self.freed += max(most, _LEAST)
-            is_much = self.freed > self.limit // _KEPT
+            is_much = self.freed > self.limit // _UNRETURNED
             if is_much:
                 self.freed = 0
                 self.leaving += taken

@@ -31,10 +31,10 @@ _METHOD: Final = "forkserver" if "forkserver" in multiprocessing.get_all_start_m
 def context() -> Any:
     """Return how children are started here; its server imports what readers need, if it is the first of this process
     to start one."""
-    found: Any = multiprocessing.get_context(_METHOD)
+    started: Any = multiprocessing.get_context(_METHOD)
     if _METHOD == "forkserver":
-        found.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
-    return found
+        started.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
+    return started
 
 
 def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
@@ -52,15 +52,15 @@ def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
         starting.result()
         theirs.close()
         try:
-            found = mine.recv()
+            received = mine.recv()
         except EOFError:
             raise ServiceError("invalid_mesh", f"the reader of {kind} files ended without an answer") from None
     finally:
         starting.add_done_callback(lambda _: _end(child, mine, theirs))
-    if isinstance(found, str):
-        raise ServiceError("invalid_mesh", found)
-    call.take(4 * sum(array.nbytes for array in found))
-    return found
+    if isinstance(received, str):
+        raise ServiceError("invalid_mesh", received)
+    call.take(4 * sum(array.nbytes for array in received))
+    return received
 
 
 def _end(child: Any, *pipe: Connection) -> None:

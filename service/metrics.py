@@ -64,8 +64,8 @@ class Metrics:
         self.stored = Gauge("geometry_store_solids", "Solids held in memory.", **sums)
         self.stored_bytes = Gauge("geometry_store_bytes", "Bytes they hold.", **sums)
         self.evicted = Counter("geometry_store_evictions", "Solids that left for want of room.", **made)
-        found = Counter("geometry_store_lookups", "Stored solids asked for, by where they were.", ("found",), **made)
-        self.hits = {where: found.labels(where) for where in ("memory", "folder", "nowhere")}
+        lookups = Counter("geometry_store_lookups", "Stored solids asked for, by where they were.", ("found",), **made)
+        self.hits = {where: lookups.labels(where) for where in ("memory", "folder", "nowhere")}
         self.ready = Gauge("geometry_ready", "1 when every kernel is warm.", multiprocess_mode="livemin", **made)
         build = Gauge("geometry_build_info", "What runs.", ("version", "python"), multiprocess_mode="livemax", **made)
         build.labels(engine.__version__, platform.python_version()).set(1)

@@ -58,8 +58,8 @@ def openapi_of(app: FastAPI, settings: Settings) -> Callable[[], dict[str, Any]]
                 license_info={"name": "MIT", "identifier": "MIT"},
             )
             _describe_keys(made, bool(settings.api_keys))
-            found = {tag for item in made["paths"].values() for each in item.values() for tag in each["tags"]}
-            made["tags"] = [{"name": tag, "description": _TAGS.get(tag, tag)} for tag in sorted(found, key=_place)]
+            named = {tag for item in made["paths"].values() for each in item.values() for tag in each["tags"]}
+            made["tags"] = [{"name": tag, "description": _TAGS.get(tag, tag)} for tag in sorted(named, key=_place)]
             app.openapi_schema = completed(made, settings)
         return app.openapi_schema
 
@@ -145,8 +145,8 @@ def _illustrate(made: dict[str, Any]) -> None:
         for operation in item.values():
             if operation.get("summary") == operation["operationId"].replace("_", " ").title():  # FastAPI's, of ours
                 operation["summary"] = re.split("[.,:;]", operation["description"])[0]
-            found = [answer for status, answer in operation["responses"].items() if status < "300"]
-            for body in (operation.get("requestBody", {}), *found):
+            successes = [answer for status, answer in operation["responses"].items() if status < "300"]
+            for body in (operation.get("requestBody", {}), *successes):
                 for media_type, content in body.get("content", {}).items():
                     if media_type != MEDIA_TYPE and "$ref" in content.get("schema", {}):
                         content["schema"] = {"$ref": content["schema"]["$ref"]}  # a field's description may stick to it

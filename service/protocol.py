@@ -188,7 +188,7 @@ class Protocol(HttpToolsProtocol):
     def _parse(self) -> None:
         """Parse what was received up to the end of one request; what stays makes reading pause."""
         raw, start, self._n_events = memoryview(self._raw), 0, 0
-        while start < len(raw) and self._n_events < _EVENTS and not self._is_held():  # bound: each turn takes bytes
+        while start < len(raw) and self._n_events < _EVENTS and not self._must_wait():  # bound: each turn takes bytes
             stop = self._end_of_piece(start)
             if stop == start:
                 break
@@ -201,7 +201,7 @@ class Protocol(HttpToolsProtocol):
             if self.is_closing:
                 return
         self._raw = self._raw[start:]
-        is_waiting = self._is_held()
+        is_waiting = self._must_wait()
         if not is_waiting and self._n_events >= _EVENTS and self._raw:
             self.loop.call_soon(self._parse)
             is_waiting = True
@@ -211,7 +211,7 @@ class Protocol(HttpToolsProtocol):
         elif was_full and not self.flow.read_paused:
             self._real.resume_reading()
 
-    def _is_held(self) -> bool:
+    def _must_wait(self) -> bool:
         """Tell whether nothing more is parsed now: a request came whole, and its answer is to be sent first."""
         is_answered = self.cycle is None or self.cycle.response_complete
         return self.is_closing or (not self._is_in_message and not is_answered)
@@ -221,9 +221,9 @@ class Protocol(HttpToolsProtocol):
         raw = self._raw
         if self._left:
             return min(len(raw), start + self._left)
-        found = raw.find(_END, start, start + _STEP)
-        if found >= 0:
-            return found + len(_END)
+        end_of_headers = raw.find(_END, start, start + _STEP)
+        if end_of_headers >= 0:
+            return end_of_headers + len(_END)
         stop = min(len(raw), start + _STEP)
         for _ in range(len(_END) - 1):  # what may be the first part of an end waits for the rest of it
             stop -= stop > start and raw[stop - 1] in b"\r\n"

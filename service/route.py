@@ -67,18 +67,18 @@ class GeometryRoute(APIRoute):
         self, document: Any, arguments: dict[str, Any], call: Call, state: Any, finish: Callable[[Any], bytes]
     ) -> bytes | list[Fault]:
         """Answer a question that was decoded elsewhere; return what `finish` makes of the answer, or what is wrong."""
-        found: bytes | list[Fault]
+        outcome: bytes | list[Fault]
         try:
             job = _Job(self.endpoint, self.adapter, arguments, call, True)
             job.document, job.finish = document, lambda answer: [finish(answer)]
-            (found,) = await state.pool.run(call, job.answer, False)
+            (outcome,) = await state.pool.run(call, job.answer, False)
         except Exception as error:
-            found = _faults_in(error, f"{self.name} as a tool")
-        status = self.status_code or 200 if isinstance(found, bytes) else STATUS[found[0].code]
+            outcome = _faults_in(error, f"{self.name} as a tool")
+        status = self.status_code or 200 if isinstance(outcome, bytes) else STATUS[outcome[0].code]
         operation = self.operation_id or self.name
         state.metrics.count(operation, status, call.seconds)
         traces.note(operation, call.seconds)
-        return found
+        return outcome
 
     def get_route_handler(self) -> Answer:
         """Return the coroutine that answers a request."""
@@ -116,7 +116,7 @@ class GeometryRoute(APIRoute):
                 headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
                 call.coding = _coding_wanted(headers.get(b"accept-encoding", b""))
                 is_small = True
-                arguments = {**request.path_params, **_queried(request, query)}
+                arguments = {**request.path_params, **_parse_query_params(request, query)}
                 job = _Job(endpoint, adapter, arguments, call, media_type is not None)
                 if media_type is not None:
                     body.check_media_type(headers, media_type)
@@ -221,7 +221,7 @@ class _Job:
                     with suppress(ValidationError):  # the other decoder keeps what pointers need
                         self.question = self.adapter.validate_python(self.document, context=self.call)
                         return
-                    pieces.let_go(self.document)
+                    pieces.free_in_steps(self.document)
                 self.call.remaining()
                 self.call.take(wire.cost_of(text))
                 self.document = wire.decode(text, self.call.remaining)
@@ -242,7 +242,7 @@ class _Job:
             if answer is None:
                 return []
             with call.phase("encode"):
-                return self._gathered((self.finish or self._encoded)(answer))
+                return self._assemble_response_parts((self.finish or self._encoded)(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
             forget_frames(error)
@@ -250,7 +250,7 @@ class _Job:
         finally:
             document, self.document, self.question, self.arguments = self.document, None, None, {}
             if not call.is_light:
-                pieces.let_go(document)
+                pieces.free_in_steps(document)
 
     def _encoded(self, answer: Any) -> Iterable[Part]:
         if isinstance(answer, np.ndarray):
@@ -259,17 +259,17 @@ class _Job:
         self.call.check_answer(wire.least_of(answer))
         return wire.encoded(answer, self.call.remaining)
 
-    def _gathered(self, parts: Iterable[Part]) -> list[Part]:
+    def _assemble_response_parts(self, parts: Iterable[Part]) -> list[Part]:
         """Return the parts of an answer, within its limits, compressed if that was asked for and is worth it."""
-        found, size = [], 0
+        gathered, size = [], 0
         for part in parts:
             self.call.take_part(part)
-            found.append(part)
+            gathered.append(part)
             size += len(part)
         if self.call.coding is None or size < LEAST_COMPRESSED:
             self.call.coding = None
-            return found
-        return [*wire.compressed(_checked(found, self.call), self.call.coding)]
+            return gathered
+        return [*wire.compressed(_checked(gathered, self.call), self.call.coding)]
 
 
 def _checked(parts: list[Part], call: Call) -> Iterable[Part]:
@@ -336,20 +336,20 @@ def _is_known(tags: bytes, call: Call, method: str) -> bool:
     return method in ("GET", "HEAD") and call.headers.get("ETag", "") in named
 
 
-def _queried(request: Request, query: Query) -> dict[str, Any]:
+def _parse_query_params(request: Request, query: Query) -> dict[str, Any]:
     """Return the query's parameters as declared; what is left out is the endpoint's own default."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for name, (adapter, is_required) in query.items():
         value = request.query_params.get(name)
         if value is None and not is_required:
             continue
         try:
-            found[name] = adapter.validate_python(value)
+            values[name] = adapter.validate_python(value)
         except ValidationError as error:
             expected = str(error.errors()[0]["msg"]).replace("Input should be", "expected")
             got = "nothing" if value is None else f"{value!r:.100}"
             raise ServiceError("invalid_request", f"query parameter {name!r}: {expected}, got {got}") from None
-    return found
+    return values
 
 
 async def _run(pool: Pool, call: Call, job: Callable[[], list[Part]], receive: Receive, is_small: bool) -> list[Part]:

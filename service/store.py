@@ -50,7 +50,7 @@ _READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOL
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _as_store_errors(path: Path) -> Iterator[None]:
     """Turn what the system refuses into what is said of it."""
     try:
         yield
@@ -81,7 +81,7 @@ class Folder:
         Raises: `store_full`, `store_unavailable`.
         """
         final = self._path / name
-        with _told(self._path):
+        with _as_store_errors(self._path):
             if self._touch(final):
                 return False
             octets = to_octets(solid)
@@ -101,7 +101,7 @@ class Folder:
             self._written += len(octets)
             is_time = self._written > self._budget // 16
         if is_time:
-            with _told(self._path):
+            with _as_store_errors(self._path):
                 self._shrink()
         return True
 
@@ -113,7 +113,7 @@ class Folder:
         if _NAME.fullmatch(name) is None:
             return None
         path = self._path / name
-        with _told(path):
+        with _as_store_errors(path):
             octets = _content(path)
         if octets is None:
             return None
@@ -157,16 +157,16 @@ class Folder:
         """Take away partial files whose writer is gone, and the files used longest ago while there are too many."""
         with self._lock:
             self._written = 0
-        found = []
+        result = []
         for entry in os.scandir(self._path):
             with contextlib.suppress(OSError):  # another process took it away
                 status = entry.stat()
                 if entry.name.endswith(_PARTIAL) and time.time() - status.st_mtime > _STALE_SECONDS:
                     os.unlink(entry.path)
                 elif _NAME.fullmatch(entry.name):
-                    found.append((status.st_mtime, status.st_size, entry.path))
-        total = sum(size for _, size, _ in found)
-        for _, size, path in sorted(found):
+                    result.append((status.st_mtime, status.st_size, entry.path))
+        total = sum(size for _, size, _ in result)
+        for _, size, path in sorted(result):
             if total <= self._budget:
                 break
             with contextlib.suppress(OSError):
@@ -250,8 +250,8 @@ def from_octets(octets: bytes) -> Solid | Scene:
                 kind, names = stored(node["type"])
                 values = [arrays[node[name]] for name in names]
                 made.append(kind.restored(*(value if value.ndim else value.item() for value in values)))
-    found: Solid = made[-1]
-    return found
+    result: Solid = made[-1]
+    return result
 
 
 def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
@@ -272,11 +272,11 @@ def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
 VERSION: Final = b"exact-geometry/1"
 """Changes when the meaning of any stored field does."""
 
-Kept = Solid | Scene
+Stored = Solid | Scene
 K = TypeVar("K", Solid, Scene)
 
 
-def solid_id(solid: Kept, known: dict[int, str] | None = None) -> str:
+def solid_id(solid: Stored, known: dict[int, str] | None = None) -> str:
     """Return the name of `solid`: 64 hexadecimal digits.
 
     known: names by `id` of the solids in the tree: each is hashed once, however often it stands there.
@@ -318,13 +318,13 @@ class Store:
         self._budget = budget
         self._metrics = metrics or Metrics()
         self._folder = None if folder is None else Folder(folder, folder_budget)
-        self._solids: OrderedDict[str, Kept] = OrderedDict()
+        self._solids: OrderedDict[str, Stored] = OrderedDict()
         self._sizes: dict[str, int] = {}
         self._looked: dict[str, int] = {}
         self._total = 0
         self._lock = threading.Lock()
 
-    def put(self, solid: Kept) -> tuple[str, bool]:
+    def put(self, solid: Stored) -> tuple[str, bool]:
         """Keep `solid`, which may be a scene; return its name and whether it is new. Those used longest ago leave if
         there is no room."""
         name, size = solid_id(solid), solid.memory
@@ -347,37 +347,37 @@ class Store:
         return self._of_kind(name, Scene, "scene")
 
     def _of_kind(self, name: str, kind: type[K], what: str) -> K:
-        if isinstance(found := self._get(name), kind):
-            return found
+        if isinstance(result := self._get(name), kind):
+            return result
         detail = f"no {what} {name[:64]!r} is stored here; put it again: POST /v1/{what}s"
         raise ServiceError(f"unknown_{what}", detail)
 
-    def _get(self, name: str) -> Kept | None:
+    def _get(self, name: str) -> Stored | None:
         with self._lock:
-            found = self._solids.get(name)
-            if found is not None:
-                self._use(name, self._size_now(name, found))
+            entry = self._solids.get(name)
+            if entry is not None:
+                self._use(name, self._size_now(name, entry))
                 self._metrics.hits["memory"].inc()
-                return found
-        found = None if self._folder is None else self._folder.get(name)
-        self._metrics.hits["nowhere" if found is None else "folder"].inc()
-        return None if found is None else self._keep(name, found)[0]
+                return entry
+        entry = None if self._folder is None else self._folder.get(name)
+        self._metrics.hits["nowhere" if entry is None else "folder"].inc()
+        return None if entry is None else self._keep(name, entry)[0]
 
-    def _size_now(self, name: str, found: Kept) -> int:
+    def _size_now(self, name: str, entry: Stored) -> int:
         """Return the bytes of what is kept, structures that have been prepared since included. To count those of a
         scene takes a microsecond a body, so it is done at its first, second, fourth, ... use."""
-        if isinstance(found, Solid):
-            return found.memory
+        if isinstance(entry, Solid):
+            return entry.memory
         uses = self._looked[name] = self._looked.get(name, 0) + 1
-        return self._sizes[name] if uses & (uses - 1) else found.memory
+        return self._sizes[name] if uses & (uses - 1) else entry.memory
 
-    def _keep(self, name: str, solid: Kept) -> tuple[Kept, bool]:
+    def _keep(self, name: str, solid: Stored) -> tuple[Stored, bool]:
         """Return the one object called `name` that all threads share, and whether it is `solid`, new here."""
         with self._lock:
             is_new = name not in self._solids
-            kept = self._solids.setdefault(name, solid)
-            self._use(name, kept.memory)
-            return kept, is_new
+            stored = self._solids.setdefault(name, solid)
+            self._use(name, stored.memory)
+            return stored, is_new
 
     def _use(self, name: str, size: int) -> None:
         """Count `size` for `name`, make it the last to leave, and let others go while there are too many bytes."""

@@ -36,11 +36,11 @@ SHOWN: Final = 10
 """Items of a list that are shown unless more are asked for."""
 _MOST: Final = 2**20
 """Bytes of a request. Solids that are larger go to /v1/solids."""
-_MOST_BESIDE: Final = 2**16
+_MOST_AROUND: Final = 2**16
 """Bytes of a request beside a tool's arguments: the library reads them on the event loop."""
 _MOST_SHOWN: Final = 1000
 """Items of a list shown at once, far more than a model reads."""
-_ASKED: Final = "geometry.asked"
+_CALL: Final = "geometry.asked"
 """The name, in the scope of a request, of its call and a tool's arguments."""
 _SCHEMAS: Final = "#/components/schemas/"
 _WORDS: Final = frozenset(
@@ -97,12 +97,12 @@ class Tools:
             manager = await asyncio.shield(self._manager)  # who goes away takes it from nobody
             own = [header for header in scope["headers"] if header[0] not in (b"content-length", b"transfer-encoding")]
             own.append((b"content-length", str(len(text)).encode()))
-            passed = {**scope, "headers": own, _ASKED: (call, arguments)}
-            gone = asyncio.create_task(watch(call, receive))
+            passed = {**scope, "headers": own, _CALL: (call, arguments)}
+            disconnected = asyncio.create_task(watch(call, receive))
             try:
-                await manager.handle_request(passed, _replayed(text, gone), send)
+                await manager.handle_request(passed, _replayed(text, disconnected), send)
             finally:
-                gone.cancel()
+                disconnected.cancel()
         except (ServiceError, EngineError) as error:
             await problem(faults_of(error))(scope, receive, send)
         except ClientDisconnect:
@@ -153,7 +153,7 @@ class Tools:
             if params.name not in calls:
                 text, is_error = f"there is no tool {params.name[:100]!r}; the tools are {', '.join(calls)}", True
             else:
-                call, arguments = context.request.scope[_ASKED]
+                call, arguments = context.request.scope[_CALL]
                 text, is_error = await self._call(calls[params.name][0], arguments, call)
             return types.CallToolResult(content=[types.TextContent(type="text", text=text)], is_error=is_error)
 
@@ -173,10 +173,10 @@ class Tools:
             return f"show and start are whole numbers, 0 or more, show at most {_MOST_SHOWN}", True
         arguments: dict[str, Any] = {}
         for name in _parameters(path):
-            found = given.pop(name, None)
-            if not isinstance(found, str) or not found:
+            present = given.pop(name, None)
+            if not isinstance(present, str) or not present:
                 return f"{name} is missing: it is the id that the call which stored it answered with", True
-            arguments[name] = found
+            arguments[name] = present
         if path == "/v1/solids":
             given = given.get("solid", given)
 
@@ -235,19 +235,19 @@ def _parted(text: Body, call: Call) -> tuple[bytes, dict[str, Any]]:
             text = json.dumps(message).encode()
         else:
             params["arguments"], arguments = arguments, {}  # the library refuses it
-    if len(text) > _MOST_BESIDE:
-        raise ServiceError("body_too_large", f"a request holds {_MOST_BESIDE} bytes at most beside a tool's arguments")
+    if len(text) > _MOST_AROUND:
+        raise ServiceError("body_too_large", f"a request holds {_MOST_AROUND} bytes at most beside a tool's arguments")
     return bytes(memoryview(text)), arguments
 
 
-def _replayed(text: bytes, gone: asyncio.Task[None]) -> Receive:
+def _replayed(text: bytes, disconnected: asyncio.Task[None]) -> Receive:
     """Return what hands a body on, and then waits for the client to go away."""
     waiting: list[Message] = [{"type": "http.request", "body": text, "more_body": False}]
 
     async def receive() -> Message:
         if waiting:
             return waiting.pop()
-        await asyncio.wait([gone])
+        await asyncio.wait([disconnected])
         return {"type": "http.disconnect"}
 
     return receive
@@ -275,14 +275,14 @@ def _input(path: str, operation: dict[str, Any], document: dict[str, Any]) -> di
     made["properties"] = {**ids, **made["properties"], **_PAGE}
     made["required"] = [*ids, *made.get("required", [])]
     made.pop("description", None)
-    found: dict[str, Any] = {}
+    present: dict[str, Any] = {}
     waiting = _names(made)
     while waiting:  # bound: each name is taken in once
         name = waiting.pop()
-        if name not in found:
-            found[name] = _terse(schemas[name])
-            waiting += _names(found[name])
-    return {**made, "$defs": dict(sorted(found.items()))}
+        if name not in present:
+            present[name] = _terse(schemas[name])
+            waiting += _names(present[name])
+    return {**made, "$defs": dict(sorted(present.items()))}
 
 
 def _in_a_sentence(union: dict[str, Any], schemas: dict[str, Any]) -> dict[str, Any]:

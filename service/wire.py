@@ -125,7 +125,7 @@ def cost_of(body: pieces.Body) -> int:
     return 0 if len(body) < arrays.LEAST else pieces.cost_of(body)
 
 
-def _refusal(body: pieces.Body, found: str) -> str:
+def _refusal(body: pieces.Body, message: str) -> str:
     text = bytes(memoryview(body)[: pieces.PIECE])
     if len(text) == len(body) and not text.strip():
         return "the body is empty; send a JSON object, /docs has an example for each call"
@@ -133,8 +133,8 @@ def _refusal(body: pieces.Body, found: str) -> str:
         return "the body begins with a byte order mark; send it as UTF-8 without one"
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "the body is UTF-16; send it as UTF-8"
-    what = next((what for begun, what in _REMEDIES.items() if found.startswith(begun)), "correct it there")
-    return f"the body is no JSON that is taken here: {found:.200}; {what}"
+    what = next((what for begun, what in _REMEDIES.items() if message.startswith(begun)), "correct it there")
+    return f"the body is no JSON that is taken here: {message:.200}; {what}"
 
 
 def encode(answer: Any, poll: Poll = no_poll) -> bytes:
@@ -172,16 +172,16 @@ def _is_long(value: Any) -> bool:
 
 def _together(pieces: Iterable[bytes | memoryview]) -> Iterator[bytes]:
     """Yield short pieces put together."""
-    kept: list[bytes | memoryview] = []
+    waiting: list[bytes | memoryview] = []
     size = 0
     for piece in pieces:
-        kept.append(piece)
+        waiting.append(piece)
         size += len(piece)
         if size >= SENT:
-            yield b"".join(kept)
-            kept, size = [], 0
-    if kept:
-        yield b"".join(kept)
+            yield b"".join(waiting)
+            waiting, size = [], 0
+    if waiting:
+        yield b"".join(waiting)
 
 
 def _pieces(answer: BaseModel, poll: Poll) -> Iterator[bytes | memoryview]:

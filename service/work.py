@@ -204,7 +204,7 @@ class Call(Cancel):
         self,
         function: Callable[..., Any],
         *arguments: Any,
-        retold: Callable[[EngineError], None] | None = None,
+        rewrite_error: Callable[[EngineError], None] | None = None,
         **options: Any,
     ) -> tuple[Any, Accuracy]:
         """Call an engine function within the time left; return its result and the report of its accuracy.
@@ -220,8 +220,8 @@ class Call(Cancel):
             except DeadlineExceededError:
                 raise self.too_late() from None
             except EngineError as error:
-                if retold is not None:
-                    retold(error)
+                if rewrite_error is not None:
+                    rewrite_error(error)
                 raise
         return result, accuracy
 

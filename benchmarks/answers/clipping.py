@@ -126,9 +126,9 @@ def moved(scene: engine.Scene, steps: dict[int, Any], segments: Array, workers: 
     """Ask a scene of which bodies moved, which answers as one that is made so."""
     after = scene.moved(steps)
     n, answer = clipped(after, segments, workers)
-    anew: Any = engine.Scene(list(after.solids), list(after.poses)).clip_segments(segments, workers=workers)
+    rebuilt: Any = engine.Scene(list(after.solids), list(after.poses)).clip_segments(segments, workers=workers)
     for name, column in zip(NAMES, answer):
-        same(column, getattr(anew, name), "a scene made anew")
+        same(column, getattr(rebuilt, name), "a scene made anew")
     return n + len(segments), answer
 
 

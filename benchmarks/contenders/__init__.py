@@ -161,7 +161,7 @@ def answers(module: str, kind: str, subject: Any, items: Any, threads: int = 1) 
     return made.answer(made.ask(made.native(items)))
 
 
-def anew(module: str, kind: str, subject: Any, threads: int = 2) -> Prepared:
+def rebuilt_each_call(module: str, kind: str, subject: Any, threads: int = 2) -> Prepared:
     """Return a contender that starts from the subject's arrays at every question: build and answer are timed."""
     make(module, kind, subject, threads)  # whether its package runs
     return Prepared(lambda items: answers(module, kind, subject, items, threads))

@@ -151,7 +151,7 @@ def _placed(data: dict[str, Any], key: str) -> Placed:
     return Placed(_subject(data[key]), placed, data[key]["type"] != "surface")  # type: ignore[arg-type]
 
 
-def _asked(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
+def _answer_of_peer(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
     """Return a contender's answer to a case."""
     match operation:
         case "locate":
@@ -178,7 +178,7 @@ def _answer(peer: Peer, case: Case) -> tuple[str, str, list[int]]:
 
             is_ok = OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"]
             return "right" if is_ok else "wrong", "", []
-        answer = _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
+        answer = _answer_of_peer(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
         return ("right", "", []) if is_right(case, answer) else ("wrong", *museum.said(case, answer))
     except NotApplicable:
         return "not applicable", "", []

@@ -179,7 +179,7 @@ def clip_polygons(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     if not is_free or report is not False:
         check_options(workers, progress, report=report)
-    plan = region.kept("clipping_plan") if isinstance(region, Solid) else None
+    plan = region.cached("clipping_plan") if isinstance(region, Solid) else None
     if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:

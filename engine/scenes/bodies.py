@@ -19,7 +19,7 @@ from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check
 from engine.compiling.jit import entry_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.methods.filters import frames_of
-from engine.containment.methods.rational_locate import Check, is_located, over_tree
+from engine.containment.methods.rational_locate import Check, fold_csg_tree, is_located
 from engine.containment.posed_locators import posed_locator
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY

@@ -24,8 +24,8 @@ from engine.scenes.segment_kernels import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.decide_then_cut import FEW
 from engine.segment_clipping.on_boundary.boundary import clip_chunk
-from engine.segment_clipping.pieces import Pieces, first_of, room_for
-from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
+from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of
+from engine.segment_clipping.profiles import ExactPiece, clip_exactly, exact_pieces
 from engine.solids.base import Solid
 from engine.solids.checks import is_ready
 from engine.solids.pose import Pose
@@ -269,4 +269,4 @@ def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budg
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
         locator = None if n <= FEW else locator_of(solid).chosen(n, budget)
         return *clip_chunk(segments, 0, n, shape, locator, budget), True
-    return settled(segments, every, solid, pose, budget), every, False
+    return clip_exactly(segments, every, solid, pose, budget), every, False

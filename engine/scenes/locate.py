@@ -13,8 +13,8 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 
 from engine.compiling.jit import entry_of, kernel
-from engine.containment.cells.build import MOST_FACES, sides_if_they_pay
-from engine.containment.locate import located_at_once
+from engine.containment.cells.build import MOST_FACES, sides_if_profitable
+from engine.containment.locate import locate_small_batch
 from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
 from engine.containment.prepared import tree_of

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.containment.methods.rational_locate import exact_inverse, to_world_frame
-from engine.containment.prepared import tree_line, tree_of
+from engine.containment.prepared import tree_of, tree_row
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.rational import nearest_pair
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE

@@ -69,16 +69,16 @@ def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Cal
         return mesh.solid(engine.Polyhedron if solid_type == "polyhedron" else engine.Surface), mesh.n_collapsed
 
 
-def from_scene_pieces(found: Any, call: Call) -> Any:
+def from_scene_pieces(pieces: Any, call: Call) -> Any:
     """Return pieces as rows of float64, or whether each segment meets a body as int8."""
-    if isinstance(found, np.ndarray):
-        return found.astype(np.int8)
-    call.take(8 * len(found) * (4 + 2 * found.start.shape[1]))
-    return np.column_stack([found.source, found.body, found.t, found.start, found.end])
+    if isinstance(pieces, np.ndarray):
+        return pieces.astype(np.int8)
+    call.take(8 * len(pieces) * (4 + 2 * pieces.start.shape[1]))
+    return np.column_stack([pieces.source, pieces.body, pieces.t, pieces.start, pieces.end])
 
 
-def from_locations(found: engine.SceneLocations, call: Call) -> Any:
+def from_locations(located: engine.SceneLocations, call: Call) -> Any:
     """Return rows of point, body and location."""
-    call.take(24 * len(found.indices))
-    points = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets))
-    return np.column_stack([points, found.indices, 1 - found.on_boundary.astype(np.int64)])
+    call.take(24 * len(located.indices))
+    points = np.repeat(np.arange(len(located.offsets) - 1), np.diff(located.offsets))
+    return np.column_stack([points, located.indices, 1 - located.on_boundary.astype(np.int64)])

@@ -98,16 +98,16 @@ def _plain(value: Any) -> Any:
 
 def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[engine.Pose] | None]:
     """Return the solids of a scene and their poses (None where no body has one)."""
-    found = [to_solid(body.solid, call, ("bodies", i_body, "solid")) for i_body, body in enumerate(models)]
+    made = [to_solid(body.solid, call, ("bodies", i_body, "solid")) for i_body, body in enumerate(models)]
     if all(body.pose is None for body in models):
-        return found, None
+        return made, None
     poses = [
         to_pose(body.pose, ("bodies", i_body, "pose"))
         if body.pose is not None
         else engine.Pose.identity(solid.dimension)
-        for i_body, (body, solid) in enumerate(zip(models, found))
+        for i_body, (body, solid) in enumerate(zip(models, made))
     ]
-    return found, poses
+    return made, poses
 
 
 def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
@@ -139,17 +139,17 @@ def to_items(array: Any, dimension: int) -> Any:
     return array if array.size else np.empty((0, *array.shape[1:-1], dimension))
 
 
-def tell_of_scene(error: EngineError) -> None:
+def rewrite_error_paths_for_scene(error: EngineError) -> None:
     """Make an error speak of `bodies`, where solids and poses stand together."""
-    _tell(error, "bodies", {"solids": "solid", "poses": "pose"})
+    _rewrite_error_paths(error, "bodies", {"solids": "solid", "poses": "pose"})
 
 
-def tell_of_poses(error: EngineError) -> None:
+def rewrite_error_paths_for_poses(error: EngineError) -> None:
     """Make an error speak of `poses`, each of a rotation and a translation."""
-    _tell(error, "poses", {"rotations": "rotation", "translations": "translation"})
+    _rewrite_error_paths(error, "poses", {"rotations": "rotation", "translations": "translation"})
 
 
-def _tell(error: EngineError, name: str, parts: dict[str, str]) -> None:
+def _rewrite_error_paths(error: EngineError, name: str, parts: dict[str, str]) -> None:
     """Turn an argument's name, in the path and in the sentence, into that of a list whose items have such parts."""
     where = error.where
     if where and where[0] in parts:
@@ -191,7 +191,7 @@ def to_scene(bodies: list[Body], call: Call) -> Scene:
         try:
             return Scene(solids, poses)
         except EngineError as error:
-            tell_of_scene(error)
+            rewrite_error_paths_for_scene(error)
             raise
 
 

@@ -24,18 +24,18 @@ def summary(answer: Any, show: int, start: int, poll: Poll = no_poll) -> dict[st
     >>> summary({"contained": [True, False, True], "accuracy": {"items": 3}}, 1, 0)
     {'contained': {'count': 3, 'true': 2, 'items': [True]}, 'accuracy': {'items': 3}}
     """
-    found: dict[str, Any] = {}
+    short: dict[str, Any] = {}
     size, most = 0, max(show, 3)
     for name, value in (answer if isinstance(answer, dict) else vars(answer)).items():
         if value is None:
             continue
         if not isinstance(value, (list, np.ndarray, Series)):
-            found[name] = _cut(value, most)
+            short[name] = _cut(value, most)
             continue
         series = value if isinstance(value, Series) else Series(len(value), partial(_slice, value))
-        told: dict[str, Any] = {"count": series.n}
+        about: dict[str, Any] = {"count": series.n}
         if series is not value and series.n and _are_bools(value):
-            told["true"] = int(np.count_nonzero(np.asarray(value)))
+            about["true"] = int(np.count_nonzero(np.asarray(value)))
         items: list[Any] = []
         for first, last in series.cuts(start, start + show):
             poll()
@@ -43,8 +43,8 @@ def summary(answer: Any, show: int, start: int, poll: Poll = no_poll) -> dict[st
             size += len(encode(items[first - start :]))
             if size > MOST:
                 raise ServiceError("answer_too_large", f"the items take more than {MOST} bytes; show fewer")
-        found[name] = {**told, "items": items}
-    return found
+        short[name] = {**about, "items": items}
+    return short
 
 
 def _slice(items: Any, start: int, stop: int) -> Any:

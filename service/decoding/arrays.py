@@ -57,7 +57,7 @@ def decode(
 
 def _sections(body: Body, poll: Callable[[], object]) -> list[tuple[int, int]]:
     """Return start and stop of what is likely to be the value of a member and a long array of numbers."""
-    found, n_quotes, most = [], 0, 8 * len(body) // LEAST
+    sections, n_quotes, most = [], 0, 8 * len(body) // LEAST
     quote = _find(body, b'"', 0, len(body))
     while quote >= 0:  # bound: each turn goes on to the next quote
         n_quotes += 1
@@ -72,16 +72,16 @@ def _sections(body: Body, poll: Callable[[], object]) -> list[tuple[int, int]]:
             brace = _find(body, b"}", start, stop)
             end = brace if brace >= 0 else body.rfind(b",", start, stop)
             if value is not None and end > value.end():
-                found.append((value.end(), end))
-    return found
+                sections.append((value.end(), end))
+    return sections
 
 
 def _find(body: Body, byte: bytes, start: int, stop: int) -> int:
     """Return where `byte` first stands, -1 if nowhere; in steps, so that no other thread waits long."""
     for at in range(start, stop, STEP):
-        found: int = body.find(byte, at, min(at + STEP, stop))
-        if found >= 0:
-            return found
+        place: int = body.find(byte, at, min(at + STEP, stop))
+        if place >= 0:
+            return place
     return -1
 
 

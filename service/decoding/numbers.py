@@ -60,14 +60,14 @@ def lengths_of(tokens: bytes, depth: int) -> tuple[int, list[list[int]]]:
 
 def cut(rows: Any, groups: list[list[int]], depth: int) -> list[Any]:
     """Return the rings, views of `rows`; at depth 4 a list of them for each polygon."""
-    found, start = [], 0
+    polygons, start = [], 0
     for lengths in groups:
         rings = []
         for length in lengths:
             rings.append(rows[start : start + length])
             start += length
-        found.append(rings)
-    return found if depth == 4 else [ring for rings in found for ring in rings]
+        polygons.append(rings)
+    return polygons if depth == 4 else [ring for rings in polygons for ring in rings]
 
 
 PIECE: Final = 2**16
@@ -96,11 +96,11 @@ class Decoder:
 
     def array(self, text: memoryview) -> Any:
         """Return the array that `text` stands for; rings of several lengths as a list of arrays, or a list of such."""
-        found = _OPENING.match(text)
+        brackets = _OPENING.match(text)
         inner = bytes(text[-64:]).rstrip()
-        if found is None or not inner.endswith(b"]"):
+        if brackets is None or not inner.endswith(b"]"):
             raise Unfit
-        depth = found[0].count(b"[")
+        depth = brackets[0].count(b"[")
         if depth > _DEEPEST:
             raise Unfit
         stop = len(text) - len(bytes(text[-64:])) + len(inner) - 1
@@ -209,7 +209,7 @@ class Decoder:
                 level = jiter.from_json(b"".join((b"[", text[start:end], b"]")))
                 for _ in range(depth - 1):
                     level = list(chain.from_iterable(level))
-                if any(type(value) is int and int(held) != value for value, held in zip(level, here.tolist())):
+                if any(type(value) is int and int(number) != value for value, number in zip(level, here.tolist())):
                     raise Unfit
             start, n_before = end + 1, n_numbers
 
@@ -229,9 +229,9 @@ def _cut(text: memoryview, depth: int, start: int, stop: int) -> int:
     """Return where an item of the outermost list ends next, `stop` if nowhere; in steps, so that no other thread waits
     long. One that ends in so many blanks that a step ends within may be missed."""
     for at in range(start, stop, _SEARCHED):
-        found = _CUTS[depth].search(text, at, min(at + _SEARCHED + PIECE, stop))
-        if found is not None:
-            return found.end() - 1
+        comma = _CUTS[depth].search(text, at, min(at + _SEARCHED + PIECE, stop))
+        if comma is not None:
+            return comma.end() - 1
     return stop
 
 

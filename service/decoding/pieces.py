@@ -79,7 +79,7 @@ def cost_of(text: Body) -> int:
     return max(0, sum(cost * counts[mark] for mark, cost in _COSTS.items()) - 2 * len(text))
 
 
-def let_go(value: Any) -> None:
+def free_in_steps(value: Any) -> None:
     """Empty a decoded value in steps: to free millions of lists or texts at once holds up all other threads."""
     waiting = [value]
     while waiting:  # bound: each container is emptied once
@@ -195,8 +195,8 @@ class _Pieces:
                 raise self._wrong(f"an object has more than {NAMES} names at line 1 column 1", piece, 0)
             for name in value:
                 if len(name) > LONGEST_NAME:
-                    found = f"the name {name:.20}... has more than {LONGEST_NAME} letters at line 1 column 1"
-                    raise self._wrong(found, piece, 0)
+                    message = f"the name {name:.20}... has more than {LONGEST_NAME} letters at line 1 column 1"
+                    raise self._wrong(message, piece, 0)
             value = value.values()
         for item in value:
             if isinstance(item, (dict, list)):
@@ -215,19 +215,19 @@ class _Pieces:
             else:
                 inner = part.pop(_MARK)
                 if twice := container.keys() & part.keys():
-                    found = f"Detected duplicate key {min(twice)!r:.100} at line 1 column 1"
-                    raise self._wrong(found, piece, 0)
+                    message = f"Detected duplicate key {min(twice)!r:.100} at line 1 column 1"
+                    raise self._wrong(message, piece, 0)
                 container |= part
                 if len(container) > NAMES:
                     raise self._wrong(f"an object has more than {NAMES} names at line 1 column 1", piece, 0)
             part = inner
         return self._open[0]
 
-    def _wrong(self, found: str, piece: bytes, n_before: int) -> NotJson:
-        """Return the error for what the parser `found` in a piece, before which `n_before` bytes were put."""
-        place = _PLACE.fullmatch(found)
+    def _wrong(self, message: str, piece: bytes, n_before: int) -> NotJson:
+        """Return the error for what the parser `message` in a piece, before which `n_before` bytes were put."""
+        place = _PLACE.fullmatch(message)
         if place is None:
-            return NotJson(found)
+            return NotJson(message)
         what, line, column = place[1], int(place[2]), int(place[3])
         if line == 1:
             column = max(0, min(column - n_before, len(piece) + 1)) + self._column

@@ -20,9 +20,9 @@ def test_the_second_question_about_a_large_mesh_builds_the_tree() -> None:
     solid = _boxes(300)
     points = np.random.default_rng(0).uniform(0, 300, (100, 3))
     answers = [locate(points, solid).tobytes()]
-    assert solid.kept("tree") is None
+    assert solid.cached("tree") is None
     answers += [locate(points, solid).tobytes() for _ in range(3)]
-    assert solid.kept("tree") is not None
+    assert solid.cached("tree") is not None
     assert len(set(answers)) == 1
 
 

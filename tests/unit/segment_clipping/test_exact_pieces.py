@@ -16,7 +16,7 @@ from engine.segment_clipping.exact_pieces import (
     nodes_with_locations,
     triangle_stretch,
 )
-from engine.segment_clipping.pieces import joined, point_of, put_own_end, room_for
+from engine.segment_clipping.pieces import allocate_pieces, joined, point_of, put_own_end
 from engine.segment_clipping.profiles import exact_pieces
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Convex, Sphere
@@ -101,7 +101,7 @@ def test_the_line_beside_crosses_what_meets_in_a_vertex_or_an_edge_an_even_numbe
 def test_an_own_end_is_written_without_negative_zeros_and_parts_are_joined() -> None:
     for dimension in (2, 3):
         segments = np.array([[[-0.0, 1.0, 2.0], [3.0, -0.0, 5.0]]])[:, :, :dimension].copy()
-        pieces = room_for(1, dimension)
+        pieces = allocate_pieces(1, dimension)
         pieces.source[0] = 7
         for end in range(2):
             put_own_end(pieces, 0, end, segments, 0, dimension == 2)
