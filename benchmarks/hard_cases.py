@@ -1,4 +1,4 @@
-"""Who gets the hard cases wrong: the figures of docs/hard_cases.md.
+"""Measures the shares of wrong answers in docs/hard_cases.md.
 
     python -m benchmarks hard_cases            # measures, and writes the figures into docs
     python -m benchmarks hard_cases --dry      # prints the figures only; --only WORD: of marks with this word
@@ -37,16 +37,16 @@ MARK = re.compile(r"<!-- measured: (.*?) -->\n(?:.+\n)*")
 N_POINTS = 600
 """Of each family."""
 Shares = dict[str, tuple[int, int]]
-"""Contender: wrong or refused, of how many."""
+"""By contender: number of wrong or refused answers, and of all."""
 
 
 def _shares_of(contest: Contest) -> Shares:
-    found = {}
+    result = {}
     for row in run_contest(contest, 1, 2.0):
         if not row.absent and not row.contender.startswith("ours,"):
             bad = (row.errors.get(kind, 0) for kind in ("wrong", "refused", "outside"))
-            found[row.contender] = sum(bad), row.errors["judged"]
-    return found
+            result[row.contender] = sum(bad), row.errors["judged"]
+    return result
 
 
 def points(words: str) -> Shares:
@@ -131,7 +131,7 @@ def _paragraph(mark: re.Match[str], lines: dict[str, str]) -> str:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Measure and write; 1 if an answer of ours is wrong."""
+    """Measure and write; return 1 if an answer of ours is wrong."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dry", action="store_true", help="print the figures, write nothing")
     parser.add_argument("--only", default="", metavar="WORD", help="only marks with this word")

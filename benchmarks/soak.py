@@ -1,4 +1,4 @@
-"""Hostile load for long, a tenth of what else is asked: no status from 500 on but 503 and 504, memory that stays.
+"""Long hostile load, a tenth of all requests: no status from 500 on but 503 and 504, bounded memory.
 
     python -m benchmarks soak                # an hour
     python -m benchmarks soak --minutes 2
@@ -115,8 +115,8 @@ def _many(name: str, port: int, n: int) -> tuple[list[int], float]:
         return send(port), time.perf_counter() - before
 
     with ThreadPoolExecutor(n) as pool:
-        found = list(pool.map(one, range(n)))
-    return [status for statuses, _ in found for status in statuses], max(seconds for _, seconds in found)
+        outcome = list(pool.map(one, range(n)))
+    return [status for statuses, _ in outcome for status in statuses], max(seconds for _, seconds in outcome)
 
 
 def each_alone() -> bool:

@@ -1,6 +1,6 @@
-"""What the service counts of itself, for Prometheus: one registry an app, so that two in one process stay apart.
+"""Prometheus metrics of the service: one registry an app, so that two in one process do not mix.
 
-Several worker processes count into files of a folder that PROMETHEUS_MULTIPROC_DIR names; any of them tells the sum.
+Several worker processes count into files of a folder that PROMETHEUS_MULTIPROC_DIR names; each of them reports the sum.
 Refusals are counted for the whole process: some are made before there is an app (protocol.py).
 """
 
@@ -28,7 +28,7 @@ def _refusal(code: str) -> Counter:
 
 
 def count_refusal(code: str) -> None:
-    """Count a problem that is told, wherever it is."""
+    """Count a problem answer."""
     _refusal(code).inc()
 
 
@@ -80,7 +80,7 @@ class Metrics:
             self._phase(operation, phase).observe(spent)
 
     def text(self) -> bytes:
-        """Return everything counted, by all processes, in the text format of Prometheus."""
+        """Return all metrics, of all processes, in the text format of Prometheus."""
         folder = os.environ.get("PROMETHEUS_MULTIPROC_DIR")
         if folder is None:
             return generate_latest(self._registry)

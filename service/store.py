@@ -1,4 +1,4 @@
-"""Solids kept between requests, named by their content; the least recently used leave when the budget is used up.
+"""Content-addressed store of solids between requests; the least recently used are evicted when the budget is used up.
 
 The store holds engine objects, so structures prepared for one request serve the next. The name of a solid is a hash
 over a version tag, its type and its arrays as little-endian bytes, each with its shape: equal input has equal names in
@@ -7,9 +7,9 @@ its operands, a scene those of its solids, and the poses of its bodies.
 
 With a folder, which replicas may share over a common volume, the memory holds what was used last, and the folder more.
 A file is named by its solid and written under another name first, so that a name never leads to half a file; one that
-was damaged all the same is known when it is read, since its name is a hash of the content: it is not served, and taken
-away. Files used longest ago leave when the folder grows beyond its budget. What the system refuses is `store_full`, or
-`store_unavailable`; what is no file, a pipe for example, is never waited for.
+is damaged all the same is detected when it is read, since its name is a hash of the content: it is not served, but
+deleted. The least recently used files are evicted when the folder grows beyond its budget. Errors of the system become
+`store_full` or `store_unavailable`; what is no file, a pipe for example, is never waited for.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ log = logging.getLogger("service")
 _NAME: Final = re.compile(r"[0-9a-f]{64}")
 _PARTIAL: Final = ".part"
 _STALE_SECONDS: Final = 3600.0
-"""Age at which a partial file has no writer any more."""
+"""Age from which a partial file is abandoned."""
 
 _FULL: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
@@ -51,7 +51,7 @@ _READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOL
 
 @contextlib.contextmanager
 def _as_store_errors(path: Path) -> Iterator[None]:
-    """Turn what the system refuses into what is said of it."""
+    """Convert errors of the system to those of the service."""
     try:
         yield
     except OSError as error:
@@ -65,7 +65,7 @@ def _as_store_errors(path: Path) -> Iterator[None]:
 
 
 class Folder:
-    """Writes, reads and forgets files of solids; safe to share between threads and processes."""
+    """Writes, reads and evicts files of solids; safe to share between threads and processes."""
 
     def __init__(self, path: Path, budget: int) -> None:
         self._path = path
@@ -106,7 +106,7 @@ class Folder:
         return True
 
     def get(self, name: str) -> Solid | Scene | None:
-        """Return the solid called `name`, or None if there is no file that holds it.
+        """Return the solid called `name`, or None if no file has it.
 
         Raises: `store_unavailable`, `unsupported_solid`.
         """
@@ -145,7 +145,7 @@ class Folder:
         return True
 
     def _sync(self) -> None:
-        """Make the new name last, where a folder can be opened (not on Windows)."""
+        """Flush the folder entry, if a folder can be opened (not on Windows)."""
         with contextlib.suppress(OSError):
             handle = os.open(self._path, os.O_RDONLY)
             try:
@@ -154,7 +154,7 @@ class Folder:
                 os.close(handle)
 
     def _shrink(self) -> None:
-        """Take away partial files whose writer is gone, and the files used longest ago while there are too many."""
+        """Delete abandoned partial files, and the least recently used files beyond the budget."""
         with self._lock:
             self._written = 0
         result = []
@@ -175,7 +175,7 @@ class Folder:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what is in a file, None if there is none, or something else in its place."""
+    """Return the content of a file, None if there is none, or something else in its place."""
     try:
         handle = os.open(path, _READ)
     except FileNotFoundError:
@@ -192,8 +192,8 @@ def _content(path: Path) -> bytes | None:
 
 
 def to_octets(solid: Solid | Scene) -> bytes:
-    """Return the file of `solid`: an npz archive of its arrays, and of the solids that it is made of, operands first,
-    each once."""
+    """Return the file of `solid`: an npz archive of its arrays, and once of each solid it consists of, operands
+    first."""
     arrays: dict[str, Any] = {}
     nodes: list[dict[str, Any]] = []
     _add_node(solid, nodes, arrays, {})
@@ -223,7 +223,7 @@ def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], p
 
 
 def pose_rows(scene: Scene) -> Any:
-    """Return the numbers of each body's pose, rotation and translation, those of none at all where it has none."""
+    """Return rotation and translation of each body, the identity's for a body without a pose."""
     dimension = scene.solids[0].dimension
     none = np.concatenate([np.eye(dimension).ravel(), np.zeros(dimension)])
     rows = [none if pose is None else [*pose.rotation.ravel(), *pose.translation] for pose in scene.poses]
@@ -236,7 +236,7 @@ def _posed(row: Any, dimension: int) -> engine.Pose | None:
 
 
 def from_octets(octets: bytes) -> Solid | Scene:
-    """Return the solid or scene in a file; raises whatever comes up if it is damaged."""
+    """Return the solid or scene in a file; raises any error if it is damaged."""
     made: list[Any] = []
     with np.load(io.BytesIO(octets), allow_pickle=False) as arrays:
         for node in json.loads(arrays["nodes"].tobytes()):
@@ -255,9 +255,9 @@ def from_octets(octets: bytes) -> Solid | Scene:
 
 
 def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
-    """Return the class of a type and the attributes that a file holds of it; `unsupported_solid` where there are none.
+    """Return the class of a type and its stored attributes; `unsupported_solid` if it has none.
 
-    Csg and scenes are made of solids.
+    Csg and scenes consist of solids.
     """
     row = engine.solid_types.get(kind)
     if row is not None and row.stored:
@@ -279,7 +279,7 @@ K = TypeVar("K", Solid, Scene)
 def solid_id(solid: Stored, known: dict[int, str] | None = None) -> str:
     """Return the name of `solid`: 64 hexadecimal digits.
 
-    known: names by `id` of the solids in the tree: each is hashed once, however often it stands there.
+    known: names by `id` of the solids in the tree: each is hashed once, however often it occurs.
     """
     known = {} if known is None else known
     if id(solid) not in known:
@@ -310,7 +310,7 @@ def _parts(solid: Any, known: dict[int, str]) -> Iterator[Any]:
 
 
 class Store:
-    """A dictionary of solids and scenes by name with a budget of bytes; safe to share between threads."""
+    """A dictionary of solids and scenes by name with a budget of bytes; thread-safe."""
 
     def __init__(
         self, budget: int, folder: Path | None = None, folder_budget: int = 2**40, metrics: Metrics | None = None
@@ -325,8 +325,8 @@ class Store:
         self._lock = threading.Lock()
 
     def put(self, solid: Stored) -> tuple[str, bool]:
-        """Keep `solid`, which may be a scene; return its name and whether it is new. Those used longest ago leave if
-        there is no room."""
+        """Store `solid`, which may be a scene; return its name and whether it is new. May evict the least recently
+        used."""
         name, size = solid_id(solid), solid.memory
         if size > self._budget:
             raise ServiceError(
@@ -364,8 +364,10 @@ class Store:
         return None if entry is None else self._keep(name, entry)[0]
 
     def _size_now(self, name: str, entry: Stored) -> int:
-        """Return the bytes of what is kept, structures that have been prepared since included. To count those of a
-        scene takes a microsecond a body, so it is done at its first, second, fourth, ... use."""
+        """Return the bytes of an entry, with the structures prepared since.
+
+        Counting those of a scene takes a microsecond a body, so it is done at its first, second, fourth, ... use.
+        """
         if isinstance(entry, Solid):
             return entry.memory
         uses = self._looked[name] = self._looked.get(name, 0) + 1
@@ -380,7 +382,7 @@ class Store:
             return stored, is_new
 
     def _use(self, name: str, size: int) -> None:
-        """Count `size` for `name`, make it the last to leave, and let others go while there are too many bytes."""
+        """Count `size` for `name`, mark it most recently used, and evict others while there are too many bytes."""
         self._solids.move_to_end(name)
         self._total += size - self._sizes.get(name, 0)
         self._sizes[name] = size

@@ -23,7 +23,7 @@ _PARENT: Final = re.compile(rb"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16
 
 @cache
 def is_exporting() -> bool:
-    """Tell whether spans are asked for and can be sent; says in the log where only one of the two holds."""
+    """Return whether spans are requested and can be sent; log if only one of the two holds."""
     if not any(map(os.environ.get, _VARIABLES)) or os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
         return False
     if any(find_spec(f"opentelemetry.{part}") is None for part in ("sdk", "exporter", "instrumentation")):
@@ -33,7 +33,7 @@ def is_exporting() -> bool:
 
 
 def export(app: FastAPI) -> None:
-    """Make every request a span, health checks left out, where that is asked for."""
+    """Make every request a span, except health checks, if requested."""
     if not is_exporting():
         return
     from opentelemetry import trace
@@ -54,7 +54,7 @@ def export(app: FastAPI) -> None:
 
 
 def trace_of(headers: Mapping[bytes, bytes]) -> tuple[dict[str, str], bytes]:
-    """Return what a log line says of the trace that a request belongs to, and `traceresponse`, empty without a span."""
+    """Return the log fields of the trace that a request belongs to, and `traceresponse`, empty without a span."""
     if is_exporting():
         from opentelemetry import trace
 
@@ -67,7 +67,7 @@ def trace_of(headers: Mapping[bytes, bytes]) -> tuple[dict[str, str], bytes]:
 
 
 def note(operation: str, seconds: Mapping[str, float]) -> None:
-    """Write the time of each phase, in milliseconds, on the span of the request under way."""
+    """Write the time of each phase, in milliseconds, on the span of the running request."""
     if is_exporting():
         from opentelemetry import trace
 

@@ -39,7 +39,7 @@ from service.wire import Series, series_of
 from service.work import Call
 
 SHORT: Final = 12
-"""Vertices of a ring up to which lists are written faster than an array, and rings that are made at once."""
+"""Vertices of a ring up to which lists are written faster than an array, and rings per part."""
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
 
 
@@ -56,7 +56,7 @@ def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
 
 
 def from_stored(name: str, solid: Solid, collapsed: int | None = None) -> StoredSolidSummary:
-    """Return what the store says of a solid; collapsed: triangles that were left out of its file."""
+    """Return the store's answer about a solid; collapsed: triangles that were left out of its file."""
     counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
     if isinstance(solid, engine.Polygon):
         counts["rings"] = len(solid.ring_offsets) - 1
@@ -133,7 +133,7 @@ def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> Clip
 
 
 def _rows(names: tuple[str, ...], columns: Iterable[Any]) -> Callable[[int, int], list[Any]]:
-    """Return what makes some rows of arrays, each an object."""
+    """Return a function that makes rows start .. stop of columns, each an object."""
 
     def some(start: int, stop: int) -> list[Any]:
         return [dict(zip(names, row)) for row in zip(*(column[start:stop].tolist() for column in columns))]
@@ -158,9 +158,9 @@ def from_line_pieces(pieces: engine.LinePieces, accuracy: engine.Accuracy) -> Cl
 
 
 def rings_of(vertices: Any, offsets: Any, is_closed: bool = False) -> list[Any]:
-    """Return consecutive rings, or lines, as they are written; closed: as GeoJSON has them, the first position again.
+    """Return consecutive rings, or lines, for the answer; is_closed: repeat the first position, as in GeoJSON.
 
-    offsets: where they begin among ``vertices``, and where the last ends.
+    offsets: of the rings in ``vertices``.
     """
     vertices, ends = vertices[offsets[0] : offsets[-1]], (offsets - offsets[0]).tolist()
     if len(vertices) < SHORT * len(ends):  # order: an array for each would take longer than its few numbers
@@ -180,7 +180,7 @@ def from_collision(collision: engine.Collision, accuracy: engine.Accuracy) -> Co
 
 
 def from_pose_collisions(results: Any, accuracy: engine.Accuracy, witness: bool) -> CollideResponse:
-    """Return the answer of `collide` for many poses: relations, witnesses if asked for, details if asked for."""
+    """Return the answer of `collide` for many poses: relations, and witnesses and details if requested."""
     relations, *rest = results if isinstance(results, tuple) else (results,)
     witnesses = rest.pop(0) if witness else [None] * len(relations)
     details = rest[0] if rest else None
@@ -197,7 +197,7 @@ def from_pose_collisions(results: Any, accuracy: engine.Accuracy, witness: bool)
 
 
 def _details(codes: Any, start: int, stop: int) -> list[engine.Rcc8 | None]:
-    """Return the relations of RCC-8 of some pairs: None where none was asked for (codes None), or none is."""
+    """Return the RCC-8 relations of some pairs: None if not requested (codes None), or undefined."""
     if codes is None:
         return [None] * (stop - start)
     return [None if code < 0 else engine.Rcc8(code) for code in codes[start:stop].tolist()]
@@ -273,12 +273,12 @@ def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> Col
 
 
 def from_stored_scene(name: str, scene: Scene) -> StoredSceneSummary:
-    """Return what the store says of a scene."""
+    """Return the store's answer about a scene."""
     return StoredSceneSummary.made(id=name, dimension=scene.solids[0].dimension, bodies=len(scene), memory=scene.memory)
 
 
 def clipped_in_scene(scene: Scene, segments: Any, keep: Keep | None, call: Call) -> ClipSegmentsSceneResponse:
-    """Return what of segments lies within which body."""
+    """Return the answer of `clip/segments/scene`."""
     if len(scene):
         segments = questions.to_items(segments, scene.solids[0].dimension)
     clipped, accuracy = call.compute(

@@ -29,7 +29,7 @@ _NUMBER_BYTES: Final = 10
 
 
 def from_features(layer: Any, accuracy: engine.Accuracy, call: Call) -> LayersResponse:
-    """Return an answer about layers, as GeoJSON."""
+    """Return the answer of the layer operations, as GeoJSON."""
     call.media_type = "application/geo+json"
     call.instead = "send fewer features at once, or fewer or shorter properties"
 
@@ -50,7 +50,7 @@ def from_features(layer: Any, accuracy: engine.Accuracy, call: Call) -> LayersRe
 
 
 def _geometry(layer: Any, row: int, call: Call) -> bytes:
-    """Return the geometry of a feature, however many parts and rings it has."""
+    """Return the geometry of a feature, of any number of parts and rings."""
     if layer.areas is None:
         return bytes(layer.geometry(row))
     positions, (rings, pieces, ends) = layer.areas
@@ -75,7 +75,7 @@ def _geometry(layer: Any, row: int, call: Call) -> bytes:
 
 
 def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy, area: bool | None) -> OverlayResponse:
-    """Return the answer of `overlay`; area: whether it was asked for, None for where it costs next to nothing."""
+    """Return the answer of `overlay`; area: whether it is requested, None for only if it costs next to nothing."""
     wants_area = len(result.vertices) <= _FREE_AREA if area is None else area
     rings = result.ring_offsets
 
@@ -130,7 +130,7 @@ def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> Over
 
 
 def _overlay_pieces(result: engine.Overlay | engine.OverlayBatch, start: int, stop: int) -> list[Any]:
-    """Return some pieces of an overlay, or of many, as they are written; many holes of one are made in parts."""
+    """Return some pieces of one overlay or of many, for the answer; many holes of one piece are made in parts."""
     ends = result.piece_offsets[start : stop + 1].tolist()
     if ends[-1] - ends[0] <= PART:
         rings = rings_of(result.vertices, result.ring_offsets[ends[0] : ends[-1] + 1], is_closed=True)

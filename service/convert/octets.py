@@ -31,14 +31,14 @@ def to_rows(octets: Any, shape: tuple[int, ...]) -> Any:
 
 
 def answer(call: Call, array: Any, accuracy: engine.Accuracy) -> Any:
-    """Return `array`, with its accuracy in the header: a dictionary of structured fields (RFC 8941)."""
+    """Return `array`, with its accuracy in a header: a dictionary of structured fields (RFC 8941)."""
     members = {name: value for name, value in vars(from_accuracy(accuracy)).items() if value is not None}
     call.headers["Geometry-Accuracy"] = ", ".join(f"{name}={value}" for name, value in members.items())
     return array
 
 
 def check_is_convex(region: engine.Solid) -> engine.Solid:
-    """Return `region` if it leaves at most one piece of a segment for certain."""
+    """Return `region` if a segment has at most one piece in it for certain."""
     rows = sorted(engine.solid_types.values(), key=lambda row: row.planes is None)  # those of planes first
     taken = [row.name for row in rows if row.is_convex]
     if region.type not in taken:
@@ -50,7 +50,7 @@ def check_is_convex(region: engine.Solid) -> engine.Solid:
 
 
 def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int, call: Call) -> Any:
-    """Return both ends of what remains of each segment, NaN where nothing does."""
+    """Return both ends of the piece of each segment, NaN if it has none."""
     call.take(16 * n_segments * dimension)
     ends = np.full((n_segments, 2, dimension), np.nan)
     ends[pieces.source, 0] = pieces.start

@@ -1,4 +1,4 @@
-"""Answers in short, for a language model: of each list how long it is and some of its items."""
+"""Short answers for language models: of each list its length and some of its items."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from service.errors import ServiceError
 from service.wire import Poll, Raw, Series, encode, no_poll
 
 MOST: Final = 2**20
-"""Bytes of what is shown of an answer."""
+"""Largest short answer in bytes."""
 _LONG: Final = 1000
 """Letters of a text that are shown."""
 
@@ -58,7 +58,7 @@ def _are_bools(items: Any) -> bool:
 
 
 def _cut(value: Any, show: int) -> Any:
-    """Return a value of an answer with its own lists cut short, and its long texts."""
+    """Return a value of an answer with its own lists and long texts shortened."""
     if isinstance(value, Raw):
         value = json.loads(value.text)
     if isinstance(value, BaseModel):

@@ -123,7 +123,7 @@ def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
             at_least=question.at_least,
             rewrite_error=questions.rewrite_error_paths_for_poses,
         )
-        if len(translations) == 1 and question.at_least is None:  # of one pose the points are told, too
+        if len(translations) == 1 and question.at_least is None:  # one pose: with its points
             pose = engine.Pose(rotations[0], translations[0])
             result, accuracy = call.compute(engine.clearance, first, second, second_pose=pose)
             result = [result]
