@@ -14,8 +14,8 @@ TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
 """Contests won by another that the head of the page names; the tables have all."""
 HEAD = ("contender", "items/s", "quartiles", "ours is faster by", "net of calls", "one item: median, p99, longest",
-        "first", "build", "wrong", "95%", "raised an error", "unsupported input", "coordinates off", "ulps, largest (median)",
-        "beyond filter")  # fmt: skip
+        "first", "build", "wrong", "95%", "raised an error", "unsupported input", "coordinates off",
+        "ulps, largest (median)", "beyond filter")  # fmt: skip
 Row = dict[str, Any]
 
 

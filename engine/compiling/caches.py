@@ -59,7 +59,7 @@ def cpus() -> list[tuple[str, str]]:
     return [own, *((family, "") for family, needed in BASELINES.items() if all(map(able.get, needed)))]
 
 
-def signs() -> list[str]:
+def marker_files() -> list[str]:
     """Return the names of the empty files that mark a complete cache for each of `cpus`."""
     return [f"{COMPLETE}-{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}" for name, features in cpus()]
 

@@ -62,7 +62,7 @@ def fill_cache(
     with contextlib.suppress(OSError):
         own = folder / digest
         own.mkdir(mode=0o755, parents=True, exist_ok=True)
-        with _alone(own / "lock"):
+        with _locked(own / "lock"):
             if not _is_full(module):
                 done = _run(module, shares, processes, progress)
                 if len(done) == len(shares):
@@ -80,8 +80,8 @@ def note_full(module: str) -> None:
         with contextlib.suppress(OSError):
             own = folder / digest
             own.mkdir(mode=0o755, parents=True, exist_ok=True)
-            for sign in completion_markers()[:1]:
-                (own / sign).touch()
+            for marker in completion_markers()[:1]:
+                (own / marker).touch()
 
 
 def _is_full(module: str) -> bool:
@@ -91,11 +91,11 @@ def _is_full(module: str) -> bool:
 
 def _has_all(folder: Path, module: str) -> bool:
     digest = source_digest(module)
-    return digest is not None and any((folder / digest / sign).exists() for sign in completion_markers())
+    return digest is not None and any((folder / digest / marker).exists() for marker in completion_markers())
 
 
 @contextlib.contextmanager
-def _alone(path: Path) -> Iterator[None]:
+def _locked(path: Path) -> Iterator[None]:
     with path.open("w") as file:
         if fcntl is not None:
             fcntl.flock(file, fcntl.LOCK_EX)  # given back when the process ends, however it ends

@@ -50,7 +50,7 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Any:
 
 def completion_markers() -> list[str]:
     """Return the names of the marker files of a complete cache, for each CPU whose kernels can run here."""
-    return [] if _caches is None else _caches.signs()
+    return [] if _caches is None else _caches.marker_files()
 
 
 class _Kernel:

@@ -13,7 +13,14 @@ from typing import Final
 import numpy as np
 
 from engine.containment.cells.lattice import can_have_cells
-from engine.containment.prepared import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, edges_met, faces_over
+from engine.containment.prepared import (
+    IN_TREE,
+    IN_TREE_A_FACE_OVER,
+    SAMPLE,
+    cost_in_tree,
+    mean_edges_met,
+    mean_faces_above,
+)
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 
@@ -63,7 +70,7 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
     earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
     calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
     if earlier > 0.0 or n_points > SAMPLE:  # it takes 30 us to find out
-        more = _PASS_A_FACE * faces_over(solid) - cost_in_tree(solid)  # that a point costs in a pass
+        more = _PASS_A_FACE * mean_faces_above(solid) - cost_in_tree(solid)  # that a point costs in a pass
         earlier += (seen - n_points) * more
         tree -= n_points * more
     return Choice.PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else Choice.LISTS
@@ -85,7 +92,7 @@ def choose_for_rings(solid: Polygon, n_points: int) -> Choice:
         return Choice.CELLS
     by_pass, by_slabs = _IN_RINGS + _PASS_AN_EDGE * n_edges, np.inf
     if solid.cached("slabs") is not None or seen * by_pass > _SLABS + _SLABS_AN_EDGE * n_edges:
-        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * edges_met(solid)[1])
+        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * mean_edges_met(solid)[1])
     if seen * min(by_pass, by_slabs) > _RING_CELLS + _RING_CELLS_AN_EDGE * n_edges:
         return Choice.CELLS
     return Choice.LISTS if by_slabs < by_pass else Choice.PASS

@@ -172,7 +172,7 @@ def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
     def build() -> Rings:
         edges = edges_of(solid)
         check()
-        n_slabs = int(len(edges.xs) / max(_LEAST_IN_SLAB, edges_met(solid)[1]))
+        n_slabs = int(len(edges.xs) / max(_LEAST_IN_SLAB, mean_edges_met(solid)[1]))
         slabs = make_axis(*edges.box[2:], max(n_slabs, 1))
         offsets = np.zeros(slabs.n_cells + 1, np.int64)
         list_runs(edges.ys, edges.runs, slabs, offsets[1:], np.full(slabs.n_cells, -1), edges.runs, False)
@@ -192,7 +192,7 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
     """
 
     def build() -> Rings:
-        rings, (across, along) = rings_of(solid, check), edges_met(solid)
+        rings, (across, along) = rings_of(solid, check), mean_edges_met(solid)
         x_min, x_max, y_min, y_max = rings.box
         if min(x_max * 0.5 - x_min * 0.5, y_max * 0.5 - y_min * 0.5) < _SMALLEST:
             return rings
@@ -212,7 +212,7 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
     return solid.prepared("ring_cells", build, check)
 
 
-def edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
+def mean_edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
     """Return the mean number of edges that a vertical and a horizontal line meet; built once."""
 
     def find() -> tuple[float, float]:
@@ -233,7 +233,7 @@ EXACT: Final = np.zeros(0)
 IN_TREE, IN_TREE_A_FACE_OVER = 150.0, 2.0
 """Nanoseconds that a point takes in a tree, and for each face box above it (policy.py)."""
 SAMPLE: Final = 256
-"""Number of faces sampled by `faces_over`."""
+"""Number of faces sampled by `mean_faces_above`."""
 
 
 class TriangleTree(NamedTuple):
@@ -303,7 +303,7 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
     )  # fmt: skip
 
 
-def faces_over(solid: Polyhedron) -> float:
+def mean_faces_above(solid: Polyhedron) -> float:
     """Return the mean number of face boxes above a point; thousands on bad shapes."""
 
     def find() -> float:
@@ -320,7 +320,7 @@ def faces_over(solid: Polyhedron) -> float:
 
 def cost_in_tree(solid: Polyhedron) -> float:
     """Return the nanoseconds that a point takes in the tree."""
-    return IN_TREE + IN_TREE_A_FACE_OVER * faces_over(solid)
+    return IN_TREE + IN_TREE_A_FACE_OVER * mean_faces_above(solid)
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:

@@ -43,6 +43,7 @@ from engine.lanes.lanes import (
     bits_of,
     bytes_of,
     dot,
+    filter_pairs,
     greater,
     lane_of,
     lesser,
@@ -50,7 +51,6 @@ from engine.lanes.lanes import (
     load_lane,
     root,
     select,
-    sift,
     store,
 )
 from engine.lanes.tracing import LANES, Lanes, Mask, Number, Rows, Triple, traced
@@ -171,7 +171,7 @@ def discs_meeting(
     if low | high == 0:
         return low, high
     place_discs(second, j, frames, np.float32(scales[1] / scales[0]), inverse_ratio(scales[1], scales[0]), work)
-    return sift(low, 0, unseparated_discs, (first, i, work)), sift(
+    return filter_pairs(low, 0, unseparated_discs, (first, i, work)), filter_pairs(
         high, LANES // 2, unseparated_discs, (first, i, work)
     )
 

@@ -74,13 +74,13 @@ from engine.lanes.lanes import (
     bits_of,
     bytes_of,
     dot,
+    filter_pairs,
     greater,
     lane_of,
     lesser,
     load,
     load_lane,
     root,
-    sift,
     store,
 )
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, Triple, traced
@@ -172,7 +172,7 @@ def faces_meeting(
     if low | high == 0:
         return low, high
     set_normals(first, i, second, j, frames, work)
-    return sift(low, 0, unseparated_faces, (work,)), sift(high, LANES // 2, unseparated_faces, (work,))
+    return filter_pairs(low, 0, unseparated_faces, (work,)), filter_pairs(high, LANES // 2, unseparated_faces, (work,))
 
 
 def _block(rows: Rows, block: int) -> list[Lanes]:

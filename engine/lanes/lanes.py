@@ -159,7 +159,7 @@ def count_bits(bits: int) -> int:
 
 
 @inline
-def sift(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
+def filter_pairs(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
     """Filter four lanes' pairs (`bytes_of`): ``remaining(lane, *arguments)`` is the mask of each lane's second
     members."""
     left = 0

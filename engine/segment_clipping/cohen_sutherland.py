@@ -54,7 +54,7 @@ _CLOSE: Final = 48.0 * U2
 that of the high parts is exact within a factor of two, and elsewhere does not matter."""
 
 
-class Meeting(NamedTuple):
+class PlaneCrossing(NamedTuple):
     """The crossing of a segment with a plane of a slab.
 
     t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: both differences are exact. plane: 0.0 ..
@@ -70,30 +70,32 @@ class Meeting(NamedTuple):
 
 
 @merged
-def meeting(p: float, q: float, at: float, plane: float) -> Meeting:
+def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing:
     """Return the crossing of p q, its coordinates on one axis, with the plane at `at`."""
     n, n_low = two_diff(at, p)
     d, d_low = two_diff(q, p)
     d = d if p != q else 1.0  # not met: any number
     t = n / d
-    return Meeting(t, ((fma(-t, d, n) + n_low) - t * d_low) / d, n, d, (n_low == 0.0) & (d_low == 0.0), plane)
+    return PlaneCrossing(t, ((fma(-t, d, n) + n_low) - t * d_low) / d, n, d, (n_low == 0.0) & (d_low == 0.0), plane)
 
 
 @merged
-def meetings(p: float, q: float, low: float, high: float, axis: float) -> tuple[Meeting, Meeting, bool]:
+def slab_crossings(
+    p: float, q: float, low: float, high: float, axis: float
+) -> tuple[PlaneCrossing, PlaneCrossing, bool]:
     """Return the crossings where p q enters and leaves the slab low .. high; False if q - p is out of range."""
     is_entered, is_left = (p < low) | (p > high), (q < low) | (q > high)
-    entered = meeting(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
-    left = meeting(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
+    entered = plane_crossing(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
+    left = plane_crossing(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
     length = abs(entered.d)
     has_range = ((length >= SHORTEST) & (length <= LONGEST)) | (not (is_entered | is_left))
-    entered = entered if is_entered else Meeting(-1.0 - axis, 0.0, 0.0, 1.0, False, -1.0)
-    left = left if is_left else Meeting(2.0 + axis, 0.0, 0.0, 1.0, False, -1.0)
+    entered = entered if is_entered else PlaneCrossing(-1.0 - axis, 0.0, 0.0, 1.0, False, -1.0)
+    left = left if is_left else PlaneCrossing(2.0 + axis, 0.0, 0.0, 1.0, False, -1.0)
     return entered, left, has_range
 
 
 @merged
-def compare_parameters(a: Meeting, b: Meeting) -> tuple[float, bool]:
+def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]:
     """Return the parameter of a minus that of b, and whether its sign is certain; exactly zero if both are equal.
 
     Of exact differences equality is n_a d_b = n_b d_a (lattices: diagonals through corners).
@@ -139,9 +141,9 @@ def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple
 @merged
 def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
     """Decide as `decide_in_doubles` does, in double-doubles."""
-    a, d, is_x = meetings(p[0], q[0], low[0], high[0], 0.0)
-    b, e, is_y = meetings(p[1], q[1], low[1], high[1], 1.0)
-    c, f, is_z = meetings(p[2], q[2], low[2], high[2], 2.0)
+    a, d, is_x = slab_crossings(p[0], q[0], low[0], high[0], 0.0)
+    b, e, is_y = slab_crossings(p[1], q[1], low[1], high[1], 1.0)
+    c, f, is_z = slab_crossings(p[2], q[2], low[2], high[2], 2.0)
     gap, sure_1 = compare_parameters(a, b)
     entered = a if gap >= 0.0 else b  # equal: the smaller plane stays
     gap, sure_2 = compare_parameters(entered, c)

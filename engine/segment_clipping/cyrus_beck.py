@@ -169,7 +169,7 @@ def compare_rows(
 
 
 @merged
-def later(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
+def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
     """Return the later of the latest crossing so far and another one, within `slack`, if is_crossed."""
     is_later = is_crossed & (t > best.t)
     other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
@@ -274,10 +274,10 @@ def decide_on_rows(
                 is_out[i] = 1.0 if p_out & q_out else is_out[i]
                 inverse = 1.0 / (p - q)
                 t, slack = p * inverse, 1.01 * bound * abs(inverse) + T_ROUNDINGS
-                t0[i], slack0[i], plane0[i], rival0[i] = later(
+                t0[i], slack0[i], plane0[i], rival0[i] = later_crossing(
                     t, slack, float(j), p_out & q_in, Latest(t0[i], slack0[i], plane0[i], rival0[i])
                 )
-                t1[i], slack1[i], plane1[i], rival1[i] = later(
+                t1[i], slack1[i], plane1[i], rival1[i] = later_crossing(
                     -t, slack, float(j), p_in & q_out, Latest(t1[i], slack1[i], plane1[i], rival1[i])
                 )
         for i in range(size):

@@ -52,7 +52,7 @@ def _cross(u: Integers, v: Integers) -> Integers:
     return cross(u, v) if len(u) == 3 else (u[0] * v[1] - u[1] * v[0], 0)
 
 
-def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
+def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
     """Return the common stretch of p q and the edge a b, and whether they are collinear (also if a = b)."""
     u, v, w = minus(q, p), minus(b, a), minus(a, p)
     normal = _cross(u, v)
@@ -70,7 +70,7 @@ def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
     return (first, last, True) if first <= last else None
 
 
-def triangle_stretch(
+def triangle_overlap(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
     """Return the common stretch of the segment p q and the closed triangle a b c, and whether they are coplanar.
@@ -82,7 +82,7 @@ def triangle_stretch(
     around = [cross(seen[k - 2], seen[k - 1]) for k in range(3)]
     normal = [sum(each) for each in zip(*around)]
     if not any(normal):  # case: no area; the triangle is its edges
-        stretches = [edge_stretch(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
+        stretches = [edge_overlap(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
         met = [stretch for stretch in stretches if stretch is not None]
         if not met:
             return None
@@ -131,7 +131,7 @@ def contacts_of(
     for i, (face, corners) in enumerate(elements):
         if i % _CHECK_EVERY == 0:
             check()
-        stretch = (edge_stretch if len(corners) == 2 else triangle_stretch)(start, end, *corners)
+        stretch = (edge_overlap if len(corners) == 2 else triangle_overlap)(start, end, *corners)
         if stretch is not None:
             yield Contact(*stretch[:2], face, stretch[2], is_crossed(start, end, corners))
 

@@ -13,7 +13,7 @@ from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.error_free import dd_add, dd_div, workspace
 from engine.predicates.expansion import is_safe, magnitude
 from engine.predicates.side import dd_value
-from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, meeting
+from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, plane_crossing
 from engine.segment_clipping.cyrus_beck import are_safe, expand_value
 from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_end, put_own_end
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
@@ -107,7 +107,7 @@ def cut_end(
     is_high = (plane == 1.0) | (plane == 3.0) | (plane == 5.0)
     low, high = (x0 if is_x else (y0 if is_y else z0)), (x1 if is_x else (y1 if is_y else z1))
     at = high if is_high else low
-    m = meeting(px if is_x else (py if is_y else pz), qx if is_x else (qy if is_y else qz), at, plane)
+    m = plane_crossing(px if is_x else (py if is_y else pz), qx if is_x else (qy if is_y else qz), at, plane)
     length, bound = abs(m.d), T_BOUND * m.t
     x, x_sure = point_at(px, qx, m.t, m.t_low, 0.0)
     y, y_sure = point_at(py, qy, m.t, m.t_low, 0.0)

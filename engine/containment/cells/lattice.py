@@ -105,7 +105,7 @@ def _narrowed(low: float, high: float, slope: float, value: float) -> tuple[floa
 
 
 @inline
-def layer_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
+def rows_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
     """Return the first and last row of a layer that the triangle may reach; z: of the cell centres, y: of row 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_x:
@@ -114,7 +114,7 @@ def layer_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tu
 
 
 @inline
-def row_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
+def cells_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
     """Return the first and last cell of a row that the triangle may reach; x: of the centre of cell 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_z:
@@ -201,11 +201,11 @@ def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool,
         base = scaled_difference(low, a, scale)
         x0, y0, z0 = base[0] + 0.5, base[1] + 0.5, base[2] + 0.5
         for z in range(z_first, z_last + 1):
-            y_from, y_to = (y_first, y_last) if is_small else layer_reached(walls, z0 + z, y0, y_first, y_last)
+            y_from, y_to = (y_first, y_last) if is_small else rows_reached(walls, z0 + z, y0, y_first, y_last)
             for y in range(y_from, y_to + 1):
                 x_from, x_to = x_first, x_last
                 if not is_small:
-                    x_from, x_to = row_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
+                    x_from, x_to = cells_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
                 for cell in range((z * ny + y) * nx + x_from, (z * ny + y) * nx + x_to + 1):
                     if is_fill:
                         items[ends[cell]] = triangle

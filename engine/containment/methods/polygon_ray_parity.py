@@ -58,7 +58,7 @@ class Rings(NamedTuple):
 
 
 @merged
-def _pass_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
+def _crosses_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
     """Return whether the ray from q crosses the edge, and whether the filter cannot prove it."""
     above = ay - y
     left = (ax - x) * (by - y)
@@ -79,7 +79,7 @@ def _count_crossings(
     n_crossed = n_unsure = 0
     for edge in range(np.uint64(first), np.uint64(last)):  # unsigned: no index that counts from the end
         follow = edge + np.uint64(1)
-        is_crossed, is_unsure = _pass_edge(xs[edge], ys[edge], xs[follow], ys[follow], x, y, blur)
+        is_crossed, is_unsure = _crosses_edge(xs[edge], ys[edge], xs[follow], ys[follow], x, y, blur)
         n_crossed += is_crossed
         n_unsure += is_unsure
     return n_crossed, n_unsure
@@ -105,7 +105,7 @@ def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
 
 
 @called
-def _one_by_one(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
+def _locate_edge_by_edge(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
     """Return the location of q by some runs, edge by edge; UNDECIDED if a sign is out of the compiled range."""
     is_odd, is_open = False, False
     for run in range(first, last):
@@ -139,11 +139,11 @@ def locate_in_runs(
         return (1 if n_crossed & 1 else -1), False
     if blur != 0.0:
         return UNDECIDED, True
-    return _one_by_one(xs, ys, runs, first, last, Point2(x, y)), True
+    return _locate_edge_by_edge(xs, ys, runs, first, last, Point2(x, y)), True
 
 
 @merged
-def _look_up(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
+def _write_cell_statuses(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
     """Write the status of each point's cell to locations; branchless."""
     u, v, (x_min, x_max, y_min, y_max), statuses = rings.u, rings.v, rings.box, rings.statuses
     for item in range(len(points)):
@@ -168,7 +168,7 @@ def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locatio
     slabs, offsets, n_beyond = rings.slabs, rings.offsets, 0
     has_cells = len(rings.statuses) > 0 and len(blurs) == 0
     if has_cells:
-        _look_up(points, rings, locations)
+        _write_cell_statuses(points, rings, locations)
     for item in range(len(points)):
         if has_cells and locations[item] != MIXED:
             continue

@@ -59,7 +59,7 @@ _ABOVE_ALL: Final = np.float32(8.0)
 
 
 @inline
-def decide2(a: Point2, b: Point2, c: Point2) -> Any:
+def orient2d_with_stage(a: Point2, b: Point2, c: Point2) -> Any:
     """Return (orient2d, 0), or (orient2d, BEYOND) if the filter did not suffice."""
     turn = orient2d_filter(a, b, c)
     if turn != UNDECIDED:
@@ -68,13 +68,13 @@ def decide2(a: Point2, b: Point2, c: Point2) -> Any:
 
 
 @inline
-def moved_sign(turn: int, a: Point2, b: Point2) -> int:
+def perturbed_sign(turn: int, a: Point2, b: Point2) -> int:
     """Return `turn` = orient2d(a, b, q), a zero decided as for q + (eps, eps^2)."""
     return turn if turn != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
 @inline
-def is_astride(first: int, second: int, third: int) -> bool:
+def has_both_signs(first: int, second: int, third: int) -> bool:
     """Return whether both 1 and -1 are among three signs; UNDECIDED counts as neither."""
     has_left = first == 1 or second == 1 or third == 1
     has_right = first == -1 or second == -1 or third == -1
@@ -85,7 +85,7 @@ def is_astride(first: int, second: int, third: int) -> bool:
 def touch_in_plane(a: Point2, b: Point2, c: Point2, q: Point2) -> int:
     """Return ON_FACE, MISSED or UNDECIDED for a 2D point and triangle: ON_FACE unless the edge signs differ."""
     first, second, third = orient2d(a, b, q), orient2d(b, c, q), orient2d(c, a, q)
-    if is_astride(first, second, third):
+    if has_both_signs(first, second, third):
         return MISSED
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED
@@ -127,13 +127,13 @@ def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
     if q.z > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
-    first, beyond = decide2(a2, b2, q2)
-    second, more = decide2(b2, c2, q2)
+    first, beyond = orient2d_with_stage(a2, b2, q2)
+    second, more = orient2d_with_stage(b2, c2, q2)
     if first * second == -1:
         return MISSED | beyond | more
-    third, most = decide2(c2, a2, q2)
+    third, most = orient2d_with_stage(c2, a2, q2)
     beyond |= more | most
-    if is_astride(first, second, third):
+    if has_both_signs(first, second, third):
         return MISSED | beyond
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED | beyond
@@ -142,8 +142,8 @@ def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
         is_outside = q.x < min(a.x, b.x, c.x) or q.x > max(a.x, b.x, c.x)
         is_outside |= q.y < min(a.y, b.y, c.y) or q.y > max(a.y, b.y, c.y)
         return (MISSED if is_outside or q.z < min(a.z, b.z, c.z) else touch_triangle(a, b, c, q)) | beyond
-    is_inside = moved_sign(first, a2, b2) == area and moved_sign(second, b2, c2) == area
-    is_inside = is_inside and moved_sign(third, c2, a2) == area
+    is_inside = perturbed_sign(first, a2, b2) == area and perturbed_sign(second, b2, c2) == area
+    is_inside = is_inside and perturbed_sign(third, c2, a2) == area
     if q.z < min(a.z, b.z, c.z):
         return (CROSSED if is_inside else MISSED) | beyond
     side = orient3d_filter(a, b, c, q)
@@ -165,7 +165,7 @@ def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> in
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
     first, second = orient2d_blurred(a2, b2, q2, blur), orient2d_blurred(b2, c2, q2, blur)
     third = orient2d_blurred(c2, a2, q2, blur)
-    if is_astride(first, second, third):
+    if has_both_signs(first, second, third):
         return MISSED
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED | BEYOND
