@@ -123,7 +123,7 @@ def clip_segments(
 
     Examples
     --------
-    >>> from engine.solids.aabb import Aabb
+    >>> from engine.solids.primitives import Aabb
     >>> pieces = clip_segments([[[-1.0, 1.0], [3.0, 1.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])

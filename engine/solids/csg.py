@@ -48,7 +48,7 @@ class Csg(Solid):
 
     Examples
     --------
-    >>> from engine.solids.sphere import Sphere
+    >>> from engine.solids.primitives import Sphere
     >>> Csg("difference", [Sphere([0, 0], 2), Sphere([0, 0], 1)])
     Csg('difference', 2 operands, 2D)
     """
