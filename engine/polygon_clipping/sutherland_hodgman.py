@@ -50,7 +50,7 @@ def clip_rings(
     """
     polygons, clipped = Polygons(vertices, ring_offsets, polygon_offsets), Clipped(out, sizes, state, may_have_bridges)
     n_planes = planes.high.shape[0]
-    room = allocate_pieces(ring_offsets, polygon_offsets[first], polygon_offsets[last], n_planes)
+    room = room_for(ring_offsets, polygon_offsets[first], polygon_offsets[last], n_planes)
     scratch = scratch_for(room, n_planes, names)
     is_ready, exact = False, exact_scratch(0, len(names), planes.row_heap[:0], planes.row_places[:0])
     polygon, written = first, 0

@@ -180,7 +180,7 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray,
     check: as for `Solid.prepared`.
     """
     if isinstance(solid, Csg):
-        box: tuple[FloatArray, FloatArray] = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
+        box: tuple[FloatArray, FloatArray] = fold_csg_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
         return box
     low, high, _ = own_box(solid, check)
     if np.isinf(low).any():

@@ -185,8 +185,8 @@ class Tables:
 
 def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
     """Return the cells and the trees of polyhedra, where they are cached."""
-    cells, trees = [solid.kept("sides") for solid in solids], [solid.kept("tree") for solid in solids]
-    lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_line(tree) for tree in trees]
+    cells, trees = [solid.cached("sides") for solid in solids], [solid.cached("tree") for solid in solids]
+    lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_row(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())
     return (
         np.array([np.zeros(6) if each is None else each.frame for each in cells]).reshape(-1, 6),

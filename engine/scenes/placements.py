@@ -56,7 +56,7 @@ class Placements(Preparing):
     @property
     def all_cached(self) -> list[Any]:
         """All cached structures."""
-        others = (self.kept("few"), self.kept("whole"))
+        others = (self.cached("few"), self.cached("whole"))
         return [self.base._prepared, self._placed, *(each._prepared for each in others if each is not None)]
 
     def after(self, poses: Mapping[int, Pose | None]) -> Placements:

@@ -40,9 +40,9 @@ WANTS_TREE: Final = -3
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
 """The fields of `Mesh` that are read here."""
 MESH_WORDS: Final = 37
-"""Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_line`'s
+"""Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_row`'s
 addresses, 0 without a tree, and sizes (8,); then as doubles origin, inverse, whether all is in range, low and high of
-its box (11,), and `tree_line`'s places (10,)."""
+its box (11,), and `tree_row`'s places (10,)."""
 TREE, PLACES, TREE_PLACES = 8, 16, 27
 """Offsets of these."""
 _Lines = namedtuple("_Lines", "addresses sizes places")

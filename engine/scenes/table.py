@@ -48,7 +48,7 @@ class Table:
         solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)
-            addresses, sizes, places = tree_line(tree_of(solid))
+            addresses, sizes, places = tree_row(tree_of(solid))
             words = self._cached[id(solid)]
             words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
             words[TREE + 1 : TREE + 5] = addresses[1:]
