@@ -1,10 +1,10 @@
-"""Who is wrong on your own data: ``python -m engine audit SUBJECT [ITEMS] [--question ...] [-o page.html]``.
+"""Compare libraries on your own data: ``python -m engine audit SUBJECT [ITEMS] [--question ...] [-o page.html]``.
 
-Asks the textbook's methods, the same on numbers rounded to float32, and every peer that is installed about your points,
-segments, bodies or layers; judges them by the exact engine; prints a table and writes one page that needs no other
-file: who is wrong, how often, on which items, how fast. Of a mesh or polygon alone the points are the middles of its
-own faces or edges, rounded: on its boundary, or beside it by less than a float32 shows. A package that ends the process
-or gives no answer within `LIMIT` is named, and all others are asked again without it.
+Runs the textbook's methods, the same on numbers rounded to float32, and every installed peer on your points, segments,
+bodies or layers; judges them by the exact engine; prints a table and writes one self-contained page: who is wrong, how
+often, on which items, how fast. Of a mesh or polygon alone the points are the middles of its
+own faces or edges, rounded: on its boundary, or off it by less than a float32 shows. A package that crashes or takes
+longer than `LIMIT` is named, and all others are run again without it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import engine
 from benchmarks import errors, machine, table, web_page
 from benchmarks.bodies import Pair
 from benchmarks.contenders import NotApplicable, Placed, Prepared, rings_of
-from benchmarks.contest import ASKED, Contender, Contest, Row, field_of, hold, refusing
+from benchmarks.contest import LISTENERS, Contender, Contest, Row, field_of, refusing, run_contest
 from benchmarks.fields import collision as in_collision
 from benchmarks.fields import containment as in_containment
 from benchmarks.fields import overlay as in_overlay
@@ -43,11 +43,11 @@ from engine.textbook import methods
 
 QUESTIONS = ("contains", "segments", "collide", "overlay")
 MOST_STEPS = 2_000_000
-"""Of a textbook's method for one item: about a second."""
+"""Steps of a textbook's method for one item: about a second."""
 MOST_NAMED = 1_000
 """Wrong items that are listed."""
 LIMIT = 120.0
-"""Seconds that a package may work without an answer."""
+"""Seconds that a package may take for an answer."""
 MESHES, POLYGONS = ("open3d", "trimesh", "igl", "cgal"), ("shapely",)
 BODIES, LAYERS = ("coal", "fcl", "open3d", "igl", "manifold3d"), ("textbook", "shapely", "manifold3d")
 
@@ -56,7 +56,7 @@ ABOUT = "your bodies; most peers see surfaces only, and miss a body inside anoth
 
 
 def subject_of(solid: engine.Solid) -> Any:
-    """Return a solid as contenders take it."""
+    """Return a solid as contenders accept it."""
     match solid:
         case engine.Polyhedron() | engine.Surface():
             return Mesh("yours", solid.vertices.copy(), solid.triangles.copy())  # some peers take writable arrays only
@@ -95,15 +95,17 @@ def books(of: Callable[..., methods.Methods], *solids: engine.Solid) -> Iterator
         yield Contender(f"textbook: {name}, float32", partial(in_float32, name, steps))
 
 
-def telling(judge: Callable[[Any, Any], dict[str, Any]]) -> Callable[[Any, Any], dict[str, Any]]:
-    """Return a judge that also lists the items that are wrong."""
+def listing_wrong(judge: Callable[[Any, Any], dict[str, Any]]) -> Callable[[Any, Any], dict[str, Any]]:
+    """Return a judge that also lists the wrong items."""
 
-    def told(answers: Any, exact: Any) -> dict[str, Any]:
+    def judged(answers: Any, exact: Any) -> dict[str, Any]:
         each = (item for item in range(len(exact)) if judge(answers[item : item + 1], exact[item : item + 1])["wrong"])
-        found = judge(answers, exact)
-        return found | {"where": [item for item, _ in zip(each, range(min(found["wrong"], MOST_NAMED)), strict=False)]}
+        result = judge(answers, exact)
+        return result | {
+            "where": [item for item, _ in zip(each, range(min(result["wrong"], MOST_NAMED)), strict=False)]
+        }
 
-    return told
+    return judged
 
 
 def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
@@ -112,7 +114,7 @@ def contains(solid: engine.Solid, points: np.ndarray) -> Contest:
     peers = MESHES if isinstance(subject, Mesh) else POLYGONS if isinstance(subject, Rings) else ()
     asked = [*field_of("points", subject, peers, 1), *books(methods.of_points, solid)]
     exact = engine.contains(points, solid)
-    return Contest("yours", "contains", True, points, exact, telling(errors.same), asked, "your points",
+    return Contest("yours", "contains", True, points, exact, listing_wrong(errors.same), asked, "your points",
                    request=partial(in_containment.request, subject, points))  # fmt: skip
 
 
@@ -127,19 +129,19 @@ def own_points(solid: engine.Solid) -> np.ndarray:
 
 
 def segments(region: engine.Solid, items: np.ndarray) -> Contest:
-    """Return the contest about segments clipped on a region: kept or not, and the coordinates."""
+    """Return the contest about segments clipped to a region: whether a piece is left, and its coordinates."""
     subject = subject_of(region)
     peers = ("shapely", "celltree") if isinstance(region, engine.Aabb) and region.dimension == 2 else ()
     asked = [*field_of("segments", subject, peers, 1), *books(methods.of_segments, region)]
     ours = asked[0].make()
     exact = ours.answer(ours.ask(items))
-    judge = telling(errors.coordinates)
+    judge = listing_wrong(errors.coordinates)
     return Contest("yours", "segments", True, items, exact, judge, asked, "your segments",
                    request=partial(in_segments.request, subject, items))  # fmt: skip
 
 
 def collide(first: engine.Solid, second: engine.Solid, poses: np.ndarray | None) -> Contest:
-    """Return the contest about two bodies, as they stand or under poses (n, 3, 4) of the second."""
+    """Return the contest about two bodies, without poses or under poses (n, 3, 4) of the second."""
     bodies = [subject_of(body) for body in (first, second)]
     if poses is None:
         is_met = engine.collide(first, second, boolean=True).relation != engine.Relation.DISJOINT
@@ -147,13 +149,13 @@ def collide(first: engine.Solid, second: engine.Solid, poses: np.ndarray | None)
                   for body, solid in zip(bodies, (first, second))]  # fmt: skip
         made = in_collision.on_couples("collide", True, [couple], np.array([is_met]), ABOUT, BODIES)
         own = [replace(each, make=partial(_for_one, each)) for each in books(methods.of_pairs, first, second)]
-        return replace(made, operation="yours", contenders=[*made.contenders, *own], judge=telling(errors.same))
+        return replace(made, operation="yours", contenders=[*made.contenders, *own], judge=listing_wrong(errors.same))
     is_closed = all(isinstance(solid, engine.Polyhedron) for solid in (first, second))
     pair = Pair("yours", bodies[0], bodies[1], is_closed, poses[:, :, :3], poses[:, :, 3])
     exact = engine.collide_poses(first, second, pair.rotations, pair.translations, boolean=True)
     rows, asked = np.arange(len(poses)), field_of("poses", pair, BODIES[:2], 1)
     met = np.asarray(exact) != engine.Relation.DISJOINT
-    return Contest("yours", "collide", True, rows, met, telling(errors.same), asked, ABOUT,
+    return Contest("yours", "collide", True, rows, met, listing_wrong(errors.same), asked, ABOUT,
                    request=partial(in_collision.request, pair))  # fmt: skip
 
 
@@ -172,7 +174,7 @@ def overlay(subjects: Sequence[engine.Solid], clips: Sequence[engine.Solid]) -> 
     pairs = list(zip(*sides, strict=True))
     exact = np.array([in_overlay.by_ours(pair) for pair in pairs])
     asked = field_of("overlay", "intersection", LAYERS, 1)
-    return Contest("yours", "overlay", True, pairs, exact, telling(errors.areas), asked, "your layers",
+    return Contest("yours", "overlay", True, pairs, exact, listing_wrong(errors.areas), asked, "your layers",
                    request=partial(in_overlay.request, pairs))  # fmt: skip
 
 
@@ -185,7 +187,7 @@ def _rings(solid: engine.Solid) -> list[np.ndarray]:
 
 
 def contest_of(question: str | None, files: Sequence[str], poses: str | None) -> Contest:
-    """Return the contest that the files are about; without a question the one that the second file tells."""
+    """Return the contest for these files; without a question the one that fits the second file."""
     first, second = files[0], files[-1]
     if len(files) == 1:
         solid = read_solid(first)
@@ -223,12 +225,12 @@ def lines_of(rows: Sequence[Row]) -> Iterator[str]:
         if row.absent:
             yield f"{row.contender:<{wide}}{'':>12}  absent: {row.absent}"
             continue
-        wrong, where, found = row.errors["wrong"], row.errors["where"], row.errors
-        between = " to ".join(map(percent, interval(wrong, found["judged"])))
-        said = [f"{found[kind]:,} {kind}" for kind in ("refused", "outside") if found.get(kind)]
-        if found.get("off"):
-            worst = f"the worst by {found['ulp_largest']:.3g} ulps"
-            said.append(f"{found['off']:,} of {found['coordinates']:,} coordinates not the nearest, {worst}")
+        wrong, where, result = row.errors["wrong"], row.errors["where"], row.errors
+        between = " to ".join(map(percent, interval(wrong, result["judged"])))
+        said = [f"{result[kind]:,} {kind}" for kind in ("refused", "outside") if result.get(kind)]
+        if result.get("off"):
+            worst = f"the worst by {result['ulp_largest']:.3g} ulps"
+            said.append(f"{result['off']:,} of {result['coordinates']:,} coordinates not the nearest, {worst}")
         said.append(", ".join(map(str, where[:6])) + ", ..." * (wrong > 6))
         shown = "the judge" if row.contender == "ours" else "; ".join(filter(None, said))
         rate = f"{row.rate:,.{0 if row.rate >= 10 else 2}f}"
@@ -257,17 +259,17 @@ def options(words: Sequence[str] | None) -> argparse.Namespace:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
     parser.add_argument("file", help="a solid or a layer")
     parser.add_argument("items", nargs="?", help="points, segments, a solid or a layer; else its own faces or edges")
-    parser.add_argument("--question", choices=QUESTIONS, help="told by the files if left out")
+    parser.add_argument("--question", choices=QUESTIONS, help="by default the one that fits the files")
     parser.add_argument("--poses", metavar="FILE", help="of the second body: rows [R | t], 12 numbers")
     parser.add_argument("--seconds", type=seconds, default=1.0, help="of each contender")
     parser.add_argument("--without", action="append", default=[], metavar="NAME", help="a contender to leave out")
     parser.add_argument("-o", "--output", type=page, metavar="PAGE", help=".html, or .json for the results alone")
-    parser.add_argument("--asked", help=argparse.SUPPRESS)  # where the one who watches reads which package is asked
+    parser.add_argument("--asked", help=argparse.SUPPRESS)  # file in which `watched` reads the running package
     return parser.parse_args(words)
 
 
 def watched(words: Sequence[str]) -> int:
-    """Audit in a process of its own, and again without each package that ends it or gives no answer."""
+    """Run the audit in a process of its own, and again without each package that crashes or hangs."""
     without: list[str] = []
     options(words)
     with tempfile.TemporaryDirectory() as folder:
@@ -288,25 +290,25 @@ def watched(words: Sequence[str]) -> int:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Ask, print and write the page."""
+    """Run the contest, print and write the page."""
     given = options(words)
     files = [given.file, *([given.items] if given.items else [])]
     contest = contest_of(given.question, files, given.poses)
-    kept = [replace(each, make=_left_out) if each.name in given.without else each for each in contest.contenders]
-    ASKED[:] = [Path(given.asked).write_text] if given.asked else []
+    remaining = [replace(each, make=_left_out) if each.name in given.without else each for each in contest.contenders]
+    LISTENERS[:] = [Path(given.asked).write_text] if given.asked else []
     facts = machine.facts(0, machine.cores())
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # what a peer says of its arithmetic
-        rows = hold(replace(contest, contenders=kept), 3, given.seconds, has_latency=True)
+        rows = run_contest(replace(contest, contenders=remaining), 3, given.seconds, has_latency=True)
     print("\n".join(lines_of(rows)))
-    found = facts | {"load_after": machine.load(), "seconds": given.seconds, "quick": False}
-    found["rows"] = [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]
+    result = facts | {"load_after": machine.load(), "seconds": given.seconds, "quick": False}
+    result["rows"] = [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]
     if given.output and given.output.endswith(".json"):
-        Path(given.output).write_text(json.dumps(found, default=table.plain))
+        Path(given.output).write_text(json.dumps(result, default=table.plain))
     elif given.output:
         title = " and ".join(Path(name).name for name in files)
         asked = ((title, "yours", "", contest.name),)
-        Path(given.output).write_text(web_page.text_of(found, "this page", asked), "utf-8")
+        Path(given.output).write_text(web_page.text_of(result, "this page", asked), "utf-8")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Bodies to collide: pairs near contact under poses, convex bodies, and thousands of them turned anyhow in a cube."""
+"""Bodies to collide: pairs near contact under poses, convex bodies, and thousands with random rotations in a cube."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def unit_sized(mesh: Mesh) -> Mesh:
 def near_contact(name: str, first: Mesh, second: Mesh, is_closed: bool, n_poses: int, seed: int) -> Pair:
     """Return poses at which about half of the pairs collide: bisected along random directions, then jittered.
 
-    A bisection starts at a random place where the pair collides (of a soup: within the middle of the box) and one
-    far outside.
+    A bisection starts at a random place where the pair collides (of a soup: within the middle of the box) and one far
+    outside.
     """
     random = generator(f"{name}/poses", seed)
     turns = random_rotations(random, n_poses)
@@ -129,7 +129,7 @@ def convex_pair(n_vertices: int, n_poses: int, seed: int) -> Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crowd:
-    """Many bodies, few solids: which solid each body is, and where it stands."""
+    """Many bodies, few solids: the solid and the pose of each body."""
 
     name: str
     meshes: list[Mesh]

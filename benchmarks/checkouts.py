@@ -1,4 +1,4 @@
-"""The speed of two checkouts of the engine, row by row, in turns: ``python -m benchmarks checkouts OTHER``.
+"""Compares the speed of two checkouts of the engine, row by row, interleaved: ``python -m benchmarks checkouts OTHER``.
 
     python -m benchmarks checkouts ../before             # every row of ours, some twelve minutes
     python -m benchmarks checkouts ../before --quick     # small sizes, two or three; --only WORD: some rows
@@ -38,16 +38,16 @@ from benchmarks import checkouts
 checkouts.serve()
 """
 MEAN, WORST = 0.98, 0.93
-"""What must hold: the geometric mean over all rows, and every row."""
+"""Least ratios that pass: the geometric mean over all rows, and the worst row."""
 SECONDS = 3.0
-"""Of a row in a pass; three rounds at least."""
+"""Seconds of a row in a pass; three rounds at least."""
 
 
 # --- the process of one checkout --------------------------------------------------------------------------------------
 
 
 def serve() -> None:
-    """Answer the lines of the standard input, one JSON each: what to make, or how often to run it."""
+    """Answer the lines of the standard input, one JSON each: a row to make, or how often to run it."""
     import engine
     from benchmarks.contest import Contest, Size, run_of_ours
     from benchmarks.fields import tasks
@@ -56,24 +56,26 @@ def serve() -> None:
     known: dict[str, Callable[[], Any]] = {}
     run: Callable[[], Any] | None = None
     for line in sys.stdin:
-        asked = json.loads(line)
+        queried = json.loads(line)
         try:
-            if "seed" in asked:
-                known = {task.name: task.make for task in tasks(Size(asked["seed"], asked["scale"]), has_figures=False)}
-                found: Any = str(Path(engine.__file__).resolve().parents[1])
-            elif "make" in asked:
+            if "seed" in queried:
+                known = {
+                    task.name: task.make for task in tasks(Size(queried["seed"], queried["scale"]), has_figures=False)
+                }
+                result: Any = str(Path(engine.__file__).resolve().parents[1])
+            elif "make" in queried:
                 run = None  # what the row before holds goes first
-                made = known[asked["make"]]()
+                made = known[queried["make"]]()
                 assert isinstance(made, Contest)
                 run = run_of_ours(made)
                 run()
-                found = min(clocked(run)[0] for _ in range(2))
+                result = min(clocked(run)[0] for _ in range(2))
             else:
                 assert run is not None
-                found = _seconds(run, asked["times"])
+                result = _seconds(run, queried["times"])
         except Exception as error:  # of a row: the others go on
-            found = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(found), file=answers, flush=True)
+            result = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(result), file=answers, flush=True)
 
 
 def _seconds(run: Callable[[], Any], times: int) -> tuple[float, float]:
@@ -90,11 +92,11 @@ class Side:
             words, cwd=checkout, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1
         )
         self.send(seed=seed, scale=scale)
-        if (found := self.answer()) != str(checkout):
-            raise SystemExit(f"the engine was imported from {found}, not from {checkout}")
+        if (result := self.answer()) != str(checkout):
+            raise SystemExit(f"the engine was imported from {result}, not from {checkout}")
 
     def send(self, **words: Any) -> None:
-        """Ask, and do not wait; that a process is dead is told by `answer`."""
+        """Send a request without waiting; `answer` raises if the process is dead."""
         assert self._process.stdin is not None
         with suppress(BrokenPipeError):
             self._process.stdin.write(json.dumps(words) + "\n")
@@ -122,10 +124,10 @@ def compare(name: str, sides: tuple[Side, Side], rounds: int) -> list[list[list[
     for side in sides:  # both at the same time: not timed
         side.send(make=name)
     warm = [side.answer() for side in sides]
-    if failed := [found["error"] for found in warm if isinstance(found, dict)]:
+    if failed := [result["error"] for result in warm if isinstance(result, dict)]:
         return str(failed[0])
     times, end = max(1, int(LEAST_SECONDS / max(min(warm), 1e-7))), time.perf_counter() + SECONDS
-    found: list[list[list[float]]] = []
+    result: list[list[list[float]]] = []
     for round_ in range(rounds):
         if round_ >= 3 and time.perf_counter() > end:
             break
@@ -133,21 +135,21 @@ def compare(name: str, sides: tuple[Side, Side], rounds: int) -> list[list[list[
         for i_side in (0, 1) if round_ % 2 == 0 else (1, 0):
             sides[i_side].send(times=times)
             pair[i_side] = sides[i_side].answer()
-        found.append(pair)
-    return found
+        result.append(pair)
+    return result
 
 
-def line(name: str, found: list[list[list[float]]]) -> tuple[str, float, float]:
-    """Return the printed line of a row, and how many times faster this checkout is by the wall clock and by CPU."""
-    wall = spread([other[0] / ours[0] for other, ours in found])
-    cpu = statistics.median(other[1] / max(ours[1], 1e-9) for other, ours in found)
-    micros = [1e6 * statistics.median(pair[side][0] for pair in found) for side in (0, 1)]
-    text = f"{name:<52} {wall.median:>6.3f}  {wall.low:.3f} - {wall.high:.3f}  {cpu:>6.3f} {len(found):>3}"
+def line(name: str, result: list[list[list[float]]]) -> tuple[str, float, float]:
+    """Return the printed line of a row, and how many times faster this checkout is by wall time and by CPU time."""
+    wall = spread([other[0] / ours[0] for other, ours in result])
+    cpu = statistics.median(other[1] / max(ours[1], 1e-9) for other, ours in result)
+    micros = [1e6 * statistics.median(pair[side][0] for pair in result) for side in (0, 1)]
+    text = f"{name:<52} {wall.median:>6.3f}  {wall.low:.3f} - {wall.high:.3f}  {cpu:>6.3f} {len(result):>3}"
     return f"{text}  {micros[0]:>12,.1f} {micros[1]:>12,.1f}", wall.median, cpu
 
 
 def main(words: list[str] | None = None) -> int:
-    """Measure and print; 1 if a row failed, or the mean or a row is below what must hold by both clocks."""
+    """Measure and print; return 1 if a row failed, or the mean or a row is below its bound by both clocks."""
     from benchmarks.contest import Size
     from benchmarks.fields import tasks
 
@@ -170,16 +172,16 @@ def main(words: list[str] | None = None) -> int:
         places = [ROOT, other] if pass_ else [other, ROOT]
         sides = {place: Side(place, given.seed, scale) for place in places}
         for name in names:
-            found = compare(name, (sides[other], sides[ROOT]), rounds)
-            if isinstance(found, str):
-                failed[name] = found
+            result = compare(name, (sides[other], sides[ROOT]), rounds)
+            if isinstance(result, str):
+                failed[name] = result
             else:
-                rows[name] += found
+                rows[name] += result
                 print(line(name, rows[name])[0], file=sys.stderr, flush=True)
         for side in sides.values():
             side.close()
     print(f"{'row':<52} {'ratio':>6}  {'quartiles':<13}  {'by CPU':>6} {'n':>3}  {'other, us':>12} {'this, us':>12}")
-    shown = {name: line(name, found) for name, found in rows.items()}
+    shown = {name: line(name, result) for name, result in rows.items()}
     for text, _, _ in shown.values():
         print(text)
     for name, error in failed.items():

@@ -1,10 +1,10 @@
-"""Cold start: what an empty kernel cache costs, each time in a fresh process.
+"""Measures cold starts: the cost of an empty kernel cache, each time in a fresh process.
 
     python -m benchmarks cold_start             # some ten minutes: also until all is warm, with one process and two
     python -m benchmarks cold_start --quick     # one operation
 
 Seconds of wall and CPU, and compilations, until the first answer of each operation; seconds until all is warm, bytes of
-machine code that are kept, and all again from a seed of the CPU family.
+cached machine code, and all again from a seed of the CPU family.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from benchmarks.fields import Figure
 CUBE = """engine.Polyhedron([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)],
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])"""
 TRIANGLE = "engine.Polygon([[[{0}, {0}], [{1}, {0}], [{0}, {1}]]])"
-ASKED = {
+OPERATIONS = {
     "locate, sphere": "engine.locate(np.zeros((4, 3)), engine.Sphere([0, 0, 0], 1))",
     "locate, polyhedron": f"engine.locate(np.linspace(-0.5, 1.5, 36).reshape(-1, 3), {CUBE})",
     "locate, polygon": f"engine.locate(np.linspace(-0.5, 1.5, 24).reshape(-1, 2), {TRIANGLE.format(0, 4)})",
@@ -51,7 +51,7 @@ print(counter.n)
 
 
 def ask(name: str, code: str, cache: Path, **variables: str) -> Figure:
-    """Return what a fresh process takes for `code`, import included; of children, compilations are not counted."""
+    """Return the time of a fresh process for `code`, import included; compilations of children are not counted."""
     environment = {**os.environ, "ENGINE_CACHE_DIR": str(cache), **variables}
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     words = [sys.executable, "-c", COUNTING.format(code)]
@@ -65,7 +65,7 @@ def ask(name: str, code: str, cache: Path, **variables: str) -> Figure:
 
 
 def seeded(name: str, code: str, folder: Path) -> Figure:
-    """Return the same from a seed, which is made when it is first needed."""
+    """Return the same with a seed, which is made at its first use."""
     if not (folder / "seed").exists():
         words = [sys.executable, "-m", "engine", "warm", "-q", "--into", str(folder / "seed"), "--cpu", "x86-64-v3"]
         subprocess.run(words, cwd=machine.ROOT, check=True)
@@ -76,8 +76,8 @@ def main(words: list[str] | None = None) -> int:
     """Print and store all rows."""
     given = table.options(words, __doc__ or "")
     with tempfile.TemporaryDirectory() as text:
-        folder, asked = Path(text), dict(list(ASKED.items())[: 1 if given.quick else None])
-        rows = [Task(name, partial(ask, name, code, folder / name)) for name, code in asked.items()]
+        folder, queried = Path(text), dict(list(OPERATIONS.items())[: 1 if given.quick else None])
+        rows = [Task(name, partial(ask, name, code, folder / name)) for name, code in queried.items()]
         rows += [Task(f"{name}, seed", partial(seeded, f"{name}, seed", code, folder))
-                 for name, code in asked.items() if not given.quick]  # fmt: skip
+                 for name, code in queried.items() if not given.quick]  # fmt: skip
         return table.run("cold_start", rows, given)

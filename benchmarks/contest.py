@@ -1,7 +1,7 @@
-"""A contest: one workload with its exact answers, put to several contenders; speed and error of each in one row.
+"""A contest: one workload with its exact answers, run by several contenders; speed and error of each in one row.
 
 A contender is a maker: called once (that is its build, timed), it returns a `Prepared` that answers for the items. One
-that cannot be imported is absent, one that raises refuses. Contenders are asked in turn, in an order that changes from
+that cannot be imported is absent, one that raises refuses. Contenders run interleaved, in an order that changes from
 round to round; a slow one is timed on the first so many items only, which its row says, but judged, outside the clock,
 on as many as all others.
 """
@@ -30,15 +30,15 @@ JUDGING = 30.0
 SIZES = (1, 10, 100)
 """Items of a question whose latency is measured by itself."""
 LARGEST = 20_000
-"""Characters of a request that is kept."""
+"""Characters of the largest request that is stored."""
 DRAWN = 300
-"""Faces or vertices of a body that is too large to be kept."""
+"""Faces or vertices of the largest body that is stored."""
 QUESTIONS = 200
 """At most, for each of these sizes."""
 NAMED: list[str] = []
 """Contenders that no contest knows and the command names."""
-ASKED: list[Callable[[str], None]] = []
-"""Who wants to know which package is asked next, "" for our own code: one may end the process."""
+LISTENERS: list[Callable[[str], None]] = []
+"""Called with the next package to run, "" for our own code: a package may end the process."""
 Goals = tuple[float | None, float | None]
 """What the ratio against a peer must be, and what it aims at."""
 
@@ -61,10 +61,10 @@ class Contender:
 def contender(
     spec: str, kind: str, subject: Any, threads: int = 2, goals: Goals | None = None, is_new: bool = False
 ) -> Contender:
-    """Return a contender; spec: module[:kind][@setting]; is_new: from the subject's arrays at every question."""
+    """Return a contender; spec: module[:kind][@setting]; is_new: rebuilt from the subject's arrays at each call."""
     spec, _, setting = spec.partition("@")
     module, _, own = spec.partition(":")
-    build = contenders.anew if is_new else contenders.make
+    build = contenders.rebuilt_each_call if is_new else contenders.make
     knob = (float(setting),) if setting else ()
     return Contender(
         contenders.shown(module, own or kind), partial(build, module, own or kind, subject, threads, *knob),
@@ -87,7 +87,7 @@ def two_threads(kind: str, subject: Any, goals: Goals = (1.7, 1.9)) -> list[Cont
 
 
 def refusing(ask: Callable[[Any], Any], item: Any, refusal: Any = errors.REFUSED) -> Any:
-    """Return the answer for one item; whatever a peer raises is a refusal, NotApplicable is out of its domain."""
+    """Return the answer for one item; any error of a peer is a refusal, NotApplicable is out of its domain."""
     try:
         return ask(item)
     except contenders.NotApplicable:
@@ -105,16 +105,16 @@ class Contest:
     is_hard: bool
     items: Any
     exact: Any
-    """Answers to the first items, as many as there are (see `judge`); or what settles the items with given numbers, to
-    be asked about those on which contenders differ and some others; or None: nothing is judged."""
+    """Answers to the first items, as many as there are (see `judge`); or a function that answers the items with given
+    numbers, for those on which contenders differ and a sample of others; or None: nothing is judged."""
     judge: Callable[[Any, Any], dict[str, Any]]
     """``judge(answers, exact)`` counts what is wrong; `worst` names the worst, or the equally bad."""
     contenders: Sequence[Contender]
     about: str = ""
     n_sample: int = 20
-    """Of items that are settled though all agree."""
+    """Number of items on which all agree that are judged."""
     most: int = 200
-    """Of items on which contenders differ."""
+    """Largest number of items on which contenders differ that are judged."""
     count: int = 0
     """How many questions the items stand for, where they are not one each; such items are never cut short."""
     request: Callable[[int], tuple[str, dict[str, Any]]] | None = None
@@ -122,7 +122,7 @@ class Contest:
 
 
 class Task(NamedTuple):
-    """A row of a table before it is made, so that none is made in vain: a contest, or a figure that is none."""
+    """A row of a table before it is made: a contest, or a figure."""
 
     name: str
     make: Callable[[], Any]
@@ -132,14 +132,14 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Size:
-    """How large the workloads are: 1.0 for the record, less for a quick run."""
+    """Scale of the workloads: 1.0 for the record, less for a quick run."""
 
     seed: int
     scale: float = 1.0
 
     @property
     def is_quick(self) -> bool:
-        """Whether only small subjects are asked about."""
+        """Whether only small subjects are used."""
         return self.scale < 0.3
 
     def of(self, full: Any, quick: Any) -> Any:
@@ -153,7 +153,7 @@ class Size:
 
 @dataclass(slots=True)
 class Row:
-    """What one contender did in one contest."""
+    """Result of one contender in one contest."""
 
     operation: str
     contest: str
@@ -172,9 +172,9 @@ class Row:
     cold: float = 0.0
     """Seconds of the first question, of `PROBE` items."""
     first: float | None = None
-    """Seconds of a build anew and a question of one item, kernels loaded."""
+    """Seconds of a fresh build and a question of one item, kernels loaded."""
     latency: dict[str, list[float]] = field(default_factory=dict)
-    """By the number of items: median, 99th percentile, largest seconds of a question, and how many were asked."""
+    """By the number of items: median, 99th percentile, largest seconds of a question, and number of questions."""
     method: str = ""
     goals: Goals = (None, None)
     call_overhead: float = 0.0
@@ -190,7 +190,7 @@ class Row:
 
     @property
     def net_rate(self) -> float:
-        """The same without what the calls themselves cost."""
+        """The same without the overhead of the calls."""
         if not self.seconds:
             return 0.0
         return self.n_items / max(statistics.median(self.seconds) - self.n_items * self.call_overhead, 1e-12)
@@ -209,37 +209,37 @@ class _Entry:
     taken: float
 
 
-def hold(contest: Contest, rounds: int, seconds: float, has_latency: bool = False) -> list[Row]:
-    """Return one row for each contender; each is timed for about `seconds`."""
+def run_contest(contest: Contest, rounds: int, seconds: float, has_latency: bool = False) -> list[Row]:
+    """Run a contest; return one row for each contender, each timed for about `seconds`."""
     rows, entries = [], []
     for each in contest.contenders:
         row = Row(contest.operation, contest.name, contest.is_hard, each.name, each.package, each.setting,
                   contest.about, goals=each.goals)  # fmt: skip
         rows.append(row)
-        _tell(row)
+        _announce(row)
         if (entry := _entered(contest, each, row, seconds / rounds)) is not None:
             entries.append(entry)
     _judge(contest, entries)
     gc.collect()
-    gc.freeze()  # what is there now is not gone through again at every turn
+    gc.freeze()  # existing objects are not collected again at every turn
     for round_ in range(rounds):
         for entry in entries if round_ % 2 == 0 else reversed(entries):
             gc.collect()
-            _tell(entry.row)
+            _announce(entry.row)
             wall, cpu, _ = clocked(partial(_repeat, entry))
             entry.row.seconds.append(wall / entry.times)
             entry.row.cpu.append(cpu / entry.times)
     gc.unfreeze()
     if has_latency and not contest.count:
         for entry in entries:
-            _tell(entry.row)
+            _announce(entry.row)
             _ask_few(contest, entry, seconds / 8)
     return rows
 
 
-def _tell(row: Row) -> None:
-    for told in ASKED:
-        told(row.contender if row.package else "")
+def _announce(row: Row) -> None:
+    for listener in LISTENERS:
+        listener(row.contender if row.package else "")
 
 
 def _repeat(entry: _Entry) -> None:
@@ -248,7 +248,7 @@ def _repeat(entry: _Entry) -> None:
 
 
 def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _Entry | None:
-    """Build a contender and ask it until it is warm; None if it is absent or refuses, for which ours has no excuse."""
+    """Build a contender and run it until it is warm; None if it is absent or refuses, which is an error for ours."""
     gc.collect()
     before = time.perf_counter()
     try:
@@ -259,8 +259,8 @@ def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _En
         row.n_items = contest.count or _how_many(prepared, contest.items, seconds)
         items = prepared.native(contest.items if contest.count else contest.items[: row.n_items])
         settle(prepared, items)
-        taken, _, found = clocked(partial(prepared.ask, items))
-        answers = prepared.answer(found)
+        taken, _, result = clocked(partial(prepared.ask, items))
+        answers = prepared.answer(result)
         row.method = prepared.method() if prepared.method else ""
         row.exact_share = prepared.share() if prepared.share else None
         row.call_overhead = each.overhead() if each.overhead else 0.0
@@ -276,7 +276,7 @@ def _entered(contest: Contest, each: Contender, row: Row, seconds: float) -> _En
 
 
 def settle(prepared: Prepared, items: Any) -> None:
-    """Ask until the method no longer changes: structures that pay only after many questions are then there."""
+    """Run until the method no longer changes: structures that amortise only after many questions are then built."""
     if prepared.method is None and prepared.memory is None:
         return
     before = None
@@ -289,7 +289,7 @@ def settle(prepared: Prepared, items: Any) -> None:
 
 
 def _how_many(prepared: Prepared, items: Any, seconds: float) -> int:
-    """Return how many items a contender answers in about so many seconds; some have a large cost per call."""
+    """Return how many items a contender answers in about so many seconds; some have a large overhead per call."""
     n_items = PROBE
     while n_items < len(items):
         once = partial(prepared.ask, prepared.native(items[:n_items]))
@@ -303,15 +303,15 @@ def _how_many(prepared: Prepared, items: Any, seconds: float) -> int:
 
 
 def _ask_few(contest: Contest, entry: _Entry, seconds: float) -> None:
-    """Measure questions of few items, each of other items, and the first question of all."""
+    """Measure questions of few items, each of other items, and the first question of a fresh build."""
     for size in SIZES:
         if size > len(contest.items):
             break
         starts = np.linspace(0, len(contest.items) - size, QUESTIONS).astype(int)
         took: list[float] = []
         for start in starts:
-            asked = entry.prepared.native(contest.items[start : start + size])
-            took.append(clocked(partial(entry.prepared.ask, asked))[0])
+            queried = entry.prepared.native(contest.items[start : start + size])
+            took.append(clocked(partial(entry.prepared.ask, queried))[0])
             if sum(took) > seconds and len(took) >= 10:
                 break
         row = [statistics.median(took), percentile(took, 0.99), max(took), len(took)]
@@ -323,7 +323,8 @@ def _ask_few(contest: Contest, entry: _Entry, seconds: float) -> None:
 
 
 def _judge(contest: Contest, entries: list[_Entry]) -> None:
-    """Judge against the exact answers, or what contenders differ on and a sample of the rest; all on the same items."""
+    """Judge all contenders by the exact answers, or by those for differing items and a sample; all on the same
+    items."""
     if contest.exact is None or callable(contest.exact):
         _judge_differing(contest, entries)
         return
@@ -331,16 +332,16 @@ def _judge(contest: Contest, entries: list[_Entry]) -> None:
         answers, n_items = entry.answers, len(contest.exact)
         if n_items > entry.row.n_items and not contest.count:
             n_items = min(n_items, max(entry.row.n_items, int(JUDGING * entry.row.n_items / max(entry.taken, 1e-9))))
-            _tell(entry.row)
+            _announce(entry.row)
             answers = entry.prepared.answer(entry.prepared.ask(entry.prepared.native(contest.items[:n_items])))
         _note(contest, entry, answers[:n_items], contest.exact[:n_items], np.arange(n_items))
 
 
 def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.ndarray) -> None:
-    """Judge a contender; keep the worst of its answers."""
-    found = contest.judge(answers, exact)
-    worst = np.atleast_1d(found.pop("worst", [])).astype(int).tolist()
-    entry.row.errors = found
+    """Judge a contender; store the worst of its answers."""
+    result = contest.judge(answers, exact)
+    worst = np.atleast_1d(result.pop("worst", [])).astype(int).tolist()
+    entry.row.errors = result
     for place in worst:  # until one is small enough to be shown
         item = int(rows[place])
         entry.row.worst = {"item": item, "answer": errors.plain(answers[place]), "exact": errors.plain(exact[place])}
@@ -356,7 +357,7 @@ def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.nd
 
 
 def sketch(value: Any) -> Any:
-    """Return a body that is too large to be shown as one that can be drawn: some of its faces and vertices."""
+    """Return a body too large to be stored as one that can be drawn: some of its faces and vertices."""
     if isinstance(value, list):
         return [sketch(each) for each in value[:DRAWN]]
     if not isinstance(value, dict):
@@ -377,27 +378,27 @@ def sketch(value: Any) -> Any:
 
 
 def _judge_differing(contest: Contest, entries: list[_Entry]) -> None:
-    told = [entry for entry in entries if entry.answers is not None]
-    if len(told) < 1 + (contest.exact is None):
+    answered = [entry for entry in entries if entry.answers is not None]
+    if len(answered) < 1 + (contest.exact is None):
         return
-    n_items = min(len(entry.answers) for entry in told)
+    n_items = min(len(entry.answers) for entry in answered)
     differs = np.zeros(n_items, bool)
-    first = np.asarray(told[0].answers[:n_items])
-    for entry in told[1:]:
+    first = np.asarray(answered[0].answers[:n_items])
+    for entry in answered[1:]:
         other = np.asarray(entry.answers[:n_items])
         differs |= ((first != other) & ~((first != first) & (other != other))).reshape(n_items, -1).any(axis=1)
     chosen = np.flatnonzero(differs)[: contest.most]
     sample = np.random.default_rng(0).choice(n_items, min(contest.n_sample, n_items), replace=False)
     chosen = np.union1d(chosen, sample)
     exact = None if contest.exact is None or errors.REASON else contest.exact(chosen)
-    for entry in told:
+    for entry in answered:
         if exact is not None:
             _note(contest, entry, np.asarray(entry.answers)[chosen], exact, chosen)
         entry.row.errors["differ"] = int(differs.sum())
 
 
 def run_of_ours(contest: Contest) -> Callable[[], Any]:
-    """Return the question that ours is timed on, warm: for two checkouts of the engine side by side."""
+    """Return the timed question of ours, warm: for comparing two checkouts of the engine."""
     prepared = next(each for each in contest.contenders if each.name == "ours").make()
     items = prepared.native(contest.items)
     settle(prepared, items)

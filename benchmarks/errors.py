@@ -1,7 +1,7 @@
-"""Wrong answers, counted against exact ones by tests/reference: rationals that share nothing with the engine.
+"""Counts wrong answers by exact ones of tests/reference: rationals that share nothing with the engine.
 
-Hard sets carry their exact answers. On workloads made for speed, what contenders disagree on, and a random sample of
-the others, is settled here. Float64 boxes, padded far beyond rounding, only throw out pairs of faces that cannot meet.
+Hard sets have their exact answers. On workloads made for speed, the items on which contenders differ, and a random
+sample of the others, are decided here. Float64 boxes, padded far beyond rounding, only exclude faces that cannot meet.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def _in_rings(point: np.ndarray, rings: list[np.ndarray]) -> int:
 
 
 class _Body:
-    """A mesh under a pose: float64 boxes of its faces, and their exact corners when asked for."""
+    """A mesh under a pose: float64 boxes of its faces, and their exact corners on demand."""
 
     def __init__(self, mesh: Mesh, pose: dict[str, Any] | None) -> None:
         self.mesh, self.pose, self.placed = mesh, pose, mesh.vertices
@@ -77,7 +77,7 @@ class _Body:
         return tuple(self.vertex(vertex) for vertex in self.mesh.faces[number].tolist())
 
     def holds_part_of(self, other: _Body) -> bool:
-        """Tell whether a part of another body, which meets no face of this one, lies inside."""
+        """Return whether a part of another body, which meets no face of this one, lies inside."""
         labels, faces = np.arange(len(other.placed)), other.mesh.faces
         while True:  # bound: labels only fall; a vertex of every connected part remains
             least = labels.copy()
@@ -125,35 +125,35 @@ def meets(segment: np.ndarray, mesh: Mesh) -> bool:
 
 
 def exact_distances(couples: Any) -> np.ndarray:
-    """Return the doubles nearest to the distances of pairs of bodies that stand where they are, 0 where they meet."""
-    found = [distance(*(document(body.shape) for body in couple)) for couple in couples]
-    return np.array([0.0 if each is None else nearest_double_with_root(-each[1], Q(1), each[0]) for each in found])
+    """Return the doubles nearest to the distances of pairs of bodies without poses, 0 if they meet."""
+    result = [distance(*(document(body.shape) for body in couple)) for couple in couples]
+    return np.array([0.0 if each is None else nearest_double_with_root(-each[1], Q(1), each[0]) for each in result])
 
 
 def first_pieces(segments: np.ndarray, region: Any) -> np.ndarray:
-    """Return (n, 2 * dim) nearest doubles of the first piece's ends, NaN where nothing remains."""
-    rows, told = np.full((len(segments), segments[0].size), np.nan), document(region)
+    """Return (n, 2 * dim) nearest doubles of the first piece's ends, NaN if there is none."""
+    rows, reported = np.full((len(segments), segments[0].size), np.nan), document(region)
     for row, segment in zip(rows, segments.tolist(), strict=True):
-        if pieces := clip_segment(segment, told):
+        if pieces := clip_segment(segment, reported):
             start, end, _ = pieces[0].rounded()
             row[:] = (*start, *end)
     return rows
 
 
 def are_kept(rings: np.ndarray, region: Any) -> np.ndarray:
-    """Return whether something remains of each ring."""
+    """Return whether a part of each ring is left."""
     planes = planes_of(document(region))
     return np.array([len(clip_contour(ring, planes)) > 0 for ring in rings.tolist()])
 
 
 def areas_in_region(rings: np.ndarray, region: Any) -> np.ndarray:
-    """Return area of what remains of each ring and its own area."""
-    planes, found = planes_of(document(region)), []
+    """Return the area of each clipped ring and its own area."""
+    planes, result = planes_of(document(region)), []
     for ring in rings.tolist():
         sizes = signed_area(clip_contour(ring, planes)), signed_area([vector(p) for p in ring])
         left, whole = (abs(float(Fraction(size))) for size in sizes)
-        found.append([left, max(whole, 1e-300)])
-    return np.array(found)
+        result.append([left, max(whole, 1e-300)])
+    return np.array(result)
 
 
 def scale_of(pair: Any) -> float:
@@ -170,17 +170,17 @@ def overlay_area(pair: Any) -> tuple[float, float]:
 # --- judging ----------------------------------------------------------------------------------------------------------
 
 REFUSED, OUTSIDE = -9, -8
-"""In place of an answer: the contender raised an error for this item; the item is outside of what it says it takes."""
+"""Replacements of an answer: the contender raised an error for this item; the item is outside of its domain."""
 SHOWABLE = 20
 """Wrong labels among which one is looked for that is small enough to be shown."""
 AREA_TOLERANCE = 2.0**-20
-"""Of the largest area of the pair: more than rounding coordinates does, less than any piece anyone would miss."""
+"""Part of the largest area of the pair: above rounding of coordinates, below any piece that matters."""
 
 
 def plain(value: Any) -> Any:
     """Return a number or array as JSON takes it, None for NaN."""
-    found = np.asarray(value).tolist()
-    return [None if x != x else x for x in found] if isinstance(found, list) else None if found != found else found
+    result = np.asarray(value).tolist()
+    return [None if x != x else x for x in result] if isinstance(result, list) else None if result != result else result
 
 
 def same(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
@@ -188,9 +188,9 @@ def same(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     answers, exact = np.asarray(answers).astype(np.int64), np.asarray(exact).astype(np.int64)
     refused, outside = answers == REFUSED, answers == OUTSIDE
     wrong = (answers != exact) & ~refused & ~outside
-    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())}
-    found["outside"] = int(outside.sum())
-    return found | ({"worst": np.flatnonzero(wrong)[:SHOWABLE].tolist()} if wrong.any() else {})
+    result = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())}
+    result["outside"] = int(outside.sum())
+    return result | ({"worst": np.flatnonzero(wrong)[:SHOWABLE].tolist()} if wrong.any() else {})
 
 
 def _ulps(errors: np.ndarray) -> dict[str, float]:
@@ -203,16 +203,16 @@ def _ulps(errors: np.ndarray) -> dict[str, float]:
 
 def coordinates(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     """Judge rows of coordinates, NaN where nothing remains: wrong where that differs; else their errors in ulps."""
-    kept, should = ~np.isnan(answers).any(axis=1), ~np.isnan(exact).any(axis=1)
-    both, wrong = kept & should, kept != should
+    remaining, should = ~np.isnan(answers).any(axis=1), ~np.isnan(exact).any(axis=1)
+    both, wrong = remaining & should, remaining != should
     ulps = np.abs(answers[both] - exact[both]) / np.spacing(np.maximum(np.abs(exact[both]), np.finfo(float).tiny))
-    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": 0} | _ulps(ulps)
-    found |= {"off": int((ulps > 0).sum()), "coordinates": ulps.size}
+    result = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": 0} | _ulps(ulps)
+    result |= {"off": int((ulps > 0).sum()), "coordinates": ulps.size}
     if wrong.any():
-        found["worst"] = int(np.argmax(wrong))
+        result["worst"] = int(np.argmax(wrong))
     elif (ulps > 0).any():
-        found["worst"] = int(np.flatnonzero(both)[np.argmax(ulps.max(axis=1))])
-    return found
+        result["worst"] = int(np.flatnonzero(both)[np.argmax(ulps.max(axis=1))])
+    return result
 
 
 def distances(answers: np.ndarray, exact: np.ndarray, tolerance: float = 1e-6) -> dict[str, Any]:
@@ -223,9 +223,9 @@ def distances(answers: np.ndarray, exact: np.ndarray, tolerance: float = 1e-6) -
     wrong = (error > tolerance * exact) | ((exact > 0.0) & (answers == 0.0))
     near = ~(wrong | refused | outside)
     ulps = error[near] / np.spacing(np.maximum(exact[near], np.finfo(float).tiny))
-    found = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())} | _ulps(ulps)
-    found |= {"outside": int(outside.sum()), "off": int((ulps > 0).sum()), "coordinates": len(ulps)}
-    return found | ({"worst": int(np.argmax(wrong * error))} if wrong.any() else {})
+    result = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": int(refused.sum())} | _ulps(ulps)
+    result |= {"outside": int(outside.sum()), "off": int((ulps > 0).sum()), "coordinates": len(ulps)}
+    return result | ({"worst": int(np.argmax(wrong * error))} if wrong.any() else {})
 
 
 def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
@@ -234,6 +234,6 @@ def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     refused, outside = np.isnan(answers), np.isinf(answers)
     error = np.abs(np.where(outside, np.nan, answers) - exact[:, 0]) / exact[:, 1]
     good = error[error <= AREA_TOLERANCE] * 2.0**53
-    found = {"judged": len(exact), "wrong": int((error > AREA_TOLERANCE).sum()), "refused": int(refused.sum())}
-    found |= {"outside": int(outside.sum())} | _ulps(good)
-    return found | ({"worst": int(np.nanargmax(error))} if found["wrong"] else {})
+    result = {"judged": len(exact), "wrong": int((error > AREA_TOLERANCE).sum()), "refused": int(refused.sum())}
+    result |= {"outside": int(outside.sum())} | _ulps(good)
+    return result | ({"worst": int(np.nanargmax(error))} if result["wrong"] else {})

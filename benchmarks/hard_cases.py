@@ -1,4 +1,4 @@
-"""Who gets the hard cases wrong: the figures of docs/hard_cases.md.
+"""Measures the shares of wrong answers in docs/hard_cases.md.
 
     python -m benchmarks hard_cases            # measures, and writes the figures into docs
     python -m benchmarks hard_cases --dry      # prints the figures only; --only WORD: of marks with this word
@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import filed
-from benchmarks.contest import Contest, Size, field_of, hold
+from benchmarks.contest import Contest, Size, field_of, run_contest
 from benchmarks.errors import same
 from benchmarks.fields import collision, containment, tasks
 from benchmarks.workloads import Mesh, MissingDataError, bumpy_sphere, hard_pairs
@@ -37,16 +37,16 @@ MARK = re.compile(r"<!-- measured: (.*?) -->\n(?:.+\n)*")
 N_POINTS = 600
 """Of each family."""
 Shares = dict[str, tuple[int, int]]
-"""Contender: wrong or refused, of how many."""
+"""By contender: number of wrong or refused answers, and of all."""
 
 
-def _held(contest: Contest) -> Shares:
-    found = {}
-    for row in hold(contest, 1, 2.0):
+def _shares_of(contest: Contest) -> Shares:
+    result = {}
+    for row in run_contest(contest, 1, 2.0):
         if not row.absent and not row.contender.startswith("ours,"):
             bad = (row.errors.get(kind, 0) for kind in ("wrong", "refused", "outside"))
-            found[row.contender] = sum(bad), row.errors["judged"]
-    return found
+            result[row.contender] = sum(bad), row.errors["judged"]
+    return result
 
 
 def points(words: str) -> Shares:
@@ -59,10 +59,10 @@ def points(words: str) -> Shares:
     rounded = Mesh("ball", np.round(ball.vertices * 64) / 64, ball.faces)
     mesh = Mesh(name, *generated_solids()[name]) if name else rounded
     drawn = dict(hard_points(f"hard cases {mesh.name}", mesh.vertices, mesh.faces, N_POINTS))
-    asked = np.concatenate(list(drawn.values())) if family == "all" else drawn[family]
-    exact = locate_points(asked, mesh.vertices, mesh.faces) >= 0
-    return _held(
-        Contest("containment", family, True, asked, exact, same, field_of("points", mesh, containment.MESH_PEERS))
+    questions = np.concatenate(list(drawn.values())) if family == "all" else drawn[family]
+    exact = locate_points(questions, mesh.vertices, mesh.faces) >= 0
+    return _shares_of(
+        Contest("containment", family, True, questions, exact, same, field_of("points", mesh, containment.MESH_PEERS))
     )
 
 
@@ -70,7 +70,7 @@ def pairs(family: str) -> Shares:
     """Return the shares on the stored pairs of a family."""
     with suppress(MissingDataError):
         if cases := [case for case in hard_pairs() if case["family"] == family]:
-            return _held(collision.stored(family, cases))
+            return _shares_of(collision.stored(family, cases))
     return {}
 
 
@@ -78,8 +78,8 @@ def cases(words: str) -> Shares:
     """Return the shares on stored cases."""
     operation, family = words.split("/")
     stored = json.loads((ROOT / "tests" / "hard" / "cases" / operation / f"{family}.json").read_text("utf-8"))
-    asked = [{"id": case["name"], "operation": operation, **case} for case in stored]
-    rows = [row for row in filed.replay(cases=asked) if row["outcome"] != "absent"]
+    questions = [{"id": case["name"], "operation": operation, **case} for case in stored]
+    rows = [row for row in filed.replay(cases=questions) if row["outcome"] != "absent"]
     all_, bad = (Counter(row["contender"] for row in rows if row["outcome"] not in ok) for ok in ((), ("right",)))
     return {name: (bad[name], count) for name, count in all_.items()}
 
@@ -88,7 +88,7 @@ def contest(name: str) -> Shares:
     """Return the shares in a contest of the report."""
     for task in tasks(Size(0, 0.5), ("segments", "polygons", "overlay"), is_page=True):
         if name.endswith(task.name.partition(": ")[2]) and f"{(made := task.make()).operation}, {made.name}" == name:
-            return _held(made)
+            return _shares_of(made)
     raise KeyError(name)
 
 
@@ -97,13 +97,15 @@ SETS = {"points": points, "pairs": pairs, "cases": cases, "contest": contest}
 
 def sentence(wanted: str, shares: Shares) -> str:
     """Return one set's line: contenders in the order of their shares, ours first."""
-    total = max((asked for _, asked in shares.values()), default=0)
+    total = max((questions for _, questions in shares.values()), default=0)
     others = sorted((name for name in shares if name != "ours"), key=lambda name: shares[name][0] / shares[name][1])
     parts = [f"**ours {shares['ours'][0]}**"]
     for name in others:
-        wrong, asked = shares[name]
+        wrong, questions = shares[name]
         share = (
-            f"{100 * wrong / asked:.3g}%" if total >= 100 else f"{wrong}" + (f" of {asked}" if asked < total else "")
+            f"{100 * wrong / questions:.3g}%"
+            if total >= 100
+            else f"{wrong}" + (f" of {questions}" if questions < total else "")
         )
         parts.append(f"{name} {share if wrong else 0}")
     return f"- *{wanted}* ({total:,}): {', '.join(parts)}\n"
@@ -129,7 +131,7 @@ def _paragraph(mark: re.Match[str], lines: dict[str, str]) -> str:
 
 
 def main(words: list[str] | None = None) -> int:
-    """Measure and write; 1 if an answer of ours is wrong."""
+    """Measure and write; return 1 if an answer of ours is wrong."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dry", action="store_true", help="print the figures, write nothing")
     parser.add_argument("--only", default="", metavar="WORD", help="only marks with this word")

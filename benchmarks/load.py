@@ -42,7 +42,7 @@ def free_port() -> int:
 
 
 class Connection:
-    """One connection, kept open as long as the server likes."""
+    """One connection, kept alive as long as the server allows."""
 
     def __init__(self, port: int, timeout: float = 120.0) -> None:
         self._address, self._timeout = ("127.0.0.1", port), timeout
@@ -95,7 +95,7 @@ def wait_until(port: int, path: str) -> None:
 
 @dataclass
 class Seen:
-    """What one client saw."""
+    """Results of one client."""
 
     statuses: Counter[int] = field(default_factory=Counter)
     seconds: list[float] = field(default_factory=list)
@@ -115,7 +115,7 @@ class Watched:
 
 @contextmanager
 def watched(port: int, pid: int, patience: float) -> Iterator[Watched]:
-    """Ask /healthz again and again meanwhile; raise at the end where it gave no 200 within `patience` seconds."""
+    """Poll /healthz meanwhile; raise at the end if it gave no 200 within `patience` seconds."""
     seen, is_over, message = Watched(), threading.Event(), b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
 
     def watch() -> None:
@@ -139,7 +139,7 @@ def watched(port: int, pid: int, patience: float) -> Iterator[Watched]:
 
 
 def loop(port: int, message: bytes, seconds: float, pause: float = 0.0) -> Seen:
-    """Ask again and again, with a pause after each answer."""
+    """Send requests one after another, with a pause after each answer."""
     seen, connection = Seen(), Connection(port)
     start = time.perf_counter()
     while time.perf_counter() - start < seconds:
@@ -163,9 +163,9 @@ def loop(port: int, message: bytes, seconds: float, pause: float = 0.0) -> Seen:
 def many(port: int, message: bytes, seconds: float, n_connections: int, pause: float = 0.0) -> Seen:
     """Run `loop` on several connections, a thread each; return what all saw."""
     with ThreadPoolExecutor(n_connections) as pool:
-        found = list(pool.map(lambda _: loop(port, message, seconds, pause), range(n_connections)))
+        outcome = list(pool.map(lambda _: loop(port, message, seconds, pause), range(n_connections)))
     total = Seen()
-    for seen in found:
+    for seen in outcome:
         total.statuses += seen.statuses
         total.seconds += seen.seconds
         total.lost += seen.lost
@@ -174,7 +174,7 @@ def many(port: int, message: bytes, seconds: float, n_connections: int, pause: f
 
 
 def in_process(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-    """Start `function` in a process of its own; return what waits for its result."""
+    """Start `function` in a process of its own; return a function that waits for its result."""
     pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"))
     result = pool.submit(function, *arguments).result
     pool.shutdown(wait=False)

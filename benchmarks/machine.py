@@ -1,4 +1,4 @@
-"""What a figure depends on: processor, versions, commit. No names of hosts or people."""
+"""Facts on which a figure depends: processor, versions, commit. No names of hosts or people."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def processor() -> str:
         text = Path("/proc/cpuinfo").read_text()
     except OSError:
         return platform.processor() or platform.machine()
-    found = re.search(r"model name\s*:\s*(.*)", text)
-    return found[1].strip() if found else platform.machine()
+    result = re.search(r"model name\s*:\s*(.*)", text)
+    return result[1].strip() if result else platform.machine()
 
 
 def results(name: str) -> Path:

@@ -1,8 +1,8 @@
 """The rules of timing.
 
-- Contenders are compared in one process, in turn: each round asks one after the other, the next round the other way
-  round, so that what else the machine does falls on all. The figure is the median of the rounds, with its quartiles.
-- The first run of each is cold (it may compile, load, build what it keeps) and is kept apart.
+- Contenders are compared in one process, interleaved: each round runs one after the other, the next round in reverse,
+  so that other load of the machine affects all. The figure is the median of the rounds, with its quartiles.
+- The first run of each is cold (it may compile, load, build caches) and is reported separately.
 - A sample shorter than `LEAST_SECONDS` is repeated within the round until it is long enough.
 - CPU time is taken too: where other processes share the machine, its ratio is the steadier one.
 """

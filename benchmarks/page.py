@@ -1,4 +1,4 @@
-"""The text of docs/speed_and_error.md from stored results; its sentences that never change stand in page.md."""
+"""Writes docs/speed_and_error.md from stored results; its fixed text is in page.md."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
 """Contests won by another that the head of the page names; the tables have all."""
 HEAD = ("contender", "items/s", "quartiles", "ours is faster by", "net of calls", "one item: median, p99, longest",
-        "first", "build", "wrong", "95%", "raised an error", "unsupported input", "coordinates off", "ulps, largest (median)",
-        "beyond filter")  # fmt: skip
+        "first", "build", "wrong", "95%", "raised an error", "unsupported input", "coordinates off",
+        "ulps, largest (median)", "beyond filter")  # fmt: skip
 Row = dict[str, Any]
 
 
-def text_of(found: dict[str, Any]) -> str:
+def text_of(result: dict[str, Any]) -> str:
     """Return the page."""
-    contests = by_contest(found["rows"])
-    versions = ", ".join(f"{name} {version}" for name, version in found["versions"].items())
+    contests = by_contest(result["rows"])
+    versions = ", ".join(f"{name} {version}" for name, version in result["versions"].items())
     facts = (
-        f"Commit {found['commit']}, seed {found['seed']}, {found['processor']}, {found['cores']} cores, "
-        f"load {found['load_before']} before and {found['load_after']} after, {found['seconds']:.0f} s. {versions}."
+        f"Commit {result['commit']}, seed {result['seed']}, {result['processor']}, {result['cores']} cores, "
+        f"load {result['load_before']} before and {result['load_after']} after, {result['seconds']:.0f} s. {versions}."
     )
-    tables = _tables(contests) + ("\n" + filed.section(found["filed"]) if "filed" in found else "")
-    parts = {"weaknesses": _weaknesses(contests), "facts": facts, "summary": _summary(found["rows"]), "tables": tables}
+    tables = _tables(contests) + ("\n" + filed.section(result["filed"]) if "filed" in result else "")
+    parts = {"weaknesses": _weaknesses(contests), "facts": facts, "summary": _summary(result["rows"]), "tables": tables}
     text = TEMPLATE.read_text("utf-8")
     for name, part in parts.items():
         text = text.replace(f"<<{name}>>", part)
@@ -37,10 +37,10 @@ def text_of(found: dict[str, Any]) -> str:
 
 def by_contest(rows: list[Row]) -> dict[str, list[Row]]:
     """Return the rows of each contest, ours first."""
-    found: dict[str, list[Row]] = {}
+    result: dict[str, list[Row]] = {}
     for row in rows:
-        found.setdefault(key_of(row), []).append(row)
-    return {key: sorted(mine, key=lambda row: row["contender"] != "ours") for key, mine in found.items()}
+        result.setdefault(key_of(row), []).append(row)
+    return {key: sorted(mine, key=lambda row: row["contender"] != "ours") for key, mine in result.items()}
 
 
 def table(head: tuple[str, ...], rows: list[list[str]]) -> str:
@@ -50,7 +50,7 @@ def table(head: tuple[str, ...], rows: list[list[str]]) -> str:
 
 
 def _weaknesses(contests: dict[str, list[Row]]) -> str:
-    """Our own wrong answers first, then where a contender was faster than ours."""
+    """Return our own wrong answers, then the contests in which a contender was faster."""
     ours = [rows[0] for rows in contests.values()]
     wrong = [row for row in ours if row["errors"]["wrong"] + row["errors"]["refused"] + row["errors"].get("off", 0)]
     judged = sum(row["errors"]["judged"] for row in ours)
@@ -71,7 +71,7 @@ def _weaknesses(contests: dict[str, list[Row]]) -> str:
 
 
 def _summary(rows: list[Row]) -> str:
-    """One line a question: how much faster ours is than the fastest peer, and who is wrong."""
+    """Return one line a question: how much faster ours is than the fastest peer, and who is wrong."""
     parts = []
     for is_alone, beside in ((False, "fastest peer"), (True, "textbook's fastest formula")):
         lines = [
@@ -85,14 +85,14 @@ def _summary(rows: list[Row]) -> str:
 
 
 def _ratio(side: dict[str, Any]) -> str:
-    """Return how many times faster or slower ours is, and than whom."""
+    """Return how many times faster or slower ours is, and than which contender."""
     return "" if side["ratio"] is None else f"{times(side['ratio'])} {side['name']}"
 
 
-def smallest(found: dict[str, Any]) -> str:
+def smallest(result: dict[str, Any]) -> str:
     """Return the README's table: of each operation its first hard contest, with the fastest peer (not the textbook)."""
     lines: dict[str, list[str]] = {}
-    for key, (ours, *others) in by_contest(found["rows"]).items():
+    for key, (ours, *others) in by_contest(result["rows"]).items():
         peers = [row for row in others if row["package"] and row["seconds"] and row.get("setting") is None]
         if not (ours["is_hard"] and peers) or ours["operation"].startswith(("orientation", "containment, ")):
             continue
@@ -120,8 +120,8 @@ def _cells(row: Row, base: Row) -> list[str]:
     name, errors = named(row["contender"], row.get("setting")), row["errors"]
     if row["absent"]:
         return [name, f"absent: {row['absent']}"] + [""] * (len(HEAD) - 2)
-    found = spread(row["seconds"])
-    low, high = row["n_items"] / found.high, row["n_items"] / found.low
+    result = spread(row["seconds"])
+    low, high = row["n_items"] / result.high, row["n_items"] / result.low
     return [
         name, f"{row['rate']:,.0f}", f"{low:,.0f} - {high:,.0f}",
         "" if row is base else f"{base['rate'] / row['rate']:.3g}x",

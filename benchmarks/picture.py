@@ -13,13 +13,13 @@ LEFT, WIDE, LINE = 170, 240, 24
 """Where the axis begins, how wide it is, how high a line."""
 
 
-def text_of(asked: list[dict[str, Any]]) -> str:
+def text_of(queried: list[dict[str, Any]]) -> str:
     """Return all questions: a ring for easy and a disc for hard input on an axis of speed, then who is wrong."""
     axis, beside = LEFT + WIDE / 2, LEFT + WIDE + 20
     heads = ((LEFT, "100x slower", "start"), (axis, "same", "middle"), (LEFT + WIDE, "100x faster", "end"),
              (beside, "wrong on hard input, the fastest first", "start"))  # fmt: skip
     parts = [_text(x, 14, words, anchor) for x, words, anchor in heads]
-    for number, each in enumerate(sorted(asked, key=lambda each: each["is_alone"])):
+    for number, each in enumerate(sorted(queried, key=lambda each: each["is_alone"])):
         y, words = 36 + LINE * number, []
         parts.append(_text(0, y + 4, each["title"]))
         parts.append(f'<path d="M{LEFT} {y}h{WIDE}M{axis} {y - 8}v16" stroke="{TONE}" stroke-opacity=".6"/>')
@@ -33,7 +33,7 @@ def text_of(asked: list[dict[str, Any]]) -> str:
             tone = BAD if one["wrong"] else SLOW if one["refused"] + one["outside"] else GOOD
             words.append(f'<tspan fill="{tone}">{faults(one)}</tspan>')
         parts.append(_text(beside, y + 4, "&#160; ".join(words)))
-    size = f'viewBox="0 0 1000 {40 + LINE * len(asked)}" font-family="sans-serif" font-size="13"'
+    size = f'viewBox="0 0 1000 {40 + LINE * len(queried)}" font-family="sans-serif" font-size="13"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n' + "\n".join(parts) + "\n</svg>\n"
 
 

@@ -24,7 +24,7 @@ BEGIN, END = "<!-- benchmarks report writes this table -->", "<!-- to here -->"
 
 
 def main(words: list[str] | None = None) -> int:
-    """Hold the contests, write the page; 1 if an answer of ours is wrong."""
+    """Run the contests, write the page; return 1 if an answer of ours is wrong."""
     given = table.options(
         words,
         __doc__ or "",
@@ -37,21 +37,21 @@ def main(words: list[str] | None = None) -> int:
             path.write_text(table.written(json.loads(path.read_text()) | {"filed": filed.replay()}))
         _write_pages(path)
         return 0
-    found = table.measured("report", tasks(given.size, is_page=True), given, has_latency=True)
+    result = table.measured("report", tasks(given.size, is_page=True), given, has_latency=True)
     if not given.only:
-        found["filed"] = filed.replay()
-    ours = [row["errors"] for row in found["rows"] if row["contender"] == "ours" and row["errors"]]
+        result["filed"] = filed.replay()
+    ours = [row["errors"] for row in result["rows"] if row["contender"] == "ours" and row["errors"]]
     wrong = sum(errors.get("wrong", 0) + errors.get("refused", 0) + errors.get("off", 0) for errors in ours)
-    wrong += sum(row["contender"] == "ours" and row["outcome"] != "right" for row in found.get("filed", ()))
+    wrong += sum(row["contender"] == "ours" and row["outcome"] != "right" for row in result.get("filed", ()))
     print(f"wrong answers, refusals or inexact coordinates of ours: {wrong}")
     if given.writes:
-        table.store("report", found)
+        table.store("report", result)
         _write_pages(machine.results("report"))
     return 1 if wrong else 0
 
 
 def named_by_the_page() -> Path:
-    """Return the stored results that the page as it stands is made of."""
+    """Return the stored results from which the current page is made."""
     named = re.findall(r"benchmarks/results/[\w-]+/report\.json", (DOCS / "speed_and_error.html").read_text("utf-8"))
     return machine.ROOT / named[0]
 
@@ -62,15 +62,15 @@ def _write_pages(results: Path) -> None:
 
 
 def pages_of(results: Path) -> dict[Path, str]:
-    """Return every file that is made of stored results, and its text."""
-    found = json.loads(results.read_text())
-    found["filed"] = [row for row in found["filed"] if row["outcome"] != "not applicable"]  # older results have them
+    """Return every file that is made from stored results, with its text."""
+    result = json.loads(results.read_text())
+    result["filed"] = [row for row in result["filed"] if row["outcome"] != "not applicable"]  # older results have them
     path = results.relative_to(machine.ROOT).as_posix()
     head, _, rest = README.read_text("utf-8").partition(BEGIN)
     return {
-        DOCS / "pictures/speed_against_error.svg": picture.text_of(web_page.questions(found["rows"])),
-        DOCS / "speed_and_error.md": page.text_of(found),
-        DOCS / "speed_and_error.html": web_page.text_of(found, path),
-        DOCS / "museum.html": museum.text_of(found["filed"], filed.load(), path),
-        README: f"{head}{BEGIN}\n{page.smallest(found)}{END}{rest.partition(END)[2]}",
+        DOCS / "pictures/speed_against_error.svg": picture.text_of(web_page.questions(result["rows"])),
+        DOCS / "speed_and_error.md": page.text_of(result),
+        DOCS / "speed_and_error.html": web_page.text_of(result, path),
+        DOCS / "museum.html": museum.text_of(result["filed"], filed.load(), path),
+        README: f"{head}{BEGIN}\n{page.smallest(result)}{END}{rest.partition(END)[2]}",
     }

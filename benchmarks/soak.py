@@ -1,4 +1,4 @@
-"""Hostile load for long, a tenth of what else is asked: no status from 500 on but 503 and 504, memory that stays.
+"""Long hostile load, a tenth of all requests: no status from 500 on but 503 and 504, bounded memory.
 
     python -m benchmarks soak                # an hour
     python -m benchmarks soak --minutes 2
@@ -115,8 +115,8 @@ def _many(name: str, port: int, n: int) -> tuple[list[int], float]:
         return send(port), time.perf_counter() - before
 
     with ThreadPoolExecutor(n) as pool:
-        found = list(pool.map(one, range(n)))
-    return [status for statuses, _ in found for status in statuses], max(seconds for _, seconds in found)
+        outcome = list(pool.map(one, range(n)))
+    return [status for statuses, _ in outcome for status in statuses], max(seconds for _, seconds in outcome)
 
 
 def each_alone() -> bool:
@@ -165,22 +165,22 @@ def main(words: list[str]) -> int:
     parser.add_argument("--rate", type=float, default=10.0, help="small questions a second")
     parser.add_argument("--each", action="store_true", help="each attack alone and eight times at once")
     parser.add_argument("--stops", type=int, default=0, help="end the service so many times under each attack")
-    asked = parser.parse_args(words)
-    if asked.each or asked.stops:
-        is_well = each_alone() if asked.each else True
-        return int(not ((stops(asked.stops) if asked.stops else True) and is_well))
+    options = parser.parse_args(words)
+    if options.each or options.stops:
+        is_well = each_alone() if options.each else True
+        return int(not ((stops(options.stops) if options.stops else True) and is_well))
     worst, wrong = Counter[int](), 0
     with serving(**SETTINGS) as (port, process):
         ask_small(port, 4.0, 10.0)
-        print(f"at rest: {memory_of(process.pid):.0f} MB, {_quantiles(ask_small(port, 10.0, asked.rate)[1])}")
-        seconds = 60.0 * asked.minutes
+        print(f"at rest: {memory_of(process.pid):.0f} MB, {_quantiles(ask_small(port, 10.0, options.rate)[1])}")
+        seconds = 60.0 * options.minutes
         end = time.perf_counter() + seconds
-        hostile = in_process(send_hostile, port, seconds, asked.rate / 10)
+        hostile = in_process(send_hostile, port, seconds, options.rate / 10)
         every: list[float] = []
         for minute in count(1):
             if (left := end - time.perf_counter()) <= 0:
                 break
-            statuses, took, n_wrong = in_process(ask_small, port, min(60.0, left), asked.rate)()
+            statuses, took, n_wrong = in_process(ask_small, port, min(60.0, left), options.rate)()
             worst, wrong, every = worst + statuses, wrong + n_wrong, every + took
             memory = memory_of(process.pid)
             print(f"minute {minute:3}: {memory:5.0f} MB; small {dict(statuses)}, {_quantiles(took)}", flush=True)

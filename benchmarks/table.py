@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import contenders, machine
-from benchmarks.contest import NAMED, Contest, Row, Size, Task, hold
+from benchmarks.contest import NAMED, Contest, Row, Size, Task, run_contest
 from benchmarks.fields import FIELDS, Figure, tasks
 from benchmarks.measure import Spread, spread
 from benchmarks.workloads import MissingDataError
@@ -78,11 +78,11 @@ def verdict(value: float, must: float | None, aim: float | None, is_ratio: bool)
 def lines_of(made: list[Row] | Figure) -> Iterable[str]:
     """Yield the printed lines of a contest's rows or of a figure."""
     if isinstance(made, Figure):
-        found = spread(made.values)
-        said = verdict(found.median, made.must, made.aim, made.unit == "x")
-        between = f"{found.low:.3g} - {found.high:.3g}" if len(made.values) > 1 else ""
+        result = spread(made.values)
+        said = verdict(result.median, made.must, made.aim, made.unit == "x")
+        between = f"{result.low:.3g} - {result.high:.3g}" if len(made.values) > 1 else ""
         about = "; ".join(part for part in (made.ours, made.peer, made.error, made.note) if part)
-        figure = f"{made.name:<54} {found.median:>9.4g} {made.unit:<5} {between:>17}"
+        figure = f"{made.name:<54} {result.median:>9.4g} {made.unit:<5} {between:>17}"
         yield f"{figure} {_goals(made.must, made.aim)} {said}  {about}"
         return
     ours = next(row for row in made if row.contender == "ours")
@@ -94,9 +94,9 @@ def lines_of(made: list[Row] | Figure) -> Iterable[str]:
             continue
         figures = f"{_rate(row):>11}"
         if row is not ours:
-            found, cpu = ratio(ours, row)
-            between, said = f"{found.low:.3g} - {found.high:.3g}", verdict(found.median, *row.goals, is_ratio=True)
-            figures += f" {found.median:>7.3g}x {between:>15} {cpu:>7.3g}x {_goals(*row.goals)} {said:<4}"
+            result, cpu = ratio(ours, row)
+            between, said = f"{result.low:.3g} - {result.high:.3g}", verdict(result.median, *row.goals, is_ratio=True)
+            figures += f" {result.median:>7.3g}x {between:>15} {cpu:>7.3g}x {_goals(*row.goals)} {said:<4}"
         errors = ", ".join(
             f"{key} {row.errors[key]:{'.3g' if isinstance(row.errors[key], float) else ','}}"
             for key in SHOWN
@@ -123,12 +123,12 @@ def _rate(row: Row) -> str:
 
 def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_latency: bool = False) -> dict[str, Any]:
     """Hold the contests and take the figures; print them; return what is stored, and how many are below their must."""
-    found: dict[str, Any] = machine.facts(given.seed, machine.cores()) | {"quick": given.quick}
+    result: dict[str, Any] = machine.facts(given.seed, machine.cores()) | {"quick": given.quick}
     names, chosen = {"ours", *contenders.names_of(given.contender)}, list(chosen)
     some = [task for task in chosen if given.only in task.name]
     if not some:
         given.refuse(f"no row has {given.only!r} in its name; there are {', '.join(task.name for task in chosen)}")
-    print(head(name, found))
+    print(head(name, result))
     started, rows, figures, missed = time.perf_counter(), [], [], 0
     for task in some:
         if sys.stderr.isatty():
@@ -136,40 +136,40 @@ def measured(name: str, chosen: Iterable[Task], given: argparse.Namespace, has_l
         try:
             made = task.make()
             if isinstance(made, Contest) and given.contender:
-                asked = [each for each in made.contenders if each.name in names or given.contender in each.name]
-                made = replace(made, contenders=asked)
-            held = hold(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
+                queried = [each for each in made.contenders if each.name in names or given.contender in each.name]
+                made = replace(made, contenders=queried)
+            outcome = run_contest(made, given.rounds, given.seconds, has_latency) if isinstance(made, Contest) else made
         except MissingDataError as error:
             print(f"{task.name}: skipped: {error}", flush=True)
             continue
-        if isinstance(held, Figure):
-            figures.append(held)
+        if isinstance(outcome, Figure):
+            figures.append(outcome)
         else:
-            rows += held
-        for line in lines_of(held):
+            rows += outcome
+        for line in lines_of(outcome):
             missed += " MISS" in line
             print(line, flush=True)
         del made
         gc.collect()
     if rows and given.contender and all(row.contender == "ours" for row in rows):
         given.refuse(f"no contender {given.contender!r} in these rows; files: {', '.join(sorted(contenders.files()))}")
-    found |= {"load_after": machine.load(), "seconds": round(time.perf_counter() - started, 1)}
-    found |= {"rows": [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]}
-    print(f"{len(rows)} rows, {len(figures)} figures, {missed} below their must, {found['seconds']} s, "
-          f"load {found['load_before']} before and {found['load_after']} after")  # fmt: skip
-    return found | {"figures": [asdict(figure) for figure in figures]}
+    result |= {"load_after": machine.load(), "seconds": round(time.perf_counter() - started, 1)}
+    result |= {"rows": [asdict(row) | {"rate": row.rate, "net_rate": row.net_rate} for row in rows]}
+    print(f"{len(rows)} rows, {len(figures)} figures, {missed} below their must, {result['seconds']} s, "
+          f"load {result['load_before']} before and {result['load_after']} after")  # fmt: skip
+    return result | {"figures": [asdict(figure) for figure in figures]}
 
 
-def store(name: str, found: dict[str, Any]) -> None:
+def store(name: str, result: dict[str, Any]) -> None:
     """Write results/<machine>/<name>.json."""
     path = machine.results(name)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(written(found))
+    path.write_text(written(result))
 
 
-def written(found: dict[str, Any]) -> str:
+def written(result: dict[str, Any]) -> str:
     """Return results as they are stored."""
-    return json.dumps(found, indent=1, default=plain) + "\n"
+    return json.dumps(result, indent=1, default=plain) + "\n"
 
 
 def plain(value: Any) -> Any:
@@ -191,9 +191,9 @@ def head(name: str, facts: dict[str, Any]) -> str:
 
 def run(name: str, chosen: Iterable[Task], given: argparse.Namespace) -> int:
     """Measure, print and store; the exit code is 0 also where a row misses its goal: the table says so."""
-    found = measured(name, chosen, given)
+    result = measured(name, chosen, given)
     if given.writes:
-        store(name, found)
+        store(name, result)
     return 0
 
 

@@ -60,7 +60,7 @@ def times(ratio: float) -> str:
 
 def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> list[dict[str, Any]]:
     """Return the questions that there are rows of: who is faster by how much, who is wrong, and both in a sentence."""
-    found = []
+    result = []
     for title, operation, easy, hard in titles:
         keys = [f"{operation}, {name}" for name in (easy, hard)]
         parts = [[row for row in rows if key_of(row) == key] for key in keys]
@@ -71,15 +71,17 @@ def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUE
         seen = [_seen(row) for row in _peers(parts[1] or parts[0], is_alone)]
         names = {"title": title, "id": title.lower().translate({ord(c): "-" for c in " ,?"}).strip("-")}
         keyed = {side: key if part else None for side, key, part in zip(("easy", "hard"), keys, parts)}
-        found.append(names | keyed | {"sides": sides, "seen": seen, "is_alone": is_alone, "say": _said(*parts)})
-    return found
+        result.append(names | keyed | {"sides": sides, "seen": seen, "is_alone": is_alone, "say": _said(*parts)})
+    return result
 
 
 def _peers(rows: list[Row], is_book: bool = False) -> list[Row]:
     """Return the peers that answered, or the textbook's methods, without turns of knobs, the fastest first."""
-    kept = [row for row in rows if row["rate"] and row.get("setting") is None]
-    kept = [row for row in kept if (row["contender"].startswith(("textbook", "naive")) if is_book else row["package"])]
-    return sorted(kept, key=lambda row: -row["rate"])
+    remaining = [row for row in rows if row["rate"] and row.get("setting") is None]
+    remaining = [
+        row for row in remaining if (row["contender"].startswith(("textbook", "naive")) if is_book else row["package"])
+    ]
+    return sorted(remaining, key=lambda row: -row["rate"])
 
 
 def _ours(rows: list[Row]) -> Row | None:
@@ -142,15 +144,15 @@ def _beside(how: str, ours: Row, others: list[Row]) -> list[str]:
     return [f"{text}."]
 
 
-def summary(asked: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, str, str, str]]:
+def summary(queried: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, str, str, str]]:
     """Return three facts as a figure, its tone, what it counts, and in brief: ours wrong, easy input, hard input."""
     ours = [row for row in rows if row["contender"] == "ours"]
     wrong, judged = sum(map(failing, ours)), sum(row["errors"].get("judged", 0) for row in ours)
     words = "of our answers are wrong, by exact arithmetic"
     facts = [(f"{wrong:,} of {judged:,}", "bad" if wrong else "good", words, "of ours wrong")]
     for side in ("easy", "hard"):
-        held = [each["sides"][side] for each in asked if not each["is_alone"] and each["sides"][side]["ratio"]]
-        slow = [each for each in held if each["ratio"] < SAME]
+        contained = [each["sides"][side] for each in queried if not each["is_alone"] and each["sides"][side]["ratio"]]
+        slow = [each for each in contained if each["ratio"] < SAME]
         words = f"questions on {side} input: exact is as fast as the fastest peer, or faster"
         brief = f"{side} inputs: as fast as any peer"
         failed = [each["fails"] for each in slow if each["fails"]]
@@ -158,13 +160,15 @@ def summary(asked: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, str
             words += f"; {len(failed)} of the {len(slow)} faster peers fail, in {percent(min(failed))} to "
             words += percent(max(failed))
             brief += f"; {len(failed)} of {len(slow)} faster ones fail"
-        if held:
-            facts.append((f"{len(held) - len(slow)} of {len(held)}", "good" if not slow else "", words, brief))
+        if contained:
+            facts.append(
+                (f"{len(contained) - len(slow)} of {len(contained)}", "good" if not slow else "", words, brief)
+            )
     return facts
 
 
 def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:
-    """Return what an audit found, ours being the judge: how many are wrong, and the worst."""
+    """Return the verdicts of an audit, judged by ours: how many are wrong, and the worst."""
     others = [row for row in rows if row["contender"] != "ours" and not row["absent"]]
     wrong = sorted((row for row in others if failing(row)), key=error_share)
     words = "contenders differ from the exact engine"
@@ -189,18 +193,18 @@ def _contest(rows: list[tuple[int, Row]]) -> dict[str, Any]:
     return {"name": first["contest"], "hard": first["is_hard"], "about": first.get("about", ""), "rows": made}
 
 
-def text_of(found: dict[str, Any], path: str, titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> str:
+def text_of(result: dict[str, Any], path: str, titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> str:
     """Return the page; path: of the results, from the root of the repository; titles: as `QUESTIONS`."""
-    rows, contests = found["rows"], {}
-    asked = questions(rows, titles)
-    for key in [question[side] for question in asked for side in ("easy", "hard") if question[side]]:
+    rows, contests = result["rows"], {}
+    queried = questions(rows, titles)
+    for key in [question[side] for question in queried for side in ("easy", "hard") if question[side]]:
         contests[key] = _contest([(i, row) for i, row in enumerate(rows) if key_of(row) == key])
     data = {
-        "facts": {key: found[key] for key in FACTS} | {"results": path},
-        "summary": summary(asked, rows) if titles is QUESTIONS else verdicts(rows),
+        "facts": {key: result[key] for key in FACTS} | {"results": path},
+        "summary": summary(queried, rows) if titles is QUESTIONS else verdicts(rows),
         "versus": "Ours, beside the fastest peer" if titles is QUESTIONS else "Your data",
         "museum": titles is QUESTIONS,
-        "questions": asked,
+        "questions": queried,
         "contests": contests,
     }
     return written("speed_and_error", data)

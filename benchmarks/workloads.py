@@ -120,10 +120,10 @@ def mesh_of_size(size: str, seed: int) -> Mesh:
     """Return the mesh of `1k`, `86k` or `1.38M` faces: knight, armadillo, armadillo subdivided, or stand-ins."""
     if size == "1k":
         return stored_or_bumpy("igl_decimated-knight", 3, seed)
-    found = stored_or_bumpy("igl_armadillo", 6, seed)
+    result = stored_or_bumpy("igl_armadillo", 6, seed)
     if size == "86k":
-        return found
-    return Mesh(f"{found.name}_subdivided2", *subdivided(subdivided((found.vertices, found.faces))))
+        return result
+    return Mesh(f"{result.name}_subdivided2", *subdivided(subdivided((result.vertices, result.faces))))
 
 
 def ring_around(angles: np.ndarray, radii: Any = 1.0) -> np.ndarray:

@@ -2,12 +2,12 @@
 for files; the last three are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
-``python -m engine audit`` says which other packages are wrong on your data.
+``python -m engine audit`` compares other packages with the exact answers on your data.
 
 A solid is a mesh file, an .npz of `vertices` and `faces`, a .json or .geojson file, or the JSON of a solid itself, as
 in ``'{"type": "sphere", "center": [0, 0, 0], "radius": 1}'``. Points, segments and poses come from .npy, .csv or
-.geojson. Answers go to the standard output as .csv or GeoJSON, or to the file named by --output, in the format that its
-name tells. Exit code: 0, or 2 where the input is at fault (the message says how).
+.geojson. Answers go to the standard output as .csv or GeoJSON, or to the file named by --output, in the format of its
+extension. Exit code: 0, or 2 if the input is invalid (the message says how).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _refused(message: str) -> int:
 
 
 def _note(options: Options) -> Callable[[str], None] | None:
-    """Return what says what was left out of a file."""
+    """Return a function that prints what was skipped of a file."""
     return None if options.quiet else partial(print, file=sys.stderr)
 
 
@@ -85,13 +85,13 @@ def _contains(options: Options) -> None:
 
 
 def _write_labels(options: Options, name: str, labels: list[str], codes: Any) -> None:
-    """Write codes, into .csv as the labels at their places."""
+    """Write codes; into .csv as labels."""
     is_text = options.output is None or options.output.endswith(".csv")
     write_table(options.output, {name: np.array(labels)[codes] if is_text else codes})
 
 
 def _posed_pair(options: Options) -> tuple[Any, ...]:
-    """Return both solids, and rotations and translations of the second; no pose is the identity."""
+    """Return both solids, and rotations and translations of the second; the identity without --poses."""
     first, second = read_solid(options.first, _note(options)), read_solid(options.second, _note(options))
     size = first.dimension
     rows = np.eye(size, size + 1)[np.newaxis] if options.poses is None else read_rows(options.poses, (size, size + 1))
@@ -137,7 +137,7 @@ def _clip_polygons(region: Any, options: Options) -> None:
 
 
 def _clipped(rings: Any, item: int) -> dict[str, Any]:
-    """Return what remains of a polygon as a feature: all its rings, which may have bridges."""
+    """Return a clipped polygon as a feature: all its rings, which may have bridges."""
     closed = [[*ring.tolist(), ring[0].tolist()] for ring in rings]
     geometry = {"type": "MultiPolygon", "coordinates": [closed]}
     return {"type": "Feature", "properties": {"item": item}, "geometry": geometry}
@@ -164,14 +164,14 @@ def _write_features(rows: Any, options: Options) -> None:
 
 
 def _bounds(options: Options) -> None:
-    found = bounds(read_solid(options.solid, _note(options)), deadline=options.deadline)
-    radius = np.array([found.sphere.radius])
-    row = {"min": found.aabb.min, "max": found.aabb.max, "center": found.sphere.center, "radius": radius}
+    volumes = bounds(read_solid(options.solid, _note(options)), deadline=options.deadline)
+    radius = np.array([volumes.sphere.radius])
+    row = {"min": volumes.aabb.min, "max": volumes.aabb.max, "center": volumes.sphere.center, "radius": radius}
     write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
 
 
 def _audit(words: Sequence[str]) -> int:
-    """Run the audit, whose peers are those of the benchmarks."""
+    """Run the audit against the packages of the benchmarks."""
     try:
         audit = import_module("benchmarks.audit")
     except ModuleNotFoundError as error:
@@ -192,7 +192,7 @@ def _warm(options: Options) -> None:
 
 
 def _warm_elsewhere(options: Options) -> None:
-    """Run the command again, where the compiler finds another CPU and another folder: it looks for them but once."""
+    """Run the command in a new process, where the compiler uses another CPU and folder: it reads them only once."""
     package = (__package__ or "engine").partition(".")[0]
     command = [sys.executable, "-P", "-m", package, "warm", "--processes", str(options.processes)]
     surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -213,7 +213,7 @@ def _warm_elsewhere(options: Options) -> None:
 
 
 class _Lines:
-    """Says in lines how much is done, where there is no bar."""
+    """Prints progress in lines, if there is no bar."""
 
     def __init__(self) -> None:
         self._done = 0
@@ -225,7 +225,7 @@ class _Lines:
 
 @contextmanager
 def _bar(n_items: int, unit: str, options: Options) -> Iterator[Progress | None]:
-    """Show a progress bar where someone looks at the standard error and tqdm is installed."""
+    """Show a progress bar if the standard error is a terminal and tqdm is installed."""
     if options.quiet or not sys.stderr.isatty() or find_spec("tqdm") is None:
         yield None
         return
@@ -235,26 +235,28 @@ def _bar(n_items: int, unit: str, options: Options) -> Iterator[Progress | None]
         yield bar.update
 
 
-SOLID: Final = {"solid": "see above"}
-POSES: Final = "a file with rows [R | t] of the second: 12 numbers in space, 6 in the plane"
-PAIR: Final = {"first": None, "second": None, "--poses": POSES}
+FORMATS: Final = "mesh file (.stl, .obj, .ply, .off, .glb), .npz, .json, .geojson, or the JSON of a solid"
+SOLID: Final = {"solid": FORMATS}
+POSES: Final = "file with rows [R | t], the poses of the second: 12 numbers in 3D, 6 in 2D; the identity by default"
+PAIR: Final = {"first": FORMATS, "second": FORMATS, "--poses": POSES}
 LAYER: Final = ".geojson file of polygons"
-KEPT: Final = "; properties and ids are kept"
+ATTRIBUTES: Final = "; properties and ids are copied"
+ROWS: Final = ".npy, .csv or .geojson file with rows of "
 COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str | None]]]] = {
     "contains": (_contains, "locate points in a solid: inside, boundary or outside",
-                 SOLID | {"points": "rows of 2 or 3 coordinates"}),
-    "collide": (_collide, "tell how two solids lie to each other, under one or many poses of the second", PAIR),
-    "clearance": (_clearance, "tell how far two solids are apart, under one or many poses of the second", PAIR),
-    "clip": (_clip, "clip segments on a solid, or polygons on a convex one",
-             {"region": None, "items": "rows of two positions; with --polygons a .geojson file"}),
+                 SOLID | {"points": ROWS + "2 or 3 coordinates"}),
+    "collide": (_collide, "decide how two solids relate, for one or many poses of the second", PAIR),
+    "clearance": (_clearance, "compute the distance of two solids, for one or many poses of the second", PAIR),
+    "clip": (_clip, "clip segments to a solid, or polygons to a convex one",
+             {"region": FORMATS, "items": ROWS + "two positions; with --polygons a .geojson file"}),
     "overlay": (_overlay, "Boolean operation on two layers, every feature with every one that it meets",
-                {"left": LAYER + KEPT, "right": LAYER}),
-    "union": (_union, "unite the features of a layer, all or those that agree in some properties", {"layer": LAYER}),
-    "join": (_join, "join points to the features that hold them, boundary included",
-             {"points": ".geojson file of points" + KEPT, "polygons": LAYER}),
+                {"left": LAYER + ATTRIBUTES, "right": LAYER}),
+    "union": (_union, "unite the features of a layer, all or those with equal properties", {"layer": LAYER}),
+    "join": (_join, "join points to the features that contain them, boundary included",
+             {"points": ".geojson file of points" + ATTRIBUTES, "polygons": LAYER}),
     "bounds": (_bounds, "smallest box and smallest sphere of a solid", SOLID),
 }  # fmt: skip
-"""What each does, and the files that it takes."""
+"""Function, help text and arguments of each command."""
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -264,9 +266,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"exact-geometry {__version__}")
     commands = parser.add_subparsers(required=True, metavar="command")
     common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("-o", "--output", metavar="FILE", help="where the answer goes; the standard output by default")
+    common.add_argument("-o", "--output", metavar="FILE", help="output file; the standard output by default")
     common.add_argument("-q", "--quiet", action="store_true", help="no progress bar")
-    common.add_argument("--deadline", type=float, metavar="SECONDS", help="give up after so long")
+    common.add_argument("--deadline", type=float, metavar="SECONDS", help="time limit")
     command = partial(commands.add_parser, parents=[common])
 
     made = {}
@@ -275,12 +277,14 @@ def _parser() -> argparse.ArgumentParser:
         made[name].set_defaults(run=run)
         for place, words in places.items():
             made[name].add_argument(place, help=words)
-    made["clearance"].add_argument("--at-least", type=float, metavar="DISTANCE", help="are they so far apart or more")
-    made["clip"].add_argument("--polygons", action="store_true", help="Sutherland-Hodgman on polygons of .geojson")
+    made["clearance"].add_argument(
+        "--at-least", type=float, metavar="DISTANCE", help="decide only: at least so far apart?"
+    )
+    made["clip"].add_argument("--polygons", action="store_true", help="clip polygons of .geojson (Sutherland-Hodgman)")
     made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
-    made["union"].add_argument("--by", nargs="+", metavar="NAME", help="properties that are equal in what is united")
-    made["join"].add_argument("--outside", action="store_true", help="points that nothing holds too")
-    commands.add_parser("audit", help="who is wrong on your data: the textbook, float32 and peers, on one page")
+    made["union"].add_argument("--by", nargs="+", metavar="NAME", help="unite features that agree in these properties")
+    made["join"].add_argument("--outside", action="store_true", help="also write points that no feature contains")
+    commands.add_parser("audit", help="compare libraries on your own data, on one page")
     ready = commands.add_parser("warm", help="compile all kernels now, for this machine or to ship them")
     ready.add_argument("--into", metavar="FOLDER", help="a folder or .tar.xz for ENGINE_CACHE_SEED of other machines")
     ready.add_argument("--cpu", metavar="NAME", help="the oldest CPUs to run on: x86-64-v3; this one by default")

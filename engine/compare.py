@@ -1,4 +1,4 @@
-"""Public: the exact answer beside the textbook's plain float64 one, on the caller's own data."""
+"""Public: compares the exact answer with the textbook's plain float64 one, on the caller's own data."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from engine.types import Accuracy, BoolArray, FloatArray, IntArray, Relation
 
 Compared = Literal["contains", "collide", "clip_segments", "clip_polygons"]
 STEPS: Final = 1 << 19
-"""Of a brute-force method between two looks at the deadline: some milliseconds."""
+"""Steps of a brute-force method between two polls of the deadline: some milliseconds."""
 MOST_STEPS: Final = 1 << 24
-"""That an item may take, since nothing interrupts it: a second or so."""
+"""Largest number of steps for an item, since nothing interrupts it: a second or so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,38 +173,38 @@ def compare(
 
 
 def _as_items(items: Any, dimension: int, n_axes: int) -> FloatArray:
-    found = as_floats(items, n_axes, ("items",))
-    if found.shape[-1] != dimension:
+    array = as_floats(items, n_axes, ("items",))
+    if array.shape[-1] != dimension:
         wanted = "(n, dim)" if n_axes == 2 else "(n, size, dim)"
-        raise WrongDimensionError(f"expected {wanted} with dim = {dimension}, got shape {found.shape}")
-    return found
+        raise WrongDimensionError(f"expected {wanted} with dim = {dimension}, got shape {array.shape}")
+    return array
 
 
 def _in_parts(ask: Callable[..., Any], n_steps: int, budget: Budget, items: FloatArray) -> Any:
-    """Ask about so few items at once that the deadline is looked at in between."""
-    size, found = max(1, STEPS // max(n_steps, 1)), []
+    """Run a method on parts of the items, small enough to poll the deadline in between."""
+    size, answers = max(1, STEPS // max(n_steps, 1)), []
     for start in range(0, max(len(items), 1), size):
         budget.check()
-        found.append(ask(items[start : start + size]))
-    return np.concatenate(found)
+        answers.append(ask(items[start : start + size]))
+    return np.concatenate(answers)
 
 
 def _differences(exact: Any, plain: Any) -> tuple[IntArray, IntArray]:
-    """Return where decisions differ, and where only coordinates do."""
+    """Return the items whose decisions differ, and those where only coordinates do."""
     if exact.ndim == 1:
         return np.flatnonzero(exact != plain), np.empty(0, np.int64)
-    kept, as_plain = ~np.isnan(exact).any(axis=1), ~np.isnan(plain).any(axis=1)
-    return np.flatnonzero(kept != as_plain), np.flatnonzero(kept & as_plain & (exact != plain).any(axis=1))
+    is_left, as_plain = ~np.isnan(exact).any(axis=1), ~np.isnan(plain).any(axis=1)
+    return np.flatnonzero(is_left != as_plain), np.flatnonzero(is_left & as_plain & (exact != plain).any(axis=1))
 
 
 def _contains(points: Any, solid: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
-    found, accuracy = locate(points, solid, **limits)
-    return found >= 0, accuracy
+    locations, accuracy = locate(points, solid, **limits)
+    return locations >= 0, accuracy
 
 
 def _collide(first: Solid, second: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
-    found, accuracy = collide(first, second, boolean=True, **limits)
-    return np.array([found.relation != Relation.DISJOINT]), accuracy
+    result, accuracy = collide(first, second, boolean=True, **limits)
+    return np.array([result.relation != Relation.DISJOINT]), accuracy
 
 
 def _clip_segments(segments: Any, region: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
@@ -215,8 +215,8 @@ def _clip_segments(segments: Any, region: Solid, limits: dict[str, Any]) -> tupl
 
 
 def _clip_polygons(polygons: Any, region: Solid, limits: dict[str, Any]) -> tuple[Any, Accuracy]:
-    found, accuracy = clip_polygons(polygons, region, **limits)
-    return np.diff(found.polygon_offsets) > 0, accuracy
+    clipped, accuracy = clip_polygons(polygons, region, **limits)
+    return np.diff(clipped.polygon_offsets) > 0, accuracy
 
 
 OPERATIONS: Final[dict[str, tuple[Callable[..., tuple[Any, Accuracy]], str]]] = {
@@ -225,4 +225,4 @@ OPERATIONS: Final[dict[str, tuple[Callable[..., tuple[Any, Accuracy]], str]]] = 
     "clip_segments": (_clip_segments, "of_segments"),
     "clip_polygons": (_clip_polygons, "of_polygons"),
 }
-"""The exact answer, and the function of `engine.textbook.methods`."""
+"""The exact operation, and the function of `engine.textbook.methods`."""

@@ -38,7 +38,7 @@ from engine.solids.checks import as_point_groups, as_points, shown
 from engine.types import BoolArray, FloatArray, Int8Array
 
 PARTS_PER_THREAD = 3
-"""Parts in flight: so many that no thread waits for the network, so few that a batch may be larger than a worker."""
+"""Parts in flight a thread: enough to hide the network, few enough for batches larger than a worker's memory."""
 
 Function = Callable[..., Any]
 
@@ -80,8 +80,8 @@ def clip_segments(
     """Clip segments on a region, see `engine.clip_segments`."""
     rows = as_point_groups(segments, 2, region.dimension, ("segments",))
     function = partial(_about_rows, clipping.clip_segments)
-    found = _in_order(_answers(client, function, (region,), (rows,), part, progress))
-    return _joined(found) if found else function((region,), rows)
+    parts_done = _in_order(_answers(client, function, (region,), (rows,), part, progress))
+    return _joined(parts_done) if parts_done else function((region,), rows)
 
 
 def clip_segments_scene(
@@ -92,10 +92,10 @@ def clip_segments_scene(
     and stays prepared there."""
     rows = as_point_groups(segments, 2, scene.solids[0].dimension if len(scene) else None, ("segments",))
     function = partial(_about_solids, Scene.clip_segments, keep=keep)
-    found = _in_order(_answers(client, function, (scene,), (rows,), part, progress))
-    if len(found) < 2:
-        return found[0][1] if found else function((scene,), rows)
-    return np.concatenate([met for _, met in found]) if keep == "any" else _joined(found)
+    parts_done = _in_order(_answers(client, function, (scene,), (rows,), part, progress))
+    if len(parts_done) < 2:
+        return parts_done[0][1] if parts_done else function((scene,), rows)
+    return np.concatenate([met for _, met in parts_done]) if keep == "any" else _joined(parts_done)
 
 
 def overlay_batch(
@@ -109,16 +109,16 @@ def overlay_batch(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)
         )
     function = partial(_about_rows, overlay_pairs, operation=operation)
-    found = _in_order(_answers(client, function, (), (subjects, clips), part, progress))
-    return join_batches([none, *(batch for _, batch in found)])
+    parts_done = _in_order(_answers(client, function, (), (subjects, clips), part, progress))
+    return join_batches([none, *(batch for _, batch in parts_done)])
 
 
-def _about_rows(ask: Function, held: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
-    return _about_solids(ask, rows, *held, **options)
+def _about_rows(ask: Function, solids: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
+    return _about_solids(ask, rows, *solids, **options)
 
 
-def _about_solids(ask: Function, held: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
-    return ask(*held, *rows, workers=1, **options)
+def _about_solids(ask: Function, solids: tuple[Any, ...], *rows: Any, **options: Any) -> Any:
+    return ask(*solids, *rows, workers=1, **options)
 
 
 def _filled(kind: Any, answers: Iterator[tuple[int, Any]], n: int) -> Any:
@@ -133,19 +133,19 @@ def _in_order(answers: Iterator[tuple[int, Any]]) -> list[tuple[int, Any]]:
     return sorted(answers, key=lambda each: each[0])
 
 
-def _joined(found: list[tuple[int, Any]]) -> Any:
-    """Return pieces of segments, at least one part, each from the number of its first segment on, as one."""
-    kind = type(found[0][1])
-    source = np.concatenate([start + pieces.source for start, pieces in found])
+def _joined(parts: list[tuple[int, Any]]) -> Any:
+    """Return parts of pieces as one; each part counts sources from its own first segment."""
+    kind = type(parts[0][1])
+    source = np.concatenate([start + pieces.source for start, pieces in parts])
     names = [field.name for field in fields(kind)][1:]
-    return kind(source, *(np.concatenate([getattr(pieces, name) for _, pieces in found]) for name in names))
+    return kind(source, *(np.concatenate([getattr(pieces, name) for _, pieces in parts]) for name in names))
 
 
 def _answers(
     client: Client, function: Function, solids: tuple[Any, ...], arrays: tuple[Any, ...], part: int,
     progress: Progress | None,
 ) -> Iterator[tuple[int, Any]]:  # fmt: skip
-    """Yield the start of each part and its answer as they arrive; on an error cancel what is under way."""
+    """Yield the start of each part and its answer as they arrive; on an error cancel the parts in flight."""
     check_options(None, progress)
     if isinstance(part, bool) or not isinstance(part, int) or part < 1:
         raise InvalidInputError(f"part must be a whole number from 1, got {shown(part)}", ("part",))
@@ -155,13 +155,13 @@ def _answers(
     def submit(queue: as_completed) -> None:
         start = starts.pop()
         rows = [array[start : start + part] for array in arrays]
-        future = client.submit(function, held, *rows, pure=False)
+        future = client.submit(function, shared, *rows, pure=False)
         waiting[future] = start
         queue.add(future)
 
     with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 PiB"}):
-        # The solids are the result of a task, not scattered: Dask makes them again when all that held them are gone.
-        held = client.submit(tuple, solids, pure=False)
+        # The solids are the result of a task, not scattered: Dask recomputes them if their workers are lost.
+        shared = client.submit(tuple, solids, pure=False)
         queue = as_completed()
         try:
             for _ in range(min(len(starts), PARTS_PER_THREAD * max(1, sum(client.nthreads().values())))):
@@ -174,4 +174,4 @@ def _answers(
                 if starts:
                     submit(queue)
         finally:
-            client.cancel([held, *waiting])
+            client.cancel([shared, *waiting])

@@ -1,4 +1,4 @@
-"""The rows of the ten solids: everything that is known of a type, and where its code is. To add a solid, add a row.
+"""The rows of the ten solids: everything about a type, and where its code is. To add a solid, add a row.
 
 A new solid needs its class in `engine/solids/`, a row here, and its name in `engine/__init__`. The least is `solid`,
 `about`, `fields`, and `exact` if points can be in it: then `locate` and scenes answer, in exact arithmetic; every other

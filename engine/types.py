@@ -19,14 +19,14 @@ Float32Array = npt.NDArray[np.float32]
 IntArray = npt.NDArray[np.int64]
 Int32Array = npt.NDArray[np.int32]
 Int8Array = npt.NDArray[np.int8]
-"""Of locations, relations and statuses, for the most part."""
+"""Mostly of locations, relations and statuses."""
 FlagArray = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
-    """Return an array of the one kind that kernels are compiled for: itself, a read-only view, or a copy."""
+    """Return an array of the one kind for which kernels are compiled: itself, a read-only view, or a copy."""
     flags = array.flags
     if flags.c_contiguous and not flags.writeable:
         return array
@@ -60,9 +60,9 @@ class HalfSpace3(NamedTuple):
 
 
 UNDECIDED: Final = 2
-"""What a predicate returns beside -1, 0, 1 when an exponent leaves the range in which expansions are exact."""
+"""Returned by a predicate instead of -1, 0, 1 if an exponent leaves the range in which expansions are exact."""
 OPEN: Final = 2
-"""Status of an item that a kernel leaves to exact arithmetic."""
+"""Status of an item that a kernel leaves to the exact fallback."""
 
 
 class Location(IntEnum):
@@ -74,7 +74,7 @@ class Location(IntEnum):
 
 
 class Relation(IntEnum):
-    """How two bodies lie to each other; the first line that is true decides. Batches hold these as int8."""
+    """How two bodies relate; the first line that is true decides. Batches hold these as int8."""
 
     DISJOINT = 0
     FIRST_INSIDE_SECOND = 1

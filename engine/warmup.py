@@ -1,7 +1,7 @@
-"""Compiles or loads every kernel that the public functions reach, by asking each a small question.
+"""Compiles or loads every kernel that the public functions reach, by a small call of each.
 
-Whatever calls the public functions later finds the same argument types, so that nothing is compiled while a client
-waits; a test compares the kernels reached here with those the engine has.
+Later calls of the public functions have the same argument types, so that nothing is compiled while a client waits; a
+test compares the kernels reached here with those the engine has.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _cube(at: float = 0.0) -> Polyhedron:
 
 
 def _regions(dimension: int) -> list[Solid]:
-    """Return one solid of every type of a dimension, those that only some operations take left out."""
+    """Return one solid of every type of a dimension, except types that only some operations take."""
     first = np.eye(dimension)[0]
     simple: list[Solid] = [
         HalfSpace(first, 0.5),
@@ -117,7 +117,7 @@ def _locate(dimension: int) -> None:
     poses: list[Pose | None] = [Pose(np.eye(dimension), np.full(dimension, 0.25))] * len(solids)
     for solid in solids:
         locate(points, solid)
-    many = np.tile(points, (4, 1))  # few are asked about body by body
+    many = np.tile(points, (4, 1))  # a few are located body by body
     locate_scene(many, solids, poses)
     locate_scene(many, solids)
     with Budget() as budget:  # what a scene asks of a single body, where its first pass is not sure
@@ -127,7 +127,7 @@ def _locate(dimension: int) -> None:
 
 
 def _warm_cells() -> None:
-    """Ask a cube and a ring of 300 edges about so many points that cells pay."""
+    """Locate enough points in a cube and in a ring of 300 edges that cells amortise."""
     many, cube = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3)), _cube()
     locate(many, cube)
     locate_scene(many, [cube])
@@ -181,7 +181,7 @@ def _bodies() -> list[Solid]:
 
 
 def _warm_clipping() -> None:
-    """Clip in the plane and in space: a third of what either compiles is the other's too."""
+    """Clip in 2D and in 3D: a third of the kernels are common."""
     _clip(2)
     corners = [[[-1.0, -1.0], [2.0, 2.0]], [[0.0, 0.0], [1.0, 1.0]]]  # through corners, and from one to another
     clip_segments(corners, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))
@@ -210,7 +210,7 @@ def _warm_overlay_rest() -> None:
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
     overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=0.5)
-    overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=1e-14)  # units that doubles tell apart, but not surely
+    overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=1e-14)  # distinguishable as doubles, but not certainly
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")
@@ -236,6 +236,6 @@ STEPS = (
     _warm_overlay_rest,
     _warm_cells,
 )
-"""Parts of the work, long ones first; what several need is compiled by the first, or by a process each."""
+"""Parts of the work, long ones first; what several need is compiled by the first, or in several processes."""
 SHARES = (24, 20, 19, 14, 8, 7, 4, 4)
-"""How long each of `STEPS` takes, in hundredths of all."""
+"""Duration of each of `STEPS`, in hundredths of all."""

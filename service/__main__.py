@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("service")
 SWITCH_SECONDS: Final = 0.0002
-"""How long one thread keeps the interpreter while others wait: the event loop hands over several times a request, and
-with Python's 5 ms each time beside a batch, small requests would wait for tens of milliseconds."""
+"""Interval at which a thread yields the interpreter: with Python's 5 ms, a batch would delay small requests by tens of
+milliseconds, since the event loop hands over several times a request."""
 
 
 class JsonFormatter(logging.Formatter):
-    """Writes time, level, logger and message, and the fields that a record brings along."""
+    """Formats a log record as JSON: time, level, logger, message, and extra fields."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line."""
+        """Return the line of a record."""
         line: dict[str, Any] = {
             "time": f"{_second(int(record.created))}.{int(record.msecs):03d}Z",
             "level": record.levelname.lower(),
@@ -54,7 +54,7 @@ def _second(moment: int) -> str:
 
 
 def config_of(level: str) -> dict[str, Any]:
-    """Return the configuration for `logging.config.dictConfig`; worker processes set it up anew."""
+    """Return the configuration for `logging.config.dictConfig`; worker processes apply it again."""
     own = {"handlers": ["stderr"], "level": level.upper(), "propagate": False}
     return {
         "version": 1,
@@ -66,7 +66,7 @@ def config_of(level: str) -> dict[str, Any]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Serve until SIGTERM or SIGINT, finish what is under way, exit with 0."""
+    """Serve until SIGTERM or SIGINT, finish running requests, exit with 0."""
     gc.disable()  # while modules are imported (`create_app`): an eighth of the time until ready
     _take_flags(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -107,7 +107,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def create_app() -> FastAPI:
-    """Return the service for a process that is all its own: nowhere else is a process changed."""
+    """Return the service for a process of its own: nowhere else does the service change its process."""
     from service.app import create_app
     from service.memory import configure_malloc
 
@@ -120,7 +120,7 @@ def create_app() -> FastAPI:
 
 
 def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> None:
-    """Serve until a signal comes; stack: what is to be cleaned up at the end."""
+    """Serve until a signal comes; stack: clean-up at the end."""
     import uvicorn
 
     from service.protocol import Protocol
@@ -153,7 +153,7 @@ def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> 
 
 
 def _leave_threads(_kind: object, ended: object, _trace: object) -> None:
-    """End the process where threads cannot be stopped; one within the compiler's C++ would abort it."""
+    """End the process if threads cannot be stopped; one within the compiler's C++ would abort it."""
     from service.server import end_process, is_left_behind
 
     if isinstance(ended, SystemExit) and not ended.code and is_left_behind():
@@ -170,7 +170,7 @@ def _refuse(what: str) -> NoReturn:
 
 
 def _take_flags(arguments: list[str]) -> None:
-    """Put flags into the environment, where worker processes find them too; `--help` and `--version` end here."""
+    """Put flags into the environment, where worker processes read them; `--help` and `--version` exit here."""
     if not arguments:
         return
     parser = argparse.ArgumentParser(
@@ -199,7 +199,7 @@ def _take_flags(arguments: list[str]) -> None:
 
 
 def _check_folder(folder: Path | None) -> None:
-    """Raise OSError unless files can be written there: worker processes would fail one by one, and be started again."""
+    """Raise OSError unless the folder is writable: worker processes would fail one by one, and be restarted."""
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -214,7 +214,8 @@ def _is_loopback(host: str) -> bool:
 
 
 def _share(folder: Path, settings: Settings) -> None:
-    """Give the worker processes one place for counters, and for solids if no folder is set; through the environment."""
+    """Give the worker processes a common folder for counters, and for solids if no folder is set, by the
+    environment."""
     counters = folder / "metrics"
     counters.mkdir()
     os.environ["PROMETHEUS_MULTIPROC_DIR"] = str(counters)

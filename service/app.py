@@ -46,8 +46,7 @@ ROUTERS: Final = (
 )
 _SHOWN: Final = "ETag, Geometry-Accuracy, Location, Retry-After, Server-Timing, Traceresponse, X-Request-ID"
 END_SECONDS: Final = 0.7
-"""How long a service that ends waits for its threads, which look at their switch, and then for its warm-up, which looks
-between two parts whether it is still wanted."""
+"""Time at shutdown for threads, which poll their switch, and then for the warm-up, which polls between two parts."""
 DESCRIPTION = """Containment, collision and clipping with exact decisions.
 
 Every float64 given is taken as the exact number it is; every yes/no, side, order, count and relation equals what exact
@@ -57,7 +56,7 @@ object and the header `Server-Timing` (decode, prepare, compute, encode). Errors
 
 
 def create_app(settings: Settings | None = None, owns_process: bool = False) -> FastAPI:
-    """Return the service as an ASGI application; owns_process: whether nothing else lives there (`__main__`)."""
+    """Return the service as an ASGI application; owns_process: whether it is alone in its process (`__main__`)."""
     settings = settings or Settings()
     app = FastAPI(
         title="exact-geometry",
@@ -105,22 +104,22 @@ def create_router(settings: Settings | None = None) -> APIRouter:
             "GEOMETRY_API_KEYS is not looked at within another application: whoever reaches it may call; guard the "
             "calls yourself: app.include_router(service.router(), dependencies=[Depends(check_key)])"
         )
-    guest = _Guest(settings)
+    guest = _EmbeddedService(settings)
     router = APIRouter(lifespan=guest.lifespan, dependencies=[Depends(guest.start_once)])
     for each in ROUTERS:
         router.include_router(each)
     return router
 
 
-class _Guest:
-    """The service within somebody else's application."""
+class _EmbeddedService:
+    """The service within another application."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
 
     @asynccontextmanager
     async def lifespan(self, app: FastAPI) -> AsyncIterator[None]:
-        """Start with the application, end with it."""
+        """Start and end with the application."""
         state = self._started(app)
         if hasattr(state, "pool") and not state.is_ending:  # the router was included twice: the first ends it
             yield
@@ -129,14 +128,14 @@ class _Guest:
             yield
 
     async def start_once(self, request: Request) -> None:
-        """Start with the first request where nobody runs the application's lifespan."""
+        """Start with the first request if nobody runs the application's lifespan."""
         state = self._started(request.app)
         if not hasattr(state, "pool"):
             warming = _start(state)
             atexit.register(_end, state, warming)
 
     def _started(self, app: FastAPI) -> State:
-        """Return what the calls share in `app`; what has ended is made again."""
+        """Return the state in `app` that calls share; an ended one is made again."""
         state: State = getattr(app.state, "geometry", None) or State({"guest": self, "is_ending": True})
         if state.guest is not self:
             raise RuntimeError(
@@ -160,7 +159,7 @@ class _Guest:
 
 
 def _prepare(state: State, settings: Settings, owns_process: bool) -> None:
-    """Make what requests share."""
+    """Make the state that requests share."""
     state.settings, state.owns_process = settings, owns_process
     state.metrics = Metrics()
     state.store = Store(settings.store_bytes, settings.store_folder, settings.store_folder_bytes, state.metrics)
@@ -177,7 +176,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 @asynccontextmanager
 async def _running(state: State) -> AsyncIterator[None]:
-    """Start, and end again: what runs is cancelled, and waited for for a while."""
+    """Start, and end again: running requests are cancelled, and awaited for a while."""
     warming = _start(state)
     try:
         yield
@@ -202,7 +201,7 @@ def _end(state: State, warming: threading.Thread) -> None:
 
 
 class _EndingError(Exception):
-    """Ends the warm-up of a service that ends."""
+    """Ends the warm-up at shutdown."""
 
 
 def _warm(state: State) -> None:

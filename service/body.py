@@ -1,4 +1,4 @@
-"""Bodies as they arrive: their media type, length and coding, read within their limits.
+"""Reads request bodies within their limits: media type, length and content coding.
 
 A large one is received into one buffer of the declared length. A compressed one is inflated off the event loop, part by
 part, so that it ends as soon as it is known to be too long.
@@ -26,20 +26,20 @@ from service.work import Call
 JSON: Final = "application/json"
 OCTETS: Final = "application/octet-stream"
 LARGE: Final = 2**22
-"""Bytes from which a body gets memory in large pages: to give 64 MB of small ones back holds all threads for 5 ms."""
+"""Bytes from which a body gets huge pages: freeing 64 MB of small pages blocks all threads for 5 ms."""
 CODINGS: Final = ("gzip", "zstd")
 _STEP: Final = 2**18
-"""Bytes inflated at once: half a millisecond."""
+"""Bytes inflated per step: half a millisecond."""
 _STEP_IN: Final = 2**14
-"""Bytes of gzip given to it at once: a member may be of 20 bytes, and what follows one is copied."""
+"""Bytes of gzip input per step: a member may be of 20 bytes, and what follows one is copied."""
 _BLOCKS: Final = 2**8
-"""Bytes of zstd inflated at once: a block takes four at least, and gives 128 KB at most."""
+"""Bytes of zstd inflated per step: a block takes four at least, and gives 128 KB at most."""
 _WINDOW: Final = 2**23
-"""Bytes that a zstd body may look back: what decoders are asked to hold (RFC 8878, 3.1.1.1.2)."""
+"""Largest window of a zstd body: the one that decoders should support (RFC 8878, 3.1.1.1.2)."""
 
 
 def check_media_type(headers: dict[bytes, bytes], expected: str) -> None:
-    """Raise unless the body is what the route takes; octets need not be named, since they can be nothing else."""
+    """Raise unless the body has the media type of the route; octets need none, since they can be nothing else."""
     given = headers.get(b"content-type", b"").decode("latin-1")
     kind = given.partition(";")[0].strip().lower()
     is_json = expected == JSON and kind.startswith("application/") and kind.endswith("+json")
@@ -51,7 +51,7 @@ def check_media_type(headers: dict[bytes, bytes], expected: str) -> None:
 
 
 def coding_of(headers: dict[bytes, bytes]) -> str | None:
-    """Return how the body is compressed, None if it is not."""
+    """Return the content coding of the body, None if it is not compressed."""
     coding = headers.get(b"content-encoding", b"").decode("latin-1").strip().lower()
     coding = {"x-gzip": "gzip", "identity": ""}.get(coding, coding)
     if coding and coding not in CODINGS:
@@ -63,7 +63,7 @@ def coding_of(headers: dict[bytes, bytes]) -> str | None:
 
 
 def declared_length(headers: dict[bytes, bytes], limit: int) -> int:
-    """Return the length that the headers declare, 0 if they do not; `body_too_large` beyond the limit."""
+    """Return the declared length, 0 if there is none; raise `body_too_large` beyond the limit."""
     given = headers.get(b"content-length", b"0").lstrip(b"0") or b"0"
     if not given.isdigit():
         return 0
@@ -73,9 +73,9 @@ def declared_length(headers: dict[bytes, bytes], limit: int) -> int:
 
 
 async def read(receive: Receive, declared: int, call: Call) -> Body:
-    """Return the body, refused as soon as it is known to be too long, declared or not, or too slow.
+    """Return the body; raise as soon as it is too long, declared or not, or too slow.
 
-    What has arrived is counted, not what is declared: that is only refused where it would not fit now.
+    The bytes that arrived are counted, not the declared ones: these are refused only if they would not fit now.
     """
     limit, seconds = call.settings.max_body_bytes, call.settings.body_seconds
     await call.wait_for(FOOTPRINT * declared)
@@ -113,7 +113,7 @@ async def read(receive: Receive, declared: int, call: Call) -> Body:
 
 
 def inflated(body: Body, coding: str, call: Call) -> bytes:
-    """Return what `body` was before it was compressed."""
+    """Return the decompressed body."""
     limit, size, whole = call.settings.max_body_bytes, 0, BytesIO()
     try:
         for part in _inflated(body, coding):
@@ -129,7 +129,7 @@ def inflated(body: Body, coding: str, call: Call) -> bytes:
 
 
 def _inflated(body: Body, coding: str) -> Iterator[bytes]:
-    """Yield what the members of a gzip body (RFC 1952, 2.2), or the frames of a zstd body (RFC 8878, 3.1), hold."""
+    """Yield the content of the members of a gzip body (RFC 1952, 2.2), or the frames of a zstd body (RFC 8878, 3.1)."""
     packed: Any = None  # a member or frame that is not over
     is_gzip, unpacker = coding == "gzip", zstandard.ZstdDecompressor(max_window_size=_WINDOW)
     step, most = (_STEP_IN, (_STEP,)) if is_gzip else (_BLOCKS, ())
@@ -151,7 +151,7 @@ def _inflated(body: Body, coding: str) -> Iterator[bytes]:
 
 
 def _room(size: int) -> bytearray | mmap.mmap:
-    """Return so many bytes; untouched pages take no memory."""
+    """Return a buffer of so many bytes; untouched pages take no memory."""
     if not hasattr(mmap, "MADV_HUGEPAGE"):
         return bytearray(size)
     try:

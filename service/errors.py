@@ -1,4 +1,4 @@
-"""One table from error codes to HTTP statuses, and how any error becomes problem+json.
+"""The table from error codes to HTTP statuses, and the conversion of any error to problem+json.
 
 Codes of the engine's errors are passed on unchanged; those that only HTTP knows are added here. The table is part of
 the API: `docs` lists it, the tests hold it against the engine's tree of errors.
@@ -75,7 +75,7 @@ _PYDANTIC_CODES: Final = {
     "recursion_loop": "too_deep",
 }
 _MOST_MISTAKES: Final = 5000
-"""Of one body that are looked at: pydantic lets no other thread run while it lists them, 2 us each."""
+"""Largest number of faults read from pydantic: no other thread runs while it lists them, 2 us each."""
 _MOST_PROBLEM: Final = 1000
 _MOST_PART: Final = 100
 """Characters of a sentence, and of a field's name in a pointer."""
@@ -94,7 +94,7 @@ _HTTP_CODES: Final = {404: "not_found", 405: "method_not_allowed", 413: "body_to
 
 
 class ServiceError(Exception):
-    """An error that only the service knows: what HTTP asks for, limits, the store, the queue."""
+    """An error of the service alone: HTTP, limits, the store, the queue."""
 
     def __init__(self, code: str, detail: str, where: Path = ()) -> None:
         super().__init__(detail)
@@ -114,7 +114,7 @@ def pointer(path: Iterable[str | int]) -> str:
 
 
 def faults_of(error: Exception) -> list[Fault]:
-    """Return what is wrong and where, for any error; at least one entry."""
+    """Return the faults of any error, with their paths; at least one."""
     if isinstance(error, EngineError):
         code = error.code if error.code in ENGINE_STATUS else EngineError.code
         return [Fault(error.where, code, error.message)]
@@ -126,7 +126,7 @@ def faults_of(error: Exception) -> list[Fault]:
 
 
 def forget_frames(error: BaseException) -> None:
-    """Forget the frames of an error and of those before it: they hold the body, and lead back to it."""
+    """Drop the frames of an error and of its causes: they reference the body, and lead back to it."""
     known: BaseException | None = error
     while known is not None:  # bound: each is raised while the next was handled
         known.with_traceback(None)
@@ -157,7 +157,7 @@ def problem(faults: list[Fault], headers: Mapping[str, str] = {}) -> Response:
 
 
 def http_fault(status: int, path: str, method: str) -> Fault:
-    """Return what is said where the framework itself found no route."""
+    """Return the fault for a request for which the framework has no route."""
     code = _HTTP_CODES.get(status, "bad_request")
     detail = {
         "not_found": f"there is nothing at {path[:200]}; /docs lists what there is",
@@ -167,7 +167,7 @@ def http_fault(status: int, path: str, method: str) -> Fault:
 
 
 def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
-    """Return what is wrong with `document`, the request as decoded, and where; at most `MAX_ERRORS` entries."""
+    """Return the faults of `document`, the decoded request, with their paths; at most `MAX_ERRORS`."""
     faults: list[Fault] = []
     if error.error_count() > _MOST_MISTAKES:
         detail = f"{error.error_count()} things are wrong, most are fields not known here; /docs has an example"
@@ -187,14 +187,14 @@ def faults_of_validation(error: ValidationError, document: Any) -> list[Fault]:
     return faults[:MAX_ERRORS]
 
 
-def _meant(given: Any) -> str:
-    """Return what a word that is used elsewhere is called here."""
+def _api_name_of(given: Any) -> str:
+    """Map the vocabulary of other APIs to ours, for a hint."""
     meant = _CALLED_HERE.get(given) if isinstance(given, str) else None
     return "" if meant is None else f" ({meant})"
 
 
 def _sentence(item: Any, parent: Any) -> str:
-    """Return what pydantic found as a sentence that says what to do; parent: what holds the value."""
+    """Return pydantic's finding as a sentence with the remedy; parent: the value's container."""
     name = _shown(item["loc"][-1], _MOST_PART) if item["loc"] else "the body"
     if item["type"] == "missing":
         return f"the field {name!r} is missing; add it"
@@ -202,12 +202,12 @@ def _sentence(item: Any, parent: Any) -> str:
         return f"the field {name!r} is not known here; leave it out"
     if item["type"] == "union_tag_invalid":
         tag, tags = item["ctx"]["tag"], item["ctx"]["expected_tags"]
-        return f"there is no solid of type {tag!r:.60}{_meant(tag)}; the types are {tags}"
+        return f"there is no solid of type {tag!r:.60}{_api_name_of(tag)}; the types are {tags}"
     if item["type"] == "string_pattern_mismatch":
         return "expected the id of a stored solid, 64 hexadecimal digits: POST /v1/solids answers with it"
     if item["type"] == "literal_error":
         got = _child(parent, name)
-        return f"expected {item['ctx']['expected']}, got {got!r:.60}{_meant(got)}"
+        return f"expected {item['ctx']['expected']}, got {got!r:.60}{_api_name_of(got)}"
     if item["type"] == "union_tag_not_found":
         return "a solid is an object with a field 'type' that names what it is, for example 'sphere'"
     if item["type"] in ("model_type", "model_attributes_type"):
@@ -216,7 +216,7 @@ def _sentence(item: Any, parent: Any) -> str:
 
 
 def _path_in(document: Any, loc: tuple[int | str, ...]) -> Path:
-    """Return pydantic's path without the tags it adds where a union was entered (each stands once, before a field)."""
+    """Return pydantic's path without the tags that it adds for unions (each stands once, before a field)."""
     path: list[int | str] = []
     value, may_be_tag = document, True
     for part in loc:
@@ -236,7 +236,7 @@ def _child(value: Any, part: int | str) -> Any:
 
 
 def _shown(part: str | int, most: int) -> str:
-    """Return text cut short, as valid UTF-8: a message may quote half a surrogate pair from the request."""
+    """Return text shortened, as valid UTF-8: a message may quote half a surrogate pair from the request."""
     text = str(part)
     text = text if len(text) <= most else text[: most - 3] + "..."
     return text.encode("utf-8", "replace").decode("utf-8")

@@ -1,7 +1,7 @@
-"""What every request passes: it gets a name, shows its key, takes the headers of safety with it, and leaves a log line.
+"""ASGI middleware around all requests: request id, key, security headers, log line.
 
 One ASGI callable around the application; a framework's middleware class would cost as much as a small answer. So does
-the framework's way to a route: where the path alone says which, the gate asks the route itself.
+the framework's routing: if the path alone determines the route, the gate calls the route itself.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from service.traces import trace_of
 log = logging.getLogger("service.access")
 
 OPEN: Final = frozenset({"/healthz", "/readyz", *(path for path in pages.OPEN if path == "/" or path[-1] != "/")})
-"""Paths that need no key: who runs the service asks for them, or a page is there, which asks for the key itself."""
+"""Paths that need no key: probes of the operator, and pages, which prompt for the key themselves."""
 _OPEN_BELOW: Final = tuple(path for path in pages.OPEN if path != "/" and path[-1] == "/")
 _SAFETY: Final = [
     (b"x-content-type-options", b"nosniff"),
@@ -42,10 +42,10 @@ _NAME: Final = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 
 class Gate:
-    """The application behind its gate."""
+    """The application behind its middleware."""
 
     def __init__(self, app: ASGIApp, settings: Settings, posts: Mapping[str, Answer], metrics: Metrics) -> None:
-        """posts: what answers a POST to a path, errors included."""
+        """posts: the handlers of a POST to a path, errors included."""
         self._app = app
         self._posts = posts
         self._metrics = metrics
@@ -110,20 +110,20 @@ class Gate:
                 _record(scope, status, seconds, name, trace)
 
     def _check(self, headers: dict[bytes, bytes]) -> None:
-        """Raise `missing_key` or `wrong_key` unless the request shows a key; as slow for each wrong one."""
+        """Raise `missing_key` or `wrong_key` unless the request has a key; as slow for each wrong one."""
         scheme, _, token = headers.get(b"authorization", b"").partition(b" ")
         given = token.strip() if scheme.lower() == b"bearer" else headers.get(b"x-api-key", b"")
         if not given:
             raise ServiceError(
                 "missing_key", "send a key of this service: Authorization: Bearer KEY, or X-API-Key: KEY"
             )
-        found = [hmac.compare_digest(_digest(given), key) for key in self._keys]
-        if not any(found):
+        matches = [hmac.compare_digest(_digest(given), key) for key in self._keys]
+        if not any(matches):
             raise ServiceError("wrong_key", "the key is none of this service's; GEOMETRY_API_KEYS holds them")
 
 
 def _digest(key: bytes) -> bytes:
-    """Return bytes of one length, so that comparing tells nothing of a key's length either."""
+    """Return bytes of one length, so that comparing does not leak a key's length either."""
     return hashlib.sha256(key).digest()
 
 

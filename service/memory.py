@@ -1,7 +1,7 @@
-"""The ledger of what requests under way hold: bodies as they arrive, documents, copies, answers until they are sent.
+"""Accounts for the memory of running requests: bodies as they arrive, documents, copies, answers until they are sent.
 
-Who holds memory for a request counts it first, by `Call.take` (work.py). What belongs to no request yet, or not any
-more, is bounded for each connection and not counted: headers, trailers, requests sent ahead (protocol.py).
+Code that allocates memory for a request counts it first, by `Call.take` (work.py). What belongs to no request yet, or
+not any more, is bounded for each connection and not counted: headers, trailers, requests sent ahead (protocol.py).
 """
 
 from __future__ import annotations
@@ -16,31 +16,31 @@ from typing import Any, Final
 import engine
 
 FOOTPRINT: Final = 4
-"""Bytes held for each byte of a body, at most: itself, its numbers, a solid of them, the answer."""
+"""Upper bound on the memory for each byte of a body: itself, its numbers, a solid of them, the answer."""
 PART: Final = 64
-"""Bytes held for each part that a body arrives in, however short."""
+"""Memory for each part in which a body arrives, however short."""
 SMALL: Final = 2**16
-"""Bytes that a request is given whatever others hold: there are no more requests than fit into the queue."""
+"""Bytes that a request gets whatever others use: there are no more requests than fit into the queue."""
 LATER: Final = 0.05
-"""Seconds after which what an answer was made of is gone."""
-_KEPT: Final = 16
-"""Of what requests may hold, one part in so many may have been freed before the system gets it back."""
+"""Seconds after which the values of an answer are freed."""
+_UNRETURNED: Final = 16
+"""One part in so many of the limit may be freed but not yet returned to the system."""
 _LEAST: Final = 2**12
-"""Bytes that a request is taken to free at least."""
+"""Bytes that a request counts as freeing at least."""
 _FEW: Final = 2**20
-"""Bytes held by requests under way up to which their objects are gone through in a few milliseconds."""
+"""Bytes of running requests up to which their objects are collected in a few milliseconds."""
 _libc: Final = ctypes.CDLL(None) if os.name == "posix" else None
 _trim = getattr(_libc, "malloc_trim", None)
-"""glibc keeps what was freed in arenas of each thread, some hundred MB after a large request."""
+"""glibc retains freed memory in arenas of each thread, some hundred MB after a large request."""
 _NEVER: Final = 2**31 - 1
-"""Collections of younger objects until the oldest are looked at."""
+"""Collections of younger objects until the oldest are collected."""
 _OF_MALLOC: Final = {-8: 2, -1: 2**20, -3: 2**20}
 """M_ARENA_MAX, M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of mallopt(3): glibc raises the last two to 64 and 32 MB itself,
 and keeps that much at the end of each thread's arena: 256 MB given, 4 to 8 hostile clients took 320 and now 240."""
 
 
 def configure_malloc() -> None:
-    """Have glibc give back what is freed, in this whole process, before its threads have arenas."""
+    """Configure glibc's malloc to return freed memory, before threads have arenas."""
     mallopt: Any = getattr(_libc, "mallopt", None)
     if mallopt is not None:
         for option, value in _OF_MALLOC.items():
@@ -48,16 +48,16 @@ def configure_malloc() -> None:
 
 
 def freeze() -> None:
-    """Have no later collection walk through what lives long; `Memory` collects when there is little else."""
+    """Exclude long-lived objects from later collections; `Memory` collects when there are few others."""
     if not gc.get_freeze_count():
         gc.freeze()  # half a million objects of modules and compiler
     gc.set_threshold(*gc.get_threshold()[:2], _NEVER)
 
 
 class Memory:
-    """Bytes that requests under way hold, or may come to hold; safe to share between threads.
+    """Bytes that running requests use or may use; thread-safe.
 
-    collects: whether the process has turned Python's own search of old objects for cycles off (`freeze`).
+    collects: whether the process has disabled Python's own collection of old objects (`freeze`).
     """
 
     def __init__(self, limit: int, collects: bool = False) -> None:
@@ -68,10 +68,10 @@ class Memory:
         self._collects = collects
 
     def free(self, taken: int, most: int) -> None:
-        """Count the end of a request that holds, or held at most, so much: it is free once the system has it back."""
+        """Count the end of a request that uses, or used at most, so much: it is free once the system has it back."""
         with self.lock:
             self.freed += max(most, _LEAST)
-            is_much = self.freed > self.limit // _KEPT
+            is_much = self.freed > self.limit // _UNRETURNED
             if is_much:
                 self.freed = 0
                 self.leaving += taken
@@ -81,10 +81,10 @@ class Memory:
             threading.Thread(target=self._give_back, args=(taken,), daemon=True).start()
 
     def _give_back(self, taken: int) -> None:
-        """Give freed memory back to the system; and what only cycles hold, while there are few objects to look at.
+        """Return freed memory to the system, and collect cycles while there are few objects.
 
-        Python would look for cycles by itself, at all objects again and again while a large body becomes more and more
-        of them: that held up all threads for up to 0.46 s. Within somebody else's process it goes on doing so.
+        Python would collect cycles by itself, over all objects again and again while a large body becomes more of them:
+        that blocked all threads for up to 0.46 s. Embedded in another process it still does so.
         """
         time.sleep(LATER)
         if self._collects and self.taken - self.leaving <= _FEW:

@@ -1,8 +1,7 @@
-"""Reads mesh files in a child process, which has limits of its own and can be ended: the reader of files is not ours,
-polls no deadline, and holds what it likes.
+"""Reads mesh files in a child process with its own limits, which can be killed.
 
-Children are forked from a server that has imported what they need; it starts with the first file and ends with this
-process. Without it (Windows) each child starts anew.
+The library that reads files polls no deadline and bounds no memory. Children are forked from a server that has imported
+what they need; it starts with the first file and ends with this process. Without it (Windows) each child starts fresh.
 """
 
 from __future__ import annotations
@@ -22,23 +21,23 @@ from service.work import Call
 
 _ROOM: Final = 2**28
 _FOOTPRINT: Final = 16
-"""Bytes that a child may take besides what it starts with, and for each byte of a file."""
+"""Memory limit of a child besides what it starts with, and for each byte of a file."""
 _POLL_SECONDS: Final = 0.05
 _starter: Final = futures.ThreadPoolExecutor(1, thread_name_prefix="mesh reader")
 _METHOD: Final = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
 
 
 def context() -> Any:
-    """Return how children are started here; its server imports what readers need, if it is the first of this process
-    to start one."""
-    found: Any = multiprocessing.get_context(_METHOD)
+    """Return the multiprocessing context; the first one of this process starts its server, which imports what readers
+    need."""
+    started: Any = multiprocessing.get_context(_METHOD)
     if _METHOD == "forkserver":
-        found.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
-    return found
+        started.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
+    return started
 
 
 def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
-    """Return what `engine.read_mesh` does of a mesh file; `invalid_mesh` where it cannot be read, in time or at all."""
+    """Return the result of `engine.read_mesh`; `invalid_mesh` if the file cannot be read, in time or at all."""
     if find_spec("trimesh") is None:
         raise ServiceError("not_installed", "this service reads no mesh files; send vertices and faces as JSON")
     around = context()
@@ -52,19 +51,19 @@ def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
         starting.result()
         theirs.close()
         try:
-            found = mine.recv()
+            received = mine.recv()
         except EOFError:
             raise ServiceError("invalid_mesh", f"the reader of {kind} files ended without an answer") from None
     finally:
         starting.add_done_callback(lambda _: _end(child, mine, theirs))
-    if isinstance(found, str):
-        raise ServiceError("invalid_mesh", found)
-    call.take(4 * sum(array.nbytes for array in found))
-    return found
+    if isinstance(received, str):
+        raise ServiceError("invalid_mesh", received)
+    call.take(4 * sum(array.nbytes for array in received))
+    return received
 
 
 def _end(child: Any, *pipe: Connection) -> None:
-    """End a child that was started, done or not, and close both ends of its pipe."""
+    """End a started child, done or not, and close both ends of its pipe."""
     for end in pipe:
         end.close()
     if child.pid is not None:
@@ -73,7 +72,7 @@ def _end(child: Any, *pipe: Connection) -> None:
 
 
 def _child(answer: Connection, octets: bytes, kind: str, room: int, seconds: float) -> None:
-    """Send what is in a file, or a sentence that says why it cannot be read."""
+    """Send the content of a file, or a sentence that says why it cannot be read."""
     _limit(room, seconds)
     try:
         answer.send(engine.read_mesh(io.BytesIO(octets), kind))
@@ -84,7 +83,7 @@ def _child(answer: Connection, octets: bytes, kind: str, room: int, seconds: flo
 
 
 def _limit(room: int, seconds: float) -> None:
-    """Let this process take no more than that, and no longer than that even where nobody ends it."""
+    """Limit memory and time of this process, the time also if nobody kills it."""
     if sys.platform == "win32":
         return
     import resource

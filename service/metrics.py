@@ -1,6 +1,6 @@
-"""What the service counts of itself, for Prometheus: one registry an app, so that two in one process stay apart.
+"""Prometheus metrics of the service: one registry an app, so that two in one process do not mix.
 
-Several worker processes count into files of a folder that PROMETHEUS_MULTIPROC_DIR names; any of them tells the sum.
+Several worker processes count into files of a folder that PROMETHEUS_MULTIPROC_DIR names; each of them reports the sum.
 Refusals are counted for the whole process: some are made before there is an app (protocol.py).
 """
 
@@ -28,7 +28,7 @@ def _refusal(code: str) -> Counter:
 
 
 def count_refusal(code: str) -> None:
-    """Count a problem that is told, wherever it is."""
+    """Count a problem answer."""
     _refusal(code).inc()
 
 
@@ -64,8 +64,8 @@ class Metrics:
         self.stored = Gauge("geometry_store_solids", "Solids held in memory.", **sums)
         self.stored_bytes = Gauge("geometry_store_bytes", "Bytes they hold.", **sums)
         self.evicted = Counter("geometry_store_evictions", "Solids that left for want of room.", **made)
-        found = Counter("geometry_store_lookups", "Stored solids asked for, by where they were.", ("found",), **made)
-        self.hits = {where: found.labels(where) for where in ("memory", "folder", "nowhere")}
+        lookups = Counter("geometry_store_lookups", "Stored solids asked for, by where they were.", ("found",), **made)
+        self.hits = {where: lookups.labels(where) for where in ("memory", "folder", "nowhere")}
         self.ready = Gauge("geometry_ready", "1 when every kernel is warm.", multiprocess_mode="livemin", **made)
         build = Gauge("geometry_build_info", "What runs.", ("version", "python"), multiprocess_mode="livemax", **made)
         build.labels(engine.__version__, platform.python_version()).set(1)
@@ -80,7 +80,7 @@ class Metrics:
             self._phase(operation, phase).observe(spent)
 
     def text(self) -> bytes:
-        """Return everything counted, by all processes, in the text format of Prometheus."""
+        """Return all metrics, of all processes, in the text format of Prometheus."""
         folder = os.environ.get("PROMETHEUS_MULTIPROC_DIR")
         if folder is None:
             return generate_latest(self._registry)

@@ -21,7 +21,7 @@ from service.schemas.base import Problem
 from service.settings import Settings
 
 ANSWERS: Final = Path(__file__).with_name("answers.json")
-"""What the service answers to the examples of its questions, by model; written by tests/contract/test_openapi.py."""
+"""Answers of the service to the examples of its questions, by model; written by tests/contract/test_openapi.py."""
 _SCHEMAS: Final = "#/components/schemas/"
 _TAGS: Final = {
     "containment": "Which points are inside?",
@@ -43,7 +43,7 @@ _OPEN: Final = ("/healthz", "/readyz")
 
 
 def openapi_of(app: FastAPI, settings: Settings) -> Callable[[], dict[str, Any]]:
-    """Return the function that FastAPI asks for its document; it is made once."""
+    """Return the function that FastAPI calls for its document; the document is made once."""
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:
@@ -58,8 +58,8 @@ def openapi_of(app: FastAPI, settings: Settings) -> Callable[[], dict[str, Any]]
                 license_info={"name": "MIT", "identifier": "MIT"},
             )
             _describe_keys(made, bool(settings.api_keys))
-            found = {tag for item in made["paths"].values() for each in item.values() for tag in each["tags"]}
-            made["tags"] = [{"name": tag, "description": _TAGS.get(tag, tag)} for tag in sorted(found, key=_place)]
+            named = {tag for item in made["paths"].values() for each in item.values() for tag in each["tags"]}
+            made["tags"] = [{"name": tag, "description": _TAGS.get(tag, tag)} for tag in sorted(named, key=_place)]
             app.openapi_schema = completed(made, settings)
         return app.openapi_schema
 
@@ -67,7 +67,7 @@ def openapi_of(app: FastAPI, settings: Settings) -> Callable[[], dict[str, Any]]
 
 
 def completed(made: dict[str, Any], settings: Settings) -> dict[str, Any]:
-    """Return FastAPI's document with what our routes need of it: limits, the model of errors, examples."""
+    """Return FastAPI's document with limits, the model of errors, and examples."""
     schemas = made["components"]["schemas"]
     problem = Problem.model_json_schema(ref_template=_SCHEMAS + "{model}")
     schemas.update(problem.pop("$defs"))
@@ -94,7 +94,7 @@ def _describe_keys(made: dict[str, Any], is_needed: bool) -> None:
 
 
 def _drop_foreign_errors(made: dict[str, Any]) -> None:
-    """Take out FastAPI's own validation error, which it describes wherever a path has a parameter."""
+    """Remove FastAPI's own validation error, which it describes wherever a path has a parameter."""
     for item in made["paths"].values():
         for operation in item.values():
             for status, response in list(operation["responses"].items()):
@@ -105,7 +105,7 @@ def _drop_foreign_errors(made: dict[str, Any]) -> None:
 
 
 def _finished(node: Any, settings: Settings) -> Any:
-    """Put limits in the place of their settings' names, drop titles that only repeat a field's name, and defaults."""
+    """Replace names of settings by their limits, drop titles that only repeat a field's name, and defaults."""
     if isinstance(node, list):
         return [_finished(item, settings) for item in node]
     if not isinstance(node, dict):
@@ -123,8 +123,8 @@ def _finished(node: Any, settings: Settings) -> Any:
 
 
 def _illustrate(made: dict[str, Any]) -> None:
-    """Give every operation a line, every property a description and an example, its own or the first that an example of
-    a model holds."""
+    """Give every operation a summary, and every property a description and an example, its own or the first in a
+    model's example."""
     schemas = made["components"]["schemas"]
     known: dict[str, list[Any]] = json.loads(ANSWERS.read_text("utf-8")) if ANSWERS.is_file() else {}
     for name, answers in known.items():
@@ -145,8 +145,8 @@ def _illustrate(made: dict[str, Any]) -> None:
         for operation in item.values():
             if operation.get("summary") == operation["operationId"].replace("_", " ").title():  # FastAPI's, of ours
                 operation["summary"] = re.split("[.,:;]", operation["description"])[0]
-            found = [answer for status, answer in operation["responses"].items() if status < "300"]
-            for body in (operation.get("requestBody", {}), *found):
+            successes = [answer for status, answer in operation["responses"].items() if status < "300"]
+            for body in (operation.get("requestBody", {}), *successes):
                 for media_type, content in body.get("content", {}).items():
                     if media_type != MEDIA_TYPE and "$ref" in content.get("schema", {}):
                         content["schema"] = {"$ref": content["schema"]["$ref"]}  # a field's description may stick to it
@@ -161,7 +161,7 @@ def _name(schema: dict[str, Any]) -> str:
 
 
 def _parts(schema: dict[str, Any], value: Any, schemas: dict[str, Any]) -> Iterator[tuple[dict[str, Any], Any]]:
-    """Yield each property that `value` has, at any depth, with its value there."""
+    """Yield each property that `value` has, at any depth, with its value."""
     if "$ref" in schema:
         schema = schemas[_name(schema)]
     if "discriminator" in schema:
@@ -197,7 +197,7 @@ _TEXTS: Final = {**_OF_ANY, **_OF_BODY, 501: "Reading files is not installed.", 
 
 
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Return the description of the error answers with these statuses, and of those that any call may have."""
+    """Return the descriptions of the error answers with these statuses, and of those of any call."""
     return {
         status: {
             "description": _TEXTS[status],
@@ -213,5 +213,5 @@ def _example(status: int) -> dict[str, Any]:
 
 
 def router_of(*statuses: int, tags: list[str | Enum] | None = None) -> APIRouter:
-    """Return a router whose calls may have errors of these statuses; without any, those of calls with a JSON body."""
+    """Return a router whose calls document errors of these statuses; by default those of calls with a JSON body."""
     return APIRouter(route_class=GeometryRoute, tags=tags, responses=responses(*(statuses or _OF_BODY)))

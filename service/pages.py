@@ -91,11 +91,11 @@ _SCRIPT: Final = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 
 def add_pages(app: FastAPI) -> None:
     """Serve the pages."""
-    found = find_spec("fastapi_offline")
-    assert found is not None
-    assert found.origin is not None
+    package = find_spec("fastapi_offline")
+    assert package is not None
+    assert package.origin is not None
     app.mount("/playground", StaticFiles(directory=FOLDER), name="playground")
-    app.mount(f"/{_FILES}", StaticFiles(directory=Path(found.origin).parent / "static"), name=_FILES)
+    app.mount(f"/{_FILES}", StaticFiles(directory=Path(package.origin).parent / "static"), name=_FILES)
     for path, page in (("/", _playground), ("/docs", _docs), ("/redoc", _redoc)):
         app.add_api_route(path, page, methods=["GET", "HEAD"], include_in_schema=False)
 

@@ -1,4 +1,4 @@
-"""HTTP/1.1 over httptools, one request after another: nothing a client sends ahead, or after its body, is taken in.
+"""HTTP/1.1 over httptools, one request at a time: nothing that a client sends ahead, or after its body, is accepted.
 
 | what a client sends | what becomes of it |
 |---|---|
@@ -34,7 +34,7 @@ _OFFER: Final = (b"upgrade", b"http2-settings", b"connection")
 
 
 class Parser:
-    """httptools' parser; after an offer a new one takes its place."""
+    """httptools' parser; after an upgrade offer a new one replaces it."""
 
     def __init__(self, protocol: HttpToolsProtocol) -> None:
         self._protocol = protocol
@@ -44,7 +44,7 @@ class Parser:
         return getattr(self._parser, name)
 
     def is_offer(self) -> bool:
-        """Tell whether the request offers another protocol (CONNECT asks for nothing else, and is refused)."""
+        """Return whether the request offers another protocol (CONNECT offers nothing else, and is refused)."""
         return self._parser.should_upgrade() and self._parser.get_method() != b"CONNECT"
 
     def feed_data(self, data: bytes) -> None:
@@ -79,19 +79,19 @@ def _new_parser(protocol: HttpToolsProtocol) -> Any:
 
 _MOST_HEADER_BYTES: Final = 2**16
 _MOST_OVERHEAD: Final = 2**14
-"""Bytes of a body's trailers and lines of chunks beyond what chunks are allowed."""
+"""Bytes of a body's trailers and chunk lines beyond the allowance for chunks."""
 _FREE_OF_CHUNK: Final = 16
 """Bytes of each chunk's line that do not count, and `_FREE_OF_DATA` for each byte of its data, itself included."""
 _FREE_OF_DATA: Final = 3
 _STEP: Final = 2**11
-"""Bytes parsed at once where chunks or requests may end among them: a millisecond where chunks are of one byte."""
+"""Bytes parsed per step if chunks or requests may end among them: a millisecond for chunks of one byte."""
 _EVENTS: Final = 64
-"""Parts of a body after which a connection lets others take their turn."""
+"""Parts of a body after which a connection yields to others."""
 _DROPPED: Final = 2**20
 _LINGER: Final = 2.0
-"""Bytes and seconds that a client may go on sending once it was answered: to close at once might cost it the answer."""
+"""Bytes and seconds that a client may go on sending after its answer: closing at once might lose the answer."""
 _END: Final = b"\n\r\n"
-"""Ends headers, and a body in chunks."""
+"""End of headers, and of a chunked body."""
 
 
 @cache
@@ -101,7 +101,7 @@ def _settings() -> Settings:
 
 
 class Protocol(HttpToolsProtocol):
-    """uvicorn's protocol with a parser that reads on after an offer, and limits to all that surrounds bodies."""
+    """uvicorn's protocol with a parser that ignores upgrade offers, and limits on everything around bodies."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -129,7 +129,7 @@ class Protocol(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def close(self) -> None:
-        """Close the connection once the client has read what was written, which it must within some time."""
+        """Close the connection once the client has read what was written, within some time."""
         if self.is_closing:
             return
         self.is_closing, self._raw = True, b""
@@ -149,7 +149,7 @@ class Protocol(HttpToolsProtocol):
             transport.close()
 
     def shutdown(self) -> None:
-        """End after the request under way."""
+        """End after the running request."""
         self._keeps_alive = False
         super().shutdown()
 
@@ -176,7 +176,7 @@ class Protocol(HttpToolsProtocol):
             self._stop("answer")
 
     def data_received(self, data: bytes) -> None:
-        """Parse `data` as far as it belongs to the request under way."""
+        """Parse `data` as far as it belongs to the running request."""
         if self.is_closing:
             self._n_dropped += len(data)
             if self._n_dropped > _DROPPED:
@@ -186,9 +186,9 @@ class Protocol(HttpToolsProtocol):
         self._parse()
 
     def _parse(self) -> None:
-        """Parse what was received up to the end of one request; what stays makes reading pause."""
+        """Parse the received bytes up to the end of one request; a remainder pauses reading."""
         raw, start, self._n_events = memoryview(self._raw), 0, 0
-        while start < len(raw) and self._n_events < _EVENTS and not self._is_held():  # bound: each turn takes bytes
+        while start < len(raw) and self._n_events < _EVENTS and not self._must_wait():  # bound: each turn takes bytes
             stop = self._end_of_piece(start)
             if stop == start:
                 break
@@ -201,7 +201,7 @@ class Protocol(HttpToolsProtocol):
             if self.is_closing:
                 return
         self._raw = self._raw[start:]
-        is_waiting = self._is_held()
+        is_waiting = self._must_wait()
         if not is_waiting and self._n_events >= _EVENTS and self._raw:
             self.loop.call_soon(self._parse)
             is_waiting = True
@@ -211,19 +211,19 @@ class Protocol(HttpToolsProtocol):
         elif was_full and not self.flow.read_paused:
             self._real.resume_reading()
 
-    def _is_held(self) -> bool:
-        """Tell whether nothing more is parsed now: a request came whole, and its answer is to be sent first."""
+    def _must_wait(self) -> bool:
+        """Return whether parsing pauses: a request is complete, and its answer must be sent first."""
         is_answered = self.cycle is None or self.cycle.response_complete
         return self.is_closing or (not self._is_in_message and not is_answered)
 
     def _end_of_piece(self, start: int) -> int:
-        """Return where to stop parsing `_raw`: at the end of headers or of a body at the latest."""
+        """Return where to stop parsing `_raw`: at the latest at the end of headers or of a body."""
         raw = self._raw
         if self._left:
             return min(len(raw), start + self._left)
-        found = raw.find(_END, start, start + _STEP)
-        if found >= 0:
-            return found + len(_END)
+        end_of_headers = raw.find(_END, start, start + _STEP)
+        if end_of_headers >= 0:
+            return end_of_headers + len(_END)
         stop = min(len(raw), start + _STEP)
         for _ in range(len(_END) - 1):  # what may be the first part of an end waits for the rest of it
             stop -= stop > start and raw[stop - 1] in b"\r\n"
@@ -278,7 +278,7 @@ class Protocol(HttpToolsProtocol):
         self._keeps_alive, self.cycle.keep_alive = self.cycle.keep_alive, False  # should it be answered too early
 
     def _fault_of_headers(self) -> str:
-        """Return what HTTP/1.1 forbids about the headers, and the parser lets pass."""
+        """Return the fault of headers that HTTP/1.1 forbids and the parser accepts."""
         n_hosts = sum(name == b"host" for name, _ in self.headers)
         if n_hosts > 1 or (not n_hosts and self.parser.get_http_version() == "1.1"):
             return f"a request has one header Host, this one has {n_hosts}; send one"
@@ -292,7 +292,8 @@ class Protocol(HttpToolsProtocol):
         self._refuse("bad_request", "this is no valid HTTP/1.1 request; correct its first line, headers or chunks")
 
     def on_body(self, body: bytes) -> None:
-        """Hand a part of the body on as it is where no other waits: uvicorn copies it into a buffer and out of it."""
+        """Pass a part of the body on without a copy if no other waits: uvicorn copies it into a buffer and out of
+        it."""
         if self.is_closing:
             return
         cycle, size = self.cycle, len(body)
@@ -318,7 +319,7 @@ class Protocol(HttpToolsProtocol):
         super().on_message_complete()
 
     def on_response_complete(self) -> None:
-        """Go on with what the client has sent meanwhile."""
+        """Parse what the client has sent meanwhile."""
         if not self.flow.write_paused:
             self._stop("answer")
         super().on_response_complete()
@@ -327,7 +328,7 @@ class Protocol(HttpToolsProtocol):
 
 
 class _Transport:
-    """A transport that is closed in the protocol's way, and not read from while that has enough to parse."""
+    """A transport that closes in the protocol's way, and pauses reading while there is enough to parse."""
 
     def __init__(self, protocol: Protocol, real: Any) -> None:
         self._protocol, self._real = protocol, real

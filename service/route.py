@@ -40,17 +40,17 @@ from service.work import Call, Pool
 log = logging.getLogger("service")
 
 LEAST_COMPRESSED: Final = 2**14
-"""Bytes from which an answer is compressed for those who take it so."""
+"""Bytes from which an answer is compressed if the client accepts it."""
 _CODING: Final = re.compile(rb"([a-z0-9*-]+)\s*(?:;\s*q=([01](?:\.\d{0,3})?))?\s*(?:,|$)")
 _OF_BODY: Final = (b"content-length", b"content-type")
-"""Headers that are not a dependency's."""
+"""Headers that belong to the body, not to a dependency."""
 Part = bytes | memoryview
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
 Answer = Callable[[Request], Coroutine[Any, Any, Response]]
 
 
 def state_of(app: Any) -> Any:
-    """Return what the service keeps in `app`: in its own it is the app's state, in another's it has a name there."""
+    """Return app.state, or app.state.geometry when embedded."""
     return getattr(app.state, "geometry", app.state)
 
 
@@ -59,26 +59,26 @@ class GeometryRoute(APIRoute):
 
     @cached_property
     def adapter(self) -> TypeAdapter[Any]:
-        """Return what makes the endpoint's model of a JSON body."""
+        """Return the validator of the endpoint's model."""
         body_field: Any = self.body_field
         return TypeAdapter(body_field.field_info.annotation)
 
     async def ask(
         self, document: Any, arguments: dict[str, Any], call: Call, state: Any, finish: Callable[[Any], bytes]
     ) -> bytes | list[Fault]:
-        """Answer a question that was decoded elsewhere; return what `finish` makes of the answer, or what is wrong."""
-        found: bytes | list[Fault]
+        """Answer a question that was decoded elsewhere; return what `finish` makes of the answer, or the faults."""
+        outcome: bytes | list[Fault]
         try:
             job = _Job(self.endpoint, self.adapter, arguments, call, True)
             job.document, job.finish = document, lambda answer: [finish(answer)]
-            (found,) = await state.pool.run(call, job.answer, False)
+            (outcome,) = await state.pool.run(call, job.answer, False)
         except Exception as error:
-            found = _faults_in(error, f"{self.name} as a tool")
-        status = self.status_code or 200 if isinstance(found, bytes) else STATUS[found[0].code]
+            outcome = _faults_in(error, f"{self.name} as a tool")
+        status = self.status_code or 200 if isinstance(outcome, bytes) else STATUS[outcome[0].code]
         operation = self.operation_id or self.name
         state.metrics.count(operation, status, call.seconds)
         traces.note(operation, call.seconds)
-        return found
+        return outcome
 
     def get_route_handler(self) -> Answer:
         """Return the coroutine that answers a request."""
@@ -102,7 +102,7 @@ class GeometryRoute(APIRoute):
             try:
                 response = await answer(request, call)
             finally:
-                if not isinstance(response, _Answer):  # it ended early, and what it held is gone
+                if not isinstance(response, _Answer):  # it ended early, its memory is free
                     call.free()
             response.raw_headers += [header for header in given if header[0] not in _OF_BODY]
             operation = self.operation_id or self.name
@@ -116,7 +116,7 @@ class GeometryRoute(APIRoute):
                 headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
                 call.coding = _coding_wanted(headers.get(b"accept-encoding", b""))
                 is_small = True
-                arguments = {**request.path_params, **_queried(request, query)}
+                arguments = {**request.path_params, **_parse_query_params(request, query)}
                 job = _Job(endpoint, adapter, arguments, call, media_type is not None)
                 if media_type is not None:
                     body.check_media_type(headers, media_type)
@@ -147,7 +147,7 @@ class GeometryRoute(APIRoute):
 
 
 def _guard_of(route: APIRoute) -> Answer | None:
-    """Return what solves the dependencies that an application gave to the router, None if there are none.
+    """Return the solver of the dependencies that an application gave to the router, None if there are none.
 
     FastAPI's own handler would solve them. Newer versions do not copy them into the routes of an included router.
     """
@@ -161,7 +161,7 @@ def _guard_of(route: APIRoute) -> Answer | None:
 
 
 def _receive_of(request: Request) -> Receive:
-    """Return what hands the body on, also where a dependency of the host has read it: the framework keeps it then."""
+    """Return the receiver of the body, also if a dependency of the host has read it: the framework stores it then."""
     known: bytes | None = getattr(request, "_body", None)
     if known is None:
         return request.receive
@@ -173,13 +173,13 @@ def _receive_of(request: Request) -> Receive:
 
 
 def _path_of(request: Request) -> str:
-    """Return the path that the client asked for, as it stands in a URL."""
+    """Return the path of the request as it stands in a URL."""
     root, path = request.scope.get("root_path", ""), request.scope["path"]
     return quote(path if path.startswith(root) else root + path)
 
 
 def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
-    """Return what answers a POST, for each path without parameters."""
+    """Return the POST handler of each path without parameters."""
     routes = [route for router in routers for route in router.routes if isinstance(route, GeometryRoute)]
     return {
         route.path: route.get_route_handler()
@@ -201,11 +201,11 @@ class _Job:
     coding: str | None = None
     question: Any = None
     document: Any = None
-    """A body that was decoded elsewhere, or is long: it is let go of in steps."""
+    """A body that was decoded elsewhere, or is long: it is freed in steps."""
     finish: Callable[[Any], Iterable[Part]] | None = None
 
     def decode(self) -> None:
-        """Turn the body into the endpoint's model, and let go of it."""
+        """Decode the body into the endpoint's model, and free it."""
         if self.question is not None:
             return
         text, self.body = self.body, b""
@@ -221,7 +221,7 @@ class _Job:
                     with suppress(ValidationError):  # the other decoder keeps what pointers need
                         self.question = self.adapter.validate_python(self.document, context=self.call)
                         return
-                    pieces.let_go(self.document)
+                    pieces.free_in_steps(self.document)
                 self.call.remaining()
                 self.call.take(wire.cost_of(text))
                 self.document = wire.decode(text, self.call.remaining)
@@ -242,7 +242,7 @@ class _Job:
             if answer is None:
                 return []
             with call.phase("encode"):
-                return self._gathered((self.finish or self._encoded)(answer))
+                return self._assemble_response_parts((self.finish or self._encoded)(answer))
         except (EngineError, ServiceError) as error:
             error.where = existing(self.question, error.where)
             forget_frames(error)
@@ -250,7 +250,7 @@ class _Job:
         finally:
             document, self.document, self.question, self.arguments = self.document, None, None, {}
             if not call.is_light:
-                pieces.let_go(document)
+                pieces.free_in_steps(document)
 
     def _encoded(self, answer: Any) -> Iterable[Part]:
         if isinstance(answer, np.ndarray):
@@ -259,17 +259,17 @@ class _Job:
         self.call.check_answer(wire.least_of(answer))
         return wire.encoded(answer, self.call.remaining)
 
-    def _gathered(self, parts: Iterable[Part]) -> list[Part]:
-        """Return the parts of an answer, within its limits, compressed if that was asked for and is worth it."""
-        found, size = [], 0
+    def _assemble_response_parts(self, parts: Iterable[Part]) -> list[Part]:
+        """Return the parts of an answer, within its limits, compressed if accepted and worthwhile."""
+        gathered, size = [], 0
         for part in parts:
             self.call.take_part(part)
-            found.append(part)
+            gathered.append(part)
             size += len(part)
         if self.call.coding is None or size < LEAST_COMPRESSED:
             self.call.coding = None
-            return found
-        return [*wire.compressed(_checked(found, self.call), self.call.coding)]
+            return gathered
+        return [*wire.compressed(_checked(gathered, self.call), self.call.coding)]
 
 
 def _checked(parts: list[Part], call: Call) -> Iterable[Part]:
@@ -279,7 +279,7 @@ def _checked(parts: list[Part], call: Call) -> Iterable[Part]:
 
 
 class _Answer(Response):
-    """An answer that leaves in parts, as fast as the client reads; what it holds is given back as it leaves."""
+    """An answer that is sent in parts, as fast as the client reads; its memory is returned as it leaves."""
 
     def __init__(self, parts: list[Part], call: Call, status: int) -> None:
         self._parts, self._call = parts, call
@@ -291,7 +291,7 @@ class _Answer(Response):
         super().__init__(None, status, headers, call.media_type if parts else None)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the parts; the server waits before each until the last has left (protocol.py says for how long)."""
+        """Send the parts; the server waits before each until the last has left (see protocol.py for the limits)."""
         parts, n_parts = self._parts, len(self._parts)
         try:
             await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
@@ -305,7 +305,7 @@ class _Answer(Response):
 
 
 class _InvalidBody(Exception):
-    """A validation error together with the document it is about."""
+    """A validation error with its document."""
 
     def __init__(self, error: ValidationError, document: Any) -> None:
         super().__init__()
@@ -313,7 +313,7 @@ class _InvalidBody(Exception):
 
 
 def _faults_in(error: Exception, what: str) -> list[Fault]:
-    """Return what is wrong; what nobody expected is logged in full."""
+    """Return the faults of an error; an unexpected one is logged in full."""
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":
         log.error("%s failed", what, exc_info=error)
@@ -322,7 +322,7 @@ def _faults_in(error: Exception, what: str) -> list[Fault]:
 
 
 def _coding_wanted(header: bytes) -> str | None:
-    """Return how the client would have a large answer compressed; zstd before gzip, since it is faster and smaller."""
+    """Return the content coding that the client accepts for a large answer; zstd before gzip: faster and smaller."""
     if not header:
         return None
     wanted = _CODING.findall(header.lower())
@@ -331,29 +331,29 @@ def _coding_wanted(header: bytes) -> str | None:
 
 
 def _is_known(tags: bytes, call: Call, method: str) -> bool:
-    """Tell whether the client has the answer already, by the tags that it names."""
+    """Return whether the client has the answer already, by the tags of If-None-Match."""
     named = {tag.strip().removeprefix("W/") for tag in tags.decode("latin-1").split(",")}
     return method in ("GET", "HEAD") and call.headers.get("ETag", "") in named
 
 
-def _queried(request: Request, query: Query) -> dict[str, Any]:
-    """Return the query's parameters as declared; what is left out is the endpoint's own default."""
-    found: dict[str, Any] = {}
+def _parse_query_params(request: Request, query: Query) -> dict[str, Any]:
+    """Return the declared query parameters; the endpoint has the defaults of absent ones."""
+    values: dict[str, Any] = {}
     for name, (adapter, is_required) in query.items():
         value = request.query_params.get(name)
         if value is None and not is_required:
             continue
         try:
-            found[name] = adapter.validate_python(value)
+            values[name] = adapter.validate_python(value)
         except ValidationError as error:
             expected = str(error.errors()[0]["msg"]).replace("Input should be", "expected")
             got = "nothing" if value is None else f"{value!r:.100}"
             raise ServiceError("invalid_request", f"query parameter {name!r}: {expected}, got {got}") from None
-    return found
+    return values
 
 
 async def _run(pool: Pool, call: Call, job: Callable[[], list[Part]], receive: Receive, is_small: bool) -> list[Part]:
-    """Run `job` in the pool and throw the call's cancel switch if the client goes away meanwhile."""
+    """Run `job` in the pool and set the call's cancel switch if the client disconnects meanwhile."""
     watcher = asyncio.create_task(watch(call, receive))
     try:
         return await pool.run(call, job, is_small)
@@ -362,7 +362,7 @@ async def _run(pool: Pool, call: Call, job: Callable[[], list[Part]], receive: R
 
 
 async def watch(call: Call, receive: Receive) -> None:
-    """Throw the call's switch when the client has gone away."""
+    """Set the call's switch when the client disconnects."""
     while (await receive())["type"] != "http.disconnect":
         pass
     call.set()

@@ -1,4 +1,4 @@
-"""uvicorn's server and its supervisor of worker processes, which end in time whatever runs."""
+"""uvicorn's server and its supervisor of worker processes, which end in time whatever is running."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from service.work import THREADS
 log = logging.getLogger("service")
 
 END_SECONDS: Final = 1.5
-"""From the end of the drain until the process ends whatever still runs."""
+"""Time from the end of the drain until the process ends whatever still runs."""
 HEALTH_SECONDS: Final = 60
-"""How long a worker process may say nothing: on a busy machine to import all takes many seconds."""
+"""Time that a worker process may be silent: on a busy machine the imports take many seconds."""
 
 
 class Server(uvicorn.Server):
@@ -36,14 +36,14 @@ class Server(uvicorn.Server):
         self._clean = clean
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Begin to end, and see to it that it does."""
+        """Begin to end, and make sure that it does."""
         if not self.should_exit:
             _end_later(self.config, self._clean)
         super().handle_exit(sig, frame)
 
 
 class Supervisor(Multiprocess):
-    """The parent of worker processes: starts them, and others in their place where they end by themselves."""
+    """The parent of worker processes: starts them, and restarts those that end by themselves."""
 
     def __init__(self, config: uvicorn.Config, sockets: list[socket.socket], clean: Callable[[], object]) -> None:
         super().__init__(config, sockets)
@@ -68,7 +68,7 @@ class Supervisor(Multiprocess):
                 os.kill(process.pid, sig)  # type: ignore[arg-type]
 
     def keep_subprocess_alive(self) -> None:
-        """Start others in the place of those that have ended, and say so."""
+        """Restart worker processes that have ended, and log it."""
         before = list(self.processes)
         super().keep_subprocess_alive()
         for old, new in zip(before, self.processes):
@@ -80,7 +80,7 @@ class Supervisor(Multiprocess):
 
 
 def is_left_behind() -> bool:
-    """Tell whether a thread still runs that Python's own end would wait for, or stop within C++, which aborts."""
+    """Return whether a thread still runs that Python's exit would wait for, or abort within C++."""
     for _ in range(20):  # one that has nothing to do ends now
         if not any(thread.name.startswith((WARM_UP, THREADS)) for thread in threading.enumerate()):
             return False
@@ -89,7 +89,7 @@ def is_left_behind() -> bool:
 
 
 def end_process() -> None:
-    """End at once, with 0; threads that cannot be stopped are left behind."""
+    """Exit immediately with 0; threads that cannot be stopped are abandoned."""
     logging.shutdown()
     sys.stdout.flush()
     os._exit(0)

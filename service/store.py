@@ -1,4 +1,4 @@
-"""Solids kept between requests, named by their content; the least recently used leave when the budget is used up.
+"""Content-addressed store of solids between requests; the least recently used are evicted when the budget is used up.
 
 The store holds engine objects, so structures prepared for one request serve the next. The name of a solid is a hash
 over a version tag, its type and its arrays as little-endian bytes, each with its shape: equal input has equal names in
@@ -7,9 +7,9 @@ its operands, a scene those of its solids, and the poses of its bodies.
 
 With a folder, which replicas may share over a common volume, the memory holds what was used last, and the folder more.
 A file is named by its solid and written under another name first, so that a name never leads to half a file; one that
-was damaged all the same is known when it is read, since its name is a hash of the content: it is not served, and taken
-away. Files used longest ago leave when the folder grows beyond its budget. What the system refuses is `store_full`, or
-`store_unavailable`; what is no file, a pipe for example, is never waited for.
+is damaged all the same is detected when it is read, since its name is a hash of the content: it is not served, but
+deleted. The least recently used files are evicted when the folder grows beyond its budget. Errors of the system become
+`store_full` or `store_unavailable`; what is no file, a pipe for example, is never waited for.
 """
 
 from __future__ import annotations
@@ -43,15 +43,15 @@ log = logging.getLogger("service")
 _NAME: Final = re.compile(r"[0-9a-f]{64}")
 _PARTIAL: Final = ".part"
 _STALE_SECONDS: Final = 3600.0
-"""Age at which a partial file has no writer any more."""
+"""Age from which a partial file is abandoned."""
 
 _FULL: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _READ: Final = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 
 
 @contextlib.contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Turn what the system refuses into what is said of it."""
+def _as_store_errors(path: Path) -> Iterator[None]:
+    """Convert errors of the system to those of the service."""
     try:
         yield
     except OSError as error:
@@ -65,7 +65,7 @@ def _told(path: Path) -> Iterator[None]:
 
 
 class Folder:
-    """Writes, reads and forgets files of solids; safe to share between threads and processes."""
+    """Writes, reads and evicts files of solids; safe to share between threads and processes."""
 
     def __init__(self, path: Path, budget: int) -> None:
         self._path = path
@@ -81,7 +81,7 @@ class Folder:
         Raises: `store_full`, `store_unavailable`.
         """
         final = self._path / name
-        with _told(self._path):
+        with _as_store_errors(self._path):
             if self._touch(final):
                 return False
             octets = to_octets(solid)
@@ -101,19 +101,19 @@ class Folder:
             self._written += len(octets)
             is_time = self._written > self._budget // 16
         if is_time:
-            with _told(self._path):
+            with _as_store_errors(self._path):
                 self._shrink()
         return True
 
     def get(self, name: str) -> Solid | Scene | None:
-        """Return the solid called `name`, or None if there is no file that holds it.
+        """Return the solid called `name`, or None if no file has it.
 
         Raises: `store_unavailable`, `unsupported_solid`.
         """
         if _NAME.fullmatch(name) is None:
             return None
         path = self._path / name
-        with _told(path):
+        with _as_store_errors(path):
             octets = _content(path)
         if octets is None:
             return None
@@ -145,7 +145,7 @@ class Folder:
         return True
 
     def _sync(self) -> None:
-        """Make the new name last, where a folder can be opened (not on Windows)."""
+        """Flush the folder entry, if a folder can be opened (not on Windows)."""
         with contextlib.suppress(OSError):
             handle = os.open(self._path, os.O_RDONLY)
             try:
@@ -154,19 +154,19 @@ class Folder:
                 os.close(handle)
 
     def _shrink(self) -> None:
-        """Take away partial files whose writer is gone, and the files used longest ago while there are too many."""
+        """Delete abandoned partial files, and the least recently used files beyond the budget."""
         with self._lock:
             self._written = 0
-        found = []
+        result = []
         for entry in os.scandir(self._path):
             with contextlib.suppress(OSError):  # another process took it away
                 status = entry.stat()
                 if entry.name.endswith(_PARTIAL) and time.time() - status.st_mtime > _STALE_SECONDS:
                     os.unlink(entry.path)
                 elif _NAME.fullmatch(entry.name):
-                    found.append((status.st_mtime, status.st_size, entry.path))
-        total = sum(size for _, size, _ in found)
-        for _, size, path in sorted(found):
+                    result.append((status.st_mtime, status.st_size, entry.path))
+        total = sum(size for _, size, _ in result)
+        for _, size, path in sorted(result):
             if total <= self._budget:
                 break
             with contextlib.suppress(OSError):
@@ -175,7 +175,7 @@ class Folder:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what is in a file, None if there is none, or something else in its place."""
+    """Return the content of a file, None if there is none, or something else in its place."""
     try:
         handle = os.open(path, _READ)
     except FileNotFoundError:
@@ -192,8 +192,8 @@ def _content(path: Path) -> bytes | None:
 
 
 def to_octets(solid: Solid | Scene) -> bytes:
-    """Return the file of `solid`: an npz archive of its arrays, and of the solids that it is made of, operands first,
-    each once."""
+    """Return the file of `solid`: an npz archive of its arrays, and once of each solid it consists of, operands
+    first."""
     arrays: dict[str, Any] = {}
     nodes: list[dict[str, Any]] = []
     _add_node(solid, nodes, arrays, {})
@@ -223,7 +223,7 @@ def _add_node(solid: Any, nodes: list[dict[str, Any]], arrays: dict[str, Any], p
 
 
 def pose_rows(scene: Scene) -> Any:
-    """Return the numbers of each body's pose, rotation and translation, those of none at all where it has none."""
+    """Return rotation and translation of each body, the identity's for a body without a pose."""
     dimension = scene.solids[0].dimension
     none = np.concatenate([np.eye(dimension).ravel(), np.zeros(dimension)])
     rows = [none if pose is None else [*pose.rotation.ravel(), *pose.translation] for pose in scene.poses]
@@ -236,7 +236,7 @@ def _posed(row: Any, dimension: int) -> engine.Pose | None:
 
 
 def from_octets(octets: bytes) -> Solid | Scene:
-    """Return the solid or scene in a file; raises whatever comes up if it is damaged."""
+    """Return the solid or scene in a file; raises any error if it is damaged."""
     made: list[Any] = []
     with np.load(io.BytesIO(octets), allow_pickle=False) as arrays:
         for node in json.loads(arrays["nodes"].tobytes()):
@@ -250,14 +250,14 @@ def from_octets(octets: bytes) -> Solid | Scene:
                 kind, names = stored(node["type"])
                 values = [arrays[node[name]] for name in names]
                 made.append(kind.restored(*(value if value.ndim else value.item() for value in values)))
-    found: Solid = made[-1]
-    return found
+    result: Solid = made[-1]
+    return result
 
 
 def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
-    """Return the class of a type and the attributes that a file holds of it; `unsupported_solid` where there are none.
+    """Return the class of a type and its stored attributes; `unsupported_solid` if it has none.
 
-    Csg and scenes are made of solids.
+    Csg and scenes consist of solids.
     """
     row = engine.solid_types.get(kind)
     if row is not None and row.stored:
@@ -272,14 +272,14 @@ def stored(kind: str) -> tuple[type[Solid], tuple[str, ...]]:
 VERSION: Final = b"exact-geometry/1"
 """Changes when the meaning of any stored field does."""
 
-Kept = Solid | Scene
+Stored = Solid | Scene
 K = TypeVar("K", Solid, Scene)
 
 
-def solid_id(solid: Kept, known: dict[int, str] | None = None) -> str:
+def solid_id(solid: Stored, known: dict[int, str] | None = None) -> str:
     """Return the name of `solid`: 64 hexadecimal digits.
 
-    known: names by `id` of the solids in the tree: each is hashed once, however often it stands there.
+    known: names by `id` of the solids in the tree: each is hashed once, however often it occurs.
     """
     known = {} if known is None else known
     if id(solid) not in known:
@@ -310,7 +310,7 @@ def _parts(solid: Any, known: dict[int, str]) -> Iterator[Any]:
 
 
 class Store:
-    """A dictionary of solids and scenes by name with a budget of bytes; safe to share between threads."""
+    """A dictionary of solids and scenes by name with a budget of bytes; thread-safe."""
 
     def __init__(
         self, budget: int, folder: Path | None = None, folder_budget: int = 2**40, metrics: Metrics | None = None
@@ -318,15 +318,15 @@ class Store:
         self._budget = budget
         self._metrics = metrics or Metrics()
         self._folder = None if folder is None else Folder(folder, folder_budget)
-        self._solids: OrderedDict[str, Kept] = OrderedDict()
+        self._solids: OrderedDict[str, Stored] = OrderedDict()
         self._sizes: dict[str, int] = {}
         self._looked: dict[str, int] = {}
         self._total = 0
         self._lock = threading.Lock()
 
-    def put(self, solid: Kept) -> tuple[str, bool]:
-        """Keep `solid`, which may be a scene; return its name and whether it is new. Those used longest ago leave if
-        there is no room."""
+    def put(self, solid: Stored) -> tuple[str, bool]:
+        """Store `solid`, which may be a scene; return its name and whether it is new. May evict the least recently
+        used."""
         name, size = solid_id(solid), solid.memory
         if size > self._budget:
             raise ServiceError(
@@ -347,40 +347,42 @@ class Store:
         return self._of_kind(name, Scene, "scene")
 
     def _of_kind(self, name: str, kind: type[K], what: str) -> K:
-        if isinstance(found := self._get(name), kind):
-            return found
+        if isinstance(result := self._get(name), kind):
+            return result
         detail = f"no {what} {name[:64]!r} is stored here; put it again: POST /v1/{what}s"
         raise ServiceError(f"unknown_{what}", detail)
 
-    def _get(self, name: str) -> Kept | None:
+    def _get(self, name: str) -> Stored | None:
         with self._lock:
-            found = self._solids.get(name)
-            if found is not None:
-                self._use(name, self._size_now(name, found))
+            entry = self._solids.get(name)
+            if entry is not None:
+                self._use(name, self._size_now(name, entry))
                 self._metrics.hits["memory"].inc()
-                return found
-        found = None if self._folder is None else self._folder.get(name)
-        self._metrics.hits["nowhere" if found is None else "folder"].inc()
-        return None if found is None else self._keep(name, found)[0]
+                return entry
+        entry = None if self._folder is None else self._folder.get(name)
+        self._metrics.hits["nowhere" if entry is None else "folder"].inc()
+        return None if entry is None else self._keep(name, entry)[0]
 
-    def _size_now(self, name: str, found: Kept) -> int:
-        """Return the bytes of what is kept, structures that have been prepared since included. To count those of a
-        scene takes a microsecond a body, so it is done at its first, second, fourth, ... use."""
-        if isinstance(found, Solid):
-            return found.memory
+    def _size_now(self, name: str, entry: Stored) -> int:
+        """Return the bytes of an entry, with the structures prepared since.
+
+        Counting those of a scene takes a microsecond a body, so it is done at its first, second, fourth, ... use.
+        """
+        if isinstance(entry, Solid):
+            return entry.memory
         uses = self._looked[name] = self._looked.get(name, 0) + 1
-        return self._sizes[name] if uses & (uses - 1) else found.memory
+        return self._sizes[name] if uses & (uses - 1) else entry.memory
 
-    def _keep(self, name: str, solid: Kept) -> tuple[Kept, bool]:
+    def _keep(self, name: str, solid: Stored) -> tuple[Stored, bool]:
         """Return the one object called `name` that all threads share, and whether it is `solid`, new here."""
         with self._lock:
             is_new = name not in self._solids
-            kept = self._solids.setdefault(name, solid)
-            self._use(name, kept.memory)
-            return kept, is_new
+            stored = self._solids.setdefault(name, solid)
+            self._use(name, stored.memory)
+            return stored, is_new
 
     def _use(self, name: str, size: int) -> None:
-        """Count `size` for `name`, make it the last to leave, and let others go while there are too many bytes."""
+        """Count `size` for `name`, mark it most recently used, and evict others while there are too many bytes."""
         self._solids.move_to_end(name)
         self._total += size - self._sizes.get(name, 0)
         self._sizes[name] = size

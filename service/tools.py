@@ -33,20 +33,20 @@ from service.work import Call
 
 PATH: Final = "/mcp"
 SHOWN: Final = 10
-"""Items of a list that are shown unless more are asked for."""
+"""Items of a list that are shown by default."""
 _MOST: Final = 2**20
-"""Bytes of a request. Solids that are larger go to /v1/solids."""
-_MOST_BESIDE: Final = 2**16
-"""Bytes of a request beside a tool's arguments: the library reads them on the event loop."""
+"""Largest request in bytes. Larger solids go to /v1/solids."""
+_MOST_AROUND: Final = 2**16
+"""Bytes of a request besides a tool's arguments: the library reads them on the event loop."""
 _MOST_SHOWN: Final = 1000
-"""Items of a list shown at once, far more than a model reads."""
-_ASKED: Final = "geometry.asked"
-"""The name, in the scope of a request, of its call and a tool's arguments."""
+"""Largest number of items of a list that are shown, far more than a model reads."""
+_CALL: Final = "geometry.asked"
+"""Key, in the scope of a request, of its call and a tool's arguments."""
 _SCHEMAS: Final = "#/components/schemas/"
 _WORDS: Final = frozenset(
     ("type", "properties", "required", "items", "enum", "const", "oneOf", "$ref", "minItems", "description", "pattern")
 )
-"""What a tool's schema keeps; lengths and formats are refused with a sentence anyway."""
+"""Keywords of a tool's schema that remain; violations of the others get an error message anyway."""
 _PAGE: Final = {
     "show": {
         "type": "integer",
@@ -63,8 +63,8 @@ _INSTRUCTIONS: Final = (
 class Tools:
     """An ASGI application that answers MCP; to leave its context ends what it started.
 
-    The library is handed a request without the arguments of its call, which are decoded here, as bodies are; and of an
-    answer no more than is shown is ever written.
+    The library gets a request without the arguments of its call, which are decoded here, as bodies are; of an answer no
+    more than is shown is ever written.
     """
 
     def __init__(self, app: FastAPI, settings: Settings, routers: Iterable[APIRouter]) -> None:
@@ -97,12 +97,12 @@ class Tools:
             manager = await asyncio.shield(self._manager)  # who goes away takes it from nobody
             own = [header for header in scope["headers"] if header[0] not in (b"content-length", b"transfer-encoding")]
             own.append((b"content-length", str(len(text)).encode()))
-            passed = {**scope, "headers": own, _ASKED: (call, arguments)}
-            gone = asyncio.create_task(watch(call, receive))
+            passed = {**scope, "headers": own, _CALL: (call, arguments)}
+            disconnected = asyncio.create_task(watch(call, receive))
             try:
-                await manager.handle_request(passed, _replayed(text, gone), send)
+                await manager.handle_request(passed, _replayed(text, disconnected), send)
             finally:
-                gone.cancel()
+                disconnected.cancel()
         except (ServiceError, EngineError) as error:
             await problem(faults_of(error))(scope, receive, send)
         except ClientDisconnect:
@@ -111,7 +111,7 @@ class Tools:
             call.free()
 
     async def _hold(self, began: asyncio.Future[Any]) -> None:
-        """Run the library's manager, which must be entered and left by one task; hand it, or why not, to `began`."""
+        """Run the library's manager, which one task must enter and leave; pass it, or its error, to `began`."""
         try:
             manager = await asyncio.to_thread(self._made)
             async with manager.run():
@@ -153,7 +153,7 @@ class Tools:
             if params.name not in calls:
                 text, is_error = f"there is no tool {params.name[:100]!r}; the tools are {', '.join(calls)}", True
             else:
-                call, arguments = context.request.scope[_ASKED]
+                call, arguments = context.request.scope[_CALL]
                 text, is_error = await self._call(calls[params.name][0], arguments, call)
             return types.CallToolResult(content=[types.TextContent(type="text", text=text)], is_error=is_error)
 
@@ -167,16 +167,16 @@ class Tools:
         return StreamableHTTPSessionManager(server, json_response=True, stateless=True, max_request_body_size=_MOST)
 
     async def _call(self, path: str, given: dict[str, Any], call: Call) -> tuple[str, bool]:
-        """Return what a call answers, in short, and whether it is an error."""
+        """Return the short answer of a call, and whether it is an error."""
         show, start = (_count(given.pop(name, default)) for name, default in (("show", SHOWN), ("start", 0)))
         if show is None or start is None or show > _MOST_SHOWN:
             return f"show and start are whole numbers, 0 or more, show at most {_MOST_SHOWN}", True
         arguments: dict[str, Any] = {}
         for name in _parameters(path):
-            found = given.pop(name, None)
-            if not isinstance(found, str) or not found:
+            present = given.pop(name, None)
+            if not isinstance(present, str) or not present:
                 return f"{name} is missing: it is the id that the call which stored it answered with", True
-            arguments[name] = found
+            arguments[name] = present
         if path == "/v1/solids":
             given = given.get("solid", given)
 
@@ -194,7 +194,7 @@ class Tools:
 def check_origin(headers: dict[bytes, bytes], settings: Settings) -> None:
     """Raise `wrong_origin` if another site's page asks, through a browser of somebody who may.
 
-    A page's site stands in Origin. Where no key is asked for and only this machine may ask, Host must name it: a page
+    A page's site stands in Origin. Without keys and on a loopback address, Host must name this machine: a page
     may have its site's name lead here, and then is of one origin with the service.
     """
     host, origin = (headers.get(name, b"").decode("latin-1").lower() for name in (b"host", b"origin"))
@@ -222,7 +222,7 @@ def _is_loopback(name: str) -> bool:
 
 
 def _parted(text: Body, call: Call) -> tuple[bytes, dict[str, Any]]:
-    """Return a request of the protocol as the library reads it, without the arguments of a tool, and these."""
+    """Return a request of the protocol without the arguments of a tool, for the library, and the arguments."""
     call.remaining()  # it may have waited past its deadline
     call.take(wire.cost_of(text))
     message = wire.decode(text, call.remaining)
@@ -235,19 +235,19 @@ def _parted(text: Body, call: Call) -> tuple[bytes, dict[str, Any]]:
             text = json.dumps(message).encode()
         else:
             params["arguments"], arguments = arguments, {}  # the library refuses it
-    if len(text) > _MOST_BESIDE:
-        raise ServiceError("body_too_large", f"a request holds {_MOST_BESIDE} bytes at most beside a tool's arguments")
+    if len(text) > _MOST_AROUND:
+        raise ServiceError("body_too_large", f"a request holds {_MOST_AROUND} bytes at most beside a tool's arguments")
     return bytes(memoryview(text)), arguments
 
 
-def _replayed(text: bytes, gone: asyncio.Task[None]) -> Receive:
-    """Return what hands a body on, and then waits for the client to go away."""
+def _replayed(text: bytes, disconnected: asyncio.Task[None]) -> Receive:
+    """Return a receiver that delivers a body, and then waits for the client to disconnect."""
     waiting: list[Message] = [{"type": "http.request", "body": text, "more_body": False}]
 
     async def receive() -> Message:
         if waiting:
             return waiting.pop()
-        await asyncio.wait([gone])
+        await asyncio.wait([disconnected])
         return {"type": "http.disconnect"}
 
     return receive
@@ -262,7 +262,7 @@ def _parameters(path: str) -> list[str]:
 
 
 def _input(path: str, operation: dict[str, Any], document: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a tool's arguments: the body's model, what the path has in it, and which items to show."""
+    """Return the schema of a tool's arguments: the body's model, path parameters, and which items to show."""
     schemas = document["components"]["schemas"]
     reference = operation["requestBody"]["content"][JSON]["schema"]
     body = schemas[reference["$ref"].removeprefix(_SCHEMAS)]
@@ -275,14 +275,14 @@ def _input(path: str, operation: dict[str, Any], document: dict[str, Any]) -> di
     made["properties"] = {**ids, **made["properties"], **_PAGE}
     made["required"] = [*ids, *made.get("required", [])]
     made.pop("description", None)
-    found: dict[str, Any] = {}
+    present: dict[str, Any] = {}
     waiting = _names(made)
     while waiting:  # bound: each name is taken in once
         name = waiting.pop()
-        if name not in found:
-            found[name] = _terse(schemas[name])
-            waiting += _names(found[name])
-    return {**made, "$defs": dict(sorted(found.items()))}
+        if name not in present:
+            present[name] = _terse(schemas[name])
+            waiting += _names(present[name])
+    return {**made, "$defs": dict(sorted(present.items()))}
 
 
 def _in_a_sentence(union: dict[str, Any], schemas: dict[str, Any]) -> dict[str, Any]:

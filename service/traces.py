@@ -17,14 +17,14 @@ from fastapi import FastAPI
 
 log = logging.getLogger("service")
 
-_ASKED: Final = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_TRACES_EXPORTER")
+_VARIABLES: Final = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_TRACES_EXPORTER")
 _PARENT: Final = re.compile(rb"(?!ff)[0-9a-f]{2}-(?!0{32})([0-9a-f]{32})-(?!0{16})[0-9a-f]{16}-[0-9a-f]{2}(?:-.*)?")
 
 
 @cache
 def is_exporting() -> bool:
-    """Tell whether spans are asked for and can be sent; says in the log where only one of the two holds."""
-    if not any(map(os.environ.get, _ASKED)) or os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
+    """Return whether spans are requested and can be sent; log if only one of the two holds."""
+    if not any(map(os.environ.get, _VARIABLES)) or os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
         return False
     if any(find_spec(f"opentelemetry.{part}") is None for part in ("sdk", "exporter", "instrumentation")):
         log.warning("OTEL_* variables are set, but the extra `telemetry` is not installed: no spans are sent")
@@ -33,7 +33,7 @@ def is_exporting() -> bool:
 
 
 def export(app: FastAPI) -> None:
-    """Make every request a span, health checks left out, where that is asked for."""
+    """Make every request a span, except health checks, if requested."""
     if not is_exporting():
         return
     from opentelemetry import trace
@@ -54,7 +54,7 @@ def export(app: FastAPI) -> None:
 
 
 def trace_of(headers: Mapping[bytes, bytes]) -> tuple[dict[str, str], bytes]:
-    """Return what a log line says of the trace that a request belongs to, and `traceresponse`, empty without a span."""
+    """Return the log fields of the trace that a request belongs to, and `traceresponse`, empty without a span."""
     if is_exporting():
         from opentelemetry import trace
 
@@ -62,12 +62,12 @@ def trace_of(headers: Mapping[bytes, bytes]) -> tuple[dict[str, str], bytes]:
         if context.is_valid:
             fields = {"trace_id": f"{context.trace_id:032x}", "span_id": f"{context.span_id:016x}"}
             return fields, f"00-{'-'.join(fields.values())}-{context.trace_flags:02x}".encode()
-    found = _PARENT.fullmatch(headers.get(b"traceparent", b""))
-    return {"trace_id": found[1].decode()} if found else {}, b""
+    match = _PARENT.fullmatch(headers.get(b"traceparent", b""))
+    return {"trace_id": match[1].decode()} if match else {}, b""
 
 
 def note(operation: str, seconds: Mapping[str, float]) -> None:
-    """Write the time of each phase, in milliseconds, on the span of the request under way."""
+    """Write the time of each phase, in milliseconds, on the span of the running request."""
     if is_exporting():
         from opentelemetry import trace
 

@@ -1,4 +1,4 @@
-"""Bytes to Python values and back: the only file that knows which JSON library does it.
+"""Encodes and decodes JSON: the only file that knows the JSON libraries.
 
 Decoding: jiter, pydantic's own parser, as fast as orjson and stricter: integers of any size stay integers, 1e400 and
 NaN arrive as infinity and NaN and are refused later with a pointer, a field that stands twice is refused. Floats come
@@ -27,9 +27,9 @@ from service.decoding.numbers import Unfit
 from service.errors import ServiceError
 
 PART: Final = 20_000
-"""Numbers encoded at once: half a millisecond."""
+"""Numbers encoded per step: half a millisecond."""
 SENT: Final = 2**17
-"""Bytes sent at once, about: parts are put together up to that."""
+"""Approximate bytes per send: parts are joined up to that."""
 _REMEDIES: Final = {
     "Detected duplicate key": "leave one of the two out",
     "a name, text or number": "shorten it",
@@ -41,14 +41,14 @@ _BOM: Final = b"\xef\xbb\xbf"
 
 
 def no_poll() -> None:
-    """Let the work go on."""
+    """Do nothing: stands for a poll."""
 
 
 class Series(NamedTuple):
     """A list of an answer whose items are made when they are written.
 
-    make: returns the items from one index up to another. n: how many there are. weight: numbers in one, about; where
-    they differ, offsets (n + 1,) says how many stand before each. least: bytes that all together take, at least.
+    make: returns the items from one index up to another. n: their number. weight: approximate numbers in one; if they
+    differ, offsets (n + 1,) has the numbers before each. least: least bytes of all together.
     """
 
     n: int
@@ -58,7 +58,7 @@ class Series(NamedTuple):
     least: int = 0
 
     def cuts(self, start: int = 0, stop: int | None = None) -> Iterator[tuple[int, int]]:
-        """Yield where parts of the items from one up to another begin and end."""
+        """Yield start and stop of the parts of the items from one up to another."""
         end = self.n if stop is None else min(stop, self.n)
         while start < end:  # bound: each turn takes an item at least
             stop = start + max(1, PART // self.weight)
@@ -76,22 +76,21 @@ class Series(NamedTuple):
 
 
 class Raw(NamedTuple):
-    """A part of an answer that is JSON already."""
+    """A part of an answer that is already JSON."""
 
     text: bytes
 
 
 def series_of(array: Any) -> Any:
-    """Return rows of numbers as they are written: in parts where they are many."""
+    """Return rows of numbers for an answer: in parts if they are many."""
     return array if array.size <= PART else Series(len(array), lambda start, stop: array[start:stop], len(array[0]))
 
 
 def decode_fast(body: pieces.Body, take: Callable[[int], object] = lambda n: None, poll: Poll = no_poll) -> Any:
-    """Return what `decode` returns, with ndarrays in the place of long arrays of numbers; None if there are none, or
-    if anything about the body is not as it should be: then `decode` finds out what.
+    """Return the result of `decode` with ndarrays for long arrays of numbers; None if there are none, or on any fault.
 
-    take: told how many bytes more that holds, fewer again where it returns None; poll: called now and then. What they
-    raise ends the work.
+    take: called with the additional bytes, fewer again if it returns None; poll: called now and then. What they raise
+    ends the work.
     """
     if len(body) < arrays.LEAST:
         return None
@@ -110,7 +109,7 @@ def decode_fast(body: pieces.Body, take: Callable[[int], object] = lambda n: Non
 
 
 def decode(body: pieces.Body, poll: Callable[[], object] = lambda: None) -> Any:
-    """Return the value that the JSON text `body` stands for; `not_json` otherwise.
+    """Return the value of the JSON text `body`; `not_json` otherwise.
 
     poll: called now and then; what it raises ends the work.
     """
@@ -121,11 +120,11 @@ def decode(body: pieces.Body, poll: Callable[[], object] = lambda: None) -> Any:
 
 
 def cost_of(body: pieces.Body) -> int:
-    """Return how many bytes `decode` holds at most beyond what is counted for each byte; little is not counted."""
+    """Return an upper bound on the bytes that `decode` needs beyond those counted for each byte; little is ignored."""
     return 0 if len(body) < arrays.LEAST else pieces.cost_of(body)
 
 
-def _refusal(body: pieces.Body, found: str) -> str:
+def _refusal(body: pieces.Body, message: str) -> str:
     text = bytes(memoryview(body)[: pieces.PIECE])
     if len(text) == len(body) and not text.strip():
         return "the body is empty; send a JSON object, /docs has an example for each call"
@@ -133,8 +132,8 @@ def _refusal(body: pieces.Body, found: str) -> str:
         return "the body begins with a byte order mark; send it as UTF-8 without one"
     if text[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "the body is UTF-16; send it as UTF-8"
-    what = next((what for begun, what in _REMEDIES.items() if found.startswith(begun)), "correct it there")
-    return f"the body is no JSON that is taken here: {found:.200}; {what}"
+    what = next((what for begun, what in _REMEDIES.items() if message.startswith(begun)), "correct it there")
+    return f"the body is no JSON that is taken here: {message:.200}; {what}"
 
 
 def encode(answer: Any, poll: Poll = no_poll) -> bytes:
@@ -143,8 +142,8 @@ def encode(answer: Any, poll: Poll = no_poll) -> bytes:
 
 
 def encoded(answer: Any, poll: Poll = no_poll) -> Iterator[bytes]:
-    """Yield the JSON of an answer in parts, one where it is short; poll: called between parts, also those of one item
-    that is long by itself."""
+    """Yield the JSON of an answer in parts, one if it is short; poll: called between parts, also those of a long
+    item."""
     if isinstance(answer, BaseModel) and any(map(_is_long, vars(answer).values())):
         yield from _together(_pieces(answer, poll))
     elif isinstance(answer, Series):
@@ -154,7 +153,7 @@ def encoded(answer: Any, poll: Poll = no_poll) -> Iterator[bytes]:
 
 
 def least_of(answer: Any) -> int:
-    """Return how many bytes an answer takes at least, as far as that is known before it is made."""
+    """Return a lower bound on the bytes of an answer, as far as known before it is made."""
     items = vars(answer).values() if isinstance(answer, BaseModel) else ()
     return sum(item.least for item in items if isinstance(item, Series))
 
@@ -171,17 +170,17 @@ def _is_long(value: Any) -> bool:
 
 
 def _together(pieces: Iterable[bytes | memoryview]) -> Iterator[bytes]:
-    """Yield short pieces put together."""
-    kept: list[bytes | memoryview] = []
+    """Yield short pieces joined."""
+    waiting: list[bytes | memoryview] = []
     size = 0
     for piece in pieces:
-        kept.append(piece)
+        waiting.append(piece)
         size += len(piece)
         if size >= SENT:
-            yield b"".join(kept)
-            kept, size = [], 0
-    if kept:
-        yield b"".join(kept)
+            yield b"".join(waiting)
+            waiting, size = [], 0
+    if waiting:
+        yield b"".join(waiting)
 
 
 def _pieces(answer: BaseModel, poll: Poll) -> Iterator[bytes | memoryview]:

@@ -1,7 +1,7 @@
-"""Work off the event loop: a bounded queue before a few threads, and what one call carries with it.
+"""Thread pool of the service: a bounded queue before a few threads, and the context of one call.
 
 A request is one job: decode, convert, compute, encode, all in one thread, so there is one hand-over. Long engine calls
-cut themselves into chunks of 1-3 ms over the engine's own pool, so short requests slip between the chunks of long ones.
+run in chunks of 1-3 ms over the engine's own pool, so short requests slip between the chunks of long ones.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ _INSTEAD: Final = {
     "overlay_batch": "send fewer pairs at once",
     "overlay": "cut both polygons by windows first and overlay window by window",
 }
-"""What to ask where an answer would be too large."""
+"""Advice for requests whose answer would be too large."""
 PHASES: Final = ("decode", "prepare", "compute", "encode")
 
 
 THREADS: Final = "geometry-"
-"""Begins the names of threads that answer requests."""
+"""Prefix of the names of threads that answer requests."""
 _LATE: Final = "late"
 GRACE: Final = 0.2
-"""Seconds that a request has after its deadline to say itself what it did not get done."""
+"""Seconds that a request has after its deadline to report by itself."""
 
 
 class _Phase:
@@ -64,9 +64,9 @@ class _Phase:
 
 
 class Call(Cancel):
-    """One request under way: its limits, the store, its deadline, the time each phase took, and the memory it holds.
+    """One running request: its limits, the store, its deadline, the time of each phase, and its memory.
 
-    It is the switch that the engine is given, to end it, and to be told of the size of what it gathers.
+    It is the engine's `Cancel` of the request: it ends the engine's call, and is notified before an answer grows.
     """
 
     __slots__ = (
@@ -85,7 +85,7 @@ class Call(Cancel):
         self.coding: str | None = None
         """How the answer is compressed."""
         self.instead: str | None = None
-        """What to ask for where the answer would be too large, once it is asked for."""
+        """Advice if the answer would be too large."""
         self.is_light = False  # then it ends before a deadline's timer could be started
         self.may_wait = False  # on the event loop it would hold up everybody
         self.start_clock()
@@ -95,7 +95,7 @@ class Call(Cancel):
         self.headers: dict[str, str] = {}
 
     def start_clock(self) -> None:
-        """Count the time to the deadline from now on."""
+        """Start the time to the deadline."""
         self.end = time.monotonic() + self.settings.deadline_seconds
 
     def phase(self, name: str) -> _Phase:
@@ -103,11 +103,11 @@ class Call(Cancel):
         return _Phase(self.seconds, name)
 
     def take(self, n_bytes: int) -> None:
-        """Account for so many bytes more (fewer if negative): of the body, of what is made of it, of the answer.
+        """Account for n_bytes more (fewer if negative): of the body, of its values, of the answer.
 
-        Raises, with nothing counted: `body_too_large` or `answer_too_large` where this request alone would hold more
-        than all may, `out_of_memory` where others hold what it needs; what takes next to nothing is always given. Off
-        the event loop it waits for others that are about to give theirs back.
+        Raises, with nothing counted: `body_too_large` or `answer_too_large` if this request alone would need more than
+        all may, `out_of_memory` if others use what it needs; next to nothing is always granted. Off the event loop it
+        waits for others that are about to return theirs.
         """
         memory = self._memory
         with memory.lock:
@@ -119,7 +119,7 @@ class Call(Cancel):
             self._most = max(self._most, self._taken)
 
     async def wait_for(self, n_bytes: int) -> None:
-        """Raise as `take` would, without taking; wait while others are about to give back what is missing."""
+        """Raise as `take` would, without taking; wait while others are about to return what is missing."""
         memory = self._memory
         while memory.leaving and memory.taken + n_bytes > memory.limit:  # bound: until they have
             await asyncio.sleep(LATER / 10)
@@ -144,7 +144,7 @@ class Call(Cancel):
         self.take(len(part))
 
     def check_answer(self, n_bytes: int) -> None:
-        """Raise at once what `take_part` would where an answer gets so long at least."""
+        """Raise immediately what `take_part` would if an answer gets at least so long."""
         self._check_answer(n_bytes)
         self.take(n_bytes)
         self.take(-n_bytes)
@@ -159,7 +159,7 @@ class Call(Cancel):
         return ServiceError("body_too_large" if self.instead is None else "answer_too_large", detail)
 
     def run(self, job: Callable[[], T]) -> T:
-        """Return what `job` returns, in a thread: what it holds is counted until it ends, though nobody waits."""
+        """Return the result of `job`, in a thread: its memory counts until it ends, even if nobody waits."""
         self.may_wait = self._is_running = True
         try:
             return job()
@@ -184,7 +184,8 @@ class Call(Cancel):
         self._memory.free(taken, most)
 
     def remaining(self) -> float:
-        """Return the seconds left; `deadline_exceeded` if there are none, `cancelled` if nobody waits any more."""
+        """Return the seconds left; raise `deadline_exceeded` if there are none, `cancelled` if nobody waits any
+        more."""
         if self.is_set:
             raise CancelledError("the request was cancelled; send it again")
         left = self.end - time.monotonic()
@@ -193,7 +194,7 @@ class Call(Cancel):
         return left
 
     def too_late(self) -> DeadlineExceededError:
-        """Return what is said once the deadline has passed."""
+        """Return the error for a passed deadline."""
         seconds = self.settings.deadline_seconds
         return DeadlineExceededError(
             f"the deadline of {seconds} s passed before the answer was there; ask for less at once, or raise "
@@ -204,12 +205,12 @@ class Call(Cancel):
         self,
         function: Callable[..., Any],
         *arguments: Any,
-        retold: Callable[[EngineError], None] | None = None,
+        rewrite_error: Callable[[EngineError], None] | None = None,
         **options: Any,
     ) -> tuple[Any, Accuracy]:
         """Call an engine function within the time left; return its result and the report of its accuracy.
 
-        retold: makes an engine error, which speaks of the function's arguments, one that speaks of the request.
+        rewrite_error: rewrites the argument paths of an engine error to request paths.
         """
         if not self.is_light:
             self.instead = _INSTEAD.get(function.__name__, "ask for less at once")
@@ -220,8 +221,8 @@ class Call(Cancel):
             except DeadlineExceededError:
                 raise self.too_late() from None
             except EngineError as error:
-                if retold is not None:
-                    retold(error)
+                if rewrite_error is not None:
+                    rewrite_error(error)
                 raise
         return result, accuracy
 
@@ -250,7 +251,7 @@ class _Lane:
 
 
 class Pool:
-    """Two lanes, so that small questions need not wait behind large ones."""
+    """Two lanes of threads, so that small questions need not wait behind large ones."""
 
     def __init__(self, settings: Settings, metrics: Metrics) -> None:
         self._metrics = metrics
@@ -258,18 +259,20 @@ class Pool:
         self._lock = threading.Lock()
 
     def check_room(self) -> None:
-        """Raise `queue_full` if another large question would not be taken now."""
+        """Raise `queue_full` if another large question would not be accepted now."""
         self._lanes[False].check_room()
 
     def is_stuck(self) -> bool:
-        """Tell whether every thread for large questions works on one whose deadline has passed."""
+        """Return whether every thread for large questions works on one whose deadline has passed."""
         lane, late = self._lanes[False], time.monotonic() - 2 * GRACE
         with self._lock:
             return sum(call.end < late for call in lane.under_way) >= lane.n_threads
 
     async def run(self, call: Call, job: Callable[[], T], is_small: bool) -> T:
-        """Run `job` in a thread. If it does not end in time, or this coroutine is cancelled, the call's switch is
-        thrown; where it has not begun yet, it never does, and leaves its place at once."""
+        """Run `job` in a thread. If it does not end in time, or this coroutine is cancelled, set the call's switch.
+
+        A job that has not begun yet never does, and leaves its place in the queue immediately.
+        """
         lane = self._lanes[is_small]
         with self._lock:
             lane.check_room()
@@ -304,7 +307,7 @@ class Pool:
             timer.cancel()
 
     def close(self, seconds: float = 0.0) -> None:
-        """Cancel what still runs, take nothing more, and wait some time for the end of it."""
+        """Cancel running jobs, accept no more, and wait some time for their end."""
         with self._lock:
             for call in [call for lane in self._lanes.values() for call in lane.under_way]:
                 call.set()

@@ -6,7 +6,7 @@
     python -m benchmarks answers --tenth 3  # a tenth of the chunks of every operation; --only WORD: chunks so named
 
 Questions are drawn with nothing but raw random bits and + - * / sqrt, no libm and no BLAS, so they too are the same
-everywhere. An operation's questions are cut into chunks, each drawn from its own name, with solids made anew. Times,
+everywhere. An operation's questions are cut into chunks, each drawn from its own name, with new solids. Times,
 counters and names of methods are left out: whoever restructures the engine may change them, an answer never.
 """
 

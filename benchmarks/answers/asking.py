@@ -1,5 +1,5 @@
-"""Families of questions, cut into chunks that are drawn, asked and hashed each by itself: numbers by their bits in one
-fixed layout, whatever type or machine they come from."""
+"""Families of questions, cut into chunks that are drawn, run and hashed separately: numbers by their bits in one fixed
+layout, whatever type or machine they come from."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ import engine
 from benchmarks.answers.draws import Draw
 
 Question = Callable[..., tuple[int, Any]]
-"""Asked with `workers`, a number of them, returns how many questions it was and what goes into the hash."""
+"""Called with `workers`, returns the number of questions and the values to hash."""
 Drawn = Callable[[Draw], Iterator[Question]]
 
 
 class Chunk(NamedTuple):
-    """Some questions of a family; its name is all that they depend on."""
+    """Some questions of a family; they depend on its name only."""
 
     operation: str
     name: str
@@ -51,7 +51,7 @@ CHUNKS: dict[str, dict[str, Chunk]] = {}
 
 
 def answered(question: Question, workers: int | None) -> tuple[int, Any]:
-    """Return the answer, an error's name, place and message if it is refused."""
+    """Return the answer, or an error's name, place and message."""
     try:
         return question(workers=workers)
     except engine.EngineError as error:
@@ -59,14 +59,14 @@ def answered(question: Question, workers: int | None) -> tuple[int, Any]:
 
 
 def family(operation: str, name: str, n_chunks: int, drawn: Drawn) -> None:
-    """Enter a family of questions under its name."""
+    """Register a family of questions under its name."""
     for number in range(n_chunks):
         chunk = Chunk(operation, f"{name}/{number}", drawn)
         CHUNKS.setdefault(operation, {})[chunk.name] = chunk
 
 
 def drawn_by(operation: str, n_chunks: int) -> Callable[[Drawn], Drawn]:
-    """Enter a family of questions; its name is that of the function."""
+    """Register a family of questions under the name of the function."""
 
     def enter(drawn: Drawn) -> Drawn:
         family(operation, drawn.__name__, n_chunks, drawn)
@@ -76,25 +76,25 @@ def drawn_by(operation: str, n_chunks: int) -> Callable[[Drawn], Drawn]:
 
 
 def asker(ask: Callable[..., Any], names: str = "", accuracy: str = "decisions") -> Callable[..., tuple[int, Any]]:
-    """Return what asks an operation about many items: these columns of its answer and of what it says of itself."""
+    """Return a function that runs an operation on many items and returns these columns of answer and report."""
 
     def asked(items: Any, *rest: Any, workers: int | None = None) -> tuple[int, Any]:
-        found, said = ask(items, *rest, workers=workers, report=True)
-        columns = [getattr(found, name) for name in names.split()] if names else [found]
+        result, said = ask(items, *rest, workers=workers, report=True)
+        columns = [getattr(result, name) for name in names.split()] if names else [result]
         return len(items), columns + [getattr(said, name) for name in accuracy.split()]
 
     return asked
 
 
 class OrderMattersError(Exception):
-    """The same geometry, its faces or vertices named in another order, has another answer."""
+    """The same geometry with faces or vertices in another order has another answer."""
 
 
-def same(found: Any, expected: Any, what: str) -> Any:
-    """Return `found` if it is as expected."""
-    if digest(found) != digest(expected):
+def same(result: Any, expected: Any, what: str) -> Any:
+    """Return `result` if it equals `expected`; raise otherwise."""
+    if digest(result) != digest(expected):
         raise OrderMattersError(f"{what} in another order: another answer")
-    return found
+    return result
 
 
 _LAYOUTS = {"b": "<u1", "i": "<i8", "u": "<i8", "f": "<f8"}
@@ -102,9 +102,9 @@ _LAYOUTS = {"b": "<u1", "i": "<i8", "u": "<i8", "f": "<f8"}
 
 def digest(value: Any) -> str:
     """Return 16 hexadecimal digits that stand for `value`."""
-    found = hashlib.sha256()
-    _feed(found, value)
-    return found.hexdigest()[:16]
+    result = hashlib.sha256()
+    _feed(result, value)
+    return result.hexdigest()[:16]
 
 
 def joined(digests: Iterable[str]) -> str:
@@ -112,35 +112,35 @@ def joined(digests: Iterable[str]) -> str:
     return hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
-def _feed(found: Any, value: Any) -> None:
+def _feed(result: Any, value: Any) -> None:
     match value:
         case Enum():
-            _feed(found, value.value)
+            _feed(result, value.value)
         case np.ndarray():
-            _feed_array(found, value)
+            _feed_array(result, value)
         case None | bool() | np.bool_():
-            found.update(b"-" if value is None else b"T" if value else b"F")
+            result.update(b"-" if value is None else b"T" if value else b"F")
         case int() | np.integer() | Fraction():
-            found.update(
+            result.update(
                 f"n{int(value.numerator):x}/{int(value.denominator):x};".encode()
             )  # decimal digits are limited
         case float():
-            found.update(b"f" + struct.pack("<d", value if value == value else float("nan")))
+            result.update(b"f" + struct.pack("<d", value if value == value else float("nan")))
         case str() | bytes():
             text = value.encode() if isinstance(value, str) else value
-            found.update(f"{type(value).__name__}{len(text)}:".encode() + text)
+            result.update(f"{type(value).__name__}{len(text)}:".encode() + text)
         case dict():
-            _feed(found, sorted(value.items()))
+            _feed(result, sorted(value.items()))
         case list() | tuple():
-            found.update(f"l{len(value)}:".encode())
+            result.update(f"l{len(value)}:".encode())
             for item in value:
-                _feed(found, item)
+                _feed(result, item)
         case _:
             raise TypeError(f"no digest of {type(value).__name__}")
 
 
-def _feed_array(found: Any, array: np.ndarray) -> None:
+def _feed_array(result: Any, array: np.ndarray) -> None:
     fixed = np.ascontiguousarray(array, _LAYOUTS[array.dtype.kind])
     if array.dtype.kind == "f":
         fixed = np.where(np.isnan(fixed), np.float64("nan"), fixed)
-    found.update(f"a{array.dtype.kind}{array.shape}".encode() + fixed.tobytes())
+    result.update(f"a{array.dtype.kind}{array.shape}".encode() + fixed.tobytes())

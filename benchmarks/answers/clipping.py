@@ -48,7 +48,7 @@ family("clip_segments", "on_regions_far_away", 10, lambda draw: _on_regions(draw
 
 @drawn_by("clip_segments", 6)
 def batches(draw: Draw) -> Iterator[Question]:
-    """Long batches of easy segments, on convex regions and on boundaries that the first batch prepares cells for."""
+    """Long batches of easy segments, on convex regions and on boundaries for which the first batch builds cells."""
     for maker in (solids.aabb, solids.convex, solids.sphere):
         shape = maker(draw, draw.pick([2, 3]))
         yield partial(segments_clipped, draw.uniform(-6.0, 6.0, 5000, 2, shape.solid.dimension), shape.solid)
@@ -111,7 +111,7 @@ NAMES = ("source", "body", "start", "end", "t", "faces", "ranks")
 
 
 def clipped(scene: engine.Scene, segments: Array, workers: int | None) -> tuple[int, Any]:
-    """Ask for all pieces, the first, and any; the last two follow from the first."""
+    """Clip with keep all, first and any; the last two must follow from the first."""
     every: Any = scene.clip_segments(segments, workers=workers)
     first: Any = scene.clip_segments(segments, keep="first", workers=workers)
     met: Any = scene.clip_segments(segments, keep="any", workers=workers)
@@ -123,12 +123,12 @@ def clipped(scene: engine.Scene, segments: Array, workers: int | None) -> tuple[
 
 
 def moved(scene: engine.Scene, steps: dict[int, Any], segments: Array, workers: int | None) -> tuple[int, Any]:
-    """Ask a scene of which bodies moved, which answers as one that is made so."""
+    """Query a scene some of whose bodies moved; it must answer like a new one."""
     after = scene.moved(steps)
     n, answer = clipped(after, segments, workers)
-    anew: Any = engine.Scene(list(after.solids), list(after.poses)).clip_segments(segments, workers=workers)
+    rebuilt: Any = engine.Scene(list(after.solids), list(after.poses)).clip_segments(segments, workers=workers)
     for name, column in zip(NAMES, answer):
-        same(column, getattr(anew, name), "a scene made anew")
+        same(column, getattr(rebuilt, name), "a scene made anew")
     return n + len(segments), answer
 
 

@@ -28,25 +28,25 @@ def _has_inside(*pair: Any) -> bool:
 
 
 def collided(first: Any, second: Any, poses: tuple[Any, Any], workers: int | None) -> tuple[int, Any]:
-    """Ask for the relation, for one of eight, for yes or no, and for the relation the other way round."""
-    kept = {"first_pose": poses[0], "second_pose": poses[1], "workers": workers}
-    found = engine.collide(first, second, detail=_has_inside(first, second), **kept)
-    meets = engine.collide(first, second, boolean=True, **kept).relation != engine.Relation.DISJOINT
+    """Query the relation, the RCC-8 relation, the Boolean, and the relation of the swapped pair."""
+    remaining = {"first_pose": poses[0], "second_pose": poses[1], "workers": workers}
+    result = engine.collide(first, second, detail=_has_inside(first, second), **remaining)
+    meets = engine.collide(first, second, boolean=True, **remaining).relation != engine.Relation.DISJOINT
     swapped = engine.collide(second, first, first_pose=poses[1], second_pose=poses[0], workers=workers).swapped()
-    same(meets, found.relation != engine.Relation.DISJOINT, "yes or no")
-    same(swapped.relation, found.relation, "two bodies")
-    return 3, [found.relation, found.detail]
+    same(meets, result.relation != engine.Relation.DISJOINT, "yes or no")
+    same(swapped.relation, result.relation, "two bodies")
+    return 3, [result.relation, result.detail]
 
 
 def witnessed(first: Any, second: Any, poses: tuple[Any, Any], workers: int | None) -> tuple[int, Any]:
-    found = engine.collide(first, second, first_pose=poses[0], second_pose=poses[1], workers=workers)
-    return 1, said(found.witness)
+    result = engine.collide(first, second, first_pose=poses[0], second_pose=poses[1], workers=workers)
+    return 1, said(result.witness)
 
 
 def posed(first: Any, second: Any, turns: Array, moves: Array, workers: int | None) -> tuple[int, Any]:
-    asked = (first, second, turns, moves)
-    meets = engine.collide_poses(*asked, boolean=True, workers=workers) != engine.Relation.DISJOINT
-    relations = engine.collide_poses(*asked, workers=workers)
+    queried = (first, second, turns, moves)
+    meets = engine.collide_poses(*queried, boolean=True, workers=workers) != engine.Relation.DISJOINT
+    relations = engine.collide_poses(*queried, workers=workers)
     same(meets, relations != engine.Relation.DISJOINT, "yes or no")
     return 2 * len(turns), relations
 
@@ -61,7 +61,7 @@ def posed_witnessed(first: Any, second: Any, turns: Array, moves: Array, workers
 
 
 def parted(first: Any, second: Any, turns: Array, moves: Array, workers: int | None) -> tuple[int, Any]:
-    """Ask how far apart, and whether as far as half of them are."""
+    """Query the distances, and whether they are at least the median."""
     distances = engine.clearance_poses(first, second, turns, moves, workers=workers)
     least = 1.001 * float(np.median(distances))  # no distance: those are rounded, the bound is not
     same(
@@ -74,13 +74,13 @@ def parted(first: Any, second: Any, turns: Array, moves: Array, workers: int | N
 
 
 def scene_collided(bodies: list[Any], poses: Any, options: dict[str, Any], workers: int | None) -> tuple[int, Any]:
-    found = engine.collide_scene(bodies, poses, workers=workers, **options)
-    return len(bodies), [found.first, found.second, found.relation, found.detail]
+    result = engine.collide_scene(bodies, poses, workers=workers, **options)
+    return len(bodies), [result.first, result.second, result.relation, result.detail]
 
 
 def scene_witnessed(bodies: list[Any], poses: Any, workers: int | None) -> tuple[int, Any]:
-    found = engine.collide_scene(bodies, poses, witnesses=True, workers=workers)
-    return len(bodies), [found.first, found.second, [said(witness) for witness in found.witnesses or ()]]
+    result = engine.collide_scene(bodies, poses, witnesses=True, workers=workers)
+    return len(bodies), [result.first, result.second, [said(witness) for witness in result.witnesses or ()]]
 
 
 def triangles_collided(first: Array, second: Array, workers: int | None) -> tuple[int, Any]:
@@ -212,7 +212,7 @@ def scenes_with_all_options(draw: Draw) -> Iterator[Question]:
 
 @drawn_by("collide_scene", 10)
 def large_scenes(draw: Draw) -> Iterator[Question]:
-    """Boxes on a lattice, unposed; convex bodies; so many that the grid is met, and one so large that it is left."""
+    """Unposed boxes on a lattice; convex bodies; enough bodies for the grid, and one too large for it."""
     for dimension in (2, 3):
         ends = np.sort(
             draw.whole(0, 60 if dimension == 2 else 24, 900, 1, dimension) + draw.whole(0, 4, 900, 2, dimension), 1

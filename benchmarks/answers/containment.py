@@ -38,7 +38,7 @@ family("locate", "simple_solids_far_away", 8, lambda draw: _about_each(draw, FAR
 
 @drawn_by("locate", 12)
 def polyhedra_asked_again_and_again(draw: Draw) -> Iterator[Question]:
-    """Few points, passes over all faces; then columns; then cells, where a batch pays for them."""
+    """Few points, passes over all faces; then the tree; then cells, once they amortise."""
     shape = solids.polyhedron(draw, 3, draw.pick(NEAR_PLACES))
     yield from _about(draw, shape, (1, 10, 40, *(60,) * 16, 300))
     if draw.chance(0.4):
@@ -55,7 +55,7 @@ def polygons_asked_again_and_again(draw: Draw) -> Iterator[Question]:
 
 @drawn_by("locate", 1)
 def large_mesh(draw: Draw) -> Iterator[Question]:
-    """So large, and points so near to it, that they are asked in the order of their cells."""
+    """A mesh so large, and points so near to it, that they are queried in the order of their cells."""
     shape = solids.polyhedron_of(shapes.ball(draw, 6, 0.05))
     near = shape.targets[draw.whole(0, len(shape.targets) - 1, 190_000)]
     yield partial(located, near * draw.uniform(0.99, 1.01, len(near), 1), shape.solid)
@@ -84,8 +84,8 @@ def faces_in_another_order(draw: Draw) -> Iterator[Question]:
 
 
 def _in_order(points: Array, first: Any, second: Any, workers: int | None) -> tuple[int, Any]:
-    n, found = located(points, first, workers=workers)
-    return 2 * n, same(located(points, second, workers=workers)[1], found, "faces or vertices")
+    n, result = located(points, first, workers=workers)
+    return 2 * n, same(located(points, second, workers=workers)[1], result, "faces or vertices")
 
 
 @drawn_by("contains", 12)
@@ -127,7 +127,7 @@ family("locate_scene", "scenes_far_away", 8, lambda draw: (
 
 @drawn_by("locate_scene", 10)
 def one_kind(draw: Draw) -> Iterator[Question]:
-    """Bodies of one type on a grid, with points enough for voxels; large polygons, for which lists are better."""
+    """Bodies of one type on a grid, with enough points for voxels; large polygons, for which lists are better."""
     makers = [solids.aabb, solids.sphere, solids.polygon, solids.convex, solids.triangle]
     for dimension, maker in ((2, draw.pick(makers)), (3, draw.pick([solids.aabb, solids.sphere, solids.convex]))):
         bodies = [maker(draw, dimension) for _ in range(50)]

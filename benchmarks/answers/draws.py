@@ -57,7 +57,7 @@ class Draw:
         return (lattice, anywhere, np.where(self.unit(n, 1) < 0.5, lattice, anywhere))[way]
 
     def nudged(self, values: Array, most: int = 2) -> Array:
-        """Return the numbers, each some ulp off or, about half of them, as they are."""
+        """Return the numbers, each moved by some ulp or, about half of them, unchanged."""
         steps = self.whole(-most, most, *values.shape) * self.whole(0, 1, *values.shape)
         for turn in range(1, most + 1):
             values = np.where(abs(steps) >= turn, np.nextafter(values, np.where(steps > 0, np.inf, -np.inf)), values)

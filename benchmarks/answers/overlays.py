@@ -19,15 +19,15 @@ Rings = list[Array]
 Pair = tuple[Rings, Rings]
 
 
-def said(found: engine.Overlay | None) -> Any:
+def said(result: engine.Overlay | None) -> Any:
     """Return an overlay as a list, without the bound on displacements, which depends on the order of edges."""
-    if found is None:
+    if result is None:
         return None
     return [
-        found.vertices, found.ring_offsets, found.piece_offsets, found.area_exact, found.n_pieces_exact,
-        found.n_holes_exact, [(part.kind, part.area, list(part.near)) for part in found.collapsed],
-        found.pieces_joined, found.pieces_parted, found.holes_joined, found.holes_parted, found.rounds,
-        found.vertices_moved, found.snapped,
+        result.vertices, result.ring_offsets, result.piece_offsets, result.area_exact, result.n_pieces_exact,
+        result.n_holes_exact, [(part.kind, part.area, list(part.near)) for part in result.collapsed],
+        result.pieces_joined, result.pieces_parted, result.holes_joined, result.holes_parted, result.rounds,
+        result.vertices_moved, result.snapped,
     ]  # fmt: skip
 
 
@@ -37,18 +37,18 @@ def overlaid(pair: Pair, workers: int | None) -> tuple[int, Any]:
 
 
 def overlaid_in_order(pair: Pair, other: Pair, workers: int | None) -> tuple[int, Any]:
-    """Ask also with rings and vertices named in another order: the same rings."""
-    n, found = overlaid(pair, workers)
-    return 2 * n, same(overlaid(other, workers)[1], found, "rings and vertices")
+    """Overlay also with rings and vertices in another order: the result must have the same rings."""
+    n, result = overlaid(pair, workers)
+    return 2 * n, same(overlaid(other, workers)[1], result, "rings and vertices")
 
 
 def batch_overlaid(pairs: list[Pair], workers: int | None) -> tuple[int, Any]:
     subjects, clips = ([engine.Polygon(rings) for rings in side] for side in zip(*pairs))
     answers = []
     for name in OPERATIONS:
-        found = engine.overlay_batch(subjects, clips, name, workers=workers)
-        flat = [found.status, found.vertices, found.ring_offsets, found.piece_offsets, found.pair_offsets]
-        answers.append([*flat, [said(found[pair]) for pair in range(0, len(found), 9)]])
+        result = engine.overlay_batch(subjects, clips, name, workers=workers)
+        flat = [result.status, result.vertices, result.ring_offsets, result.piece_offsets, result.pair_offsets]
+        answers.append([*flat, [said(result[pair]) for pair in range(0, len(result), 9)]])
     return 4 * len(pairs), answers
 
 
@@ -57,7 +57,7 @@ def any_rings(draw: Draw) -> Pair:
 
 
 def lattice(draw: Draw) -> Pair:
-    """Hardly an edge that touches no other."""
+    """Lattice rings: nearly every edge touches another."""
     size = draw.pick([2, 3, 8])
     rings = [draw.whole(0, size, draw.one(4, 9), 2).astype(float) for _ in range(3)]
     return rings[:2], rings[2:]
@@ -142,11 +142,11 @@ def rings_in_another_order(draw: Draw) -> Iterator[Question]:
 
 
 def displaced(pair: Pair, workers: int | None) -> tuple[int, Any]:
-    """Ask how far rounding moved edges at most."""
+    """Query the largest displacement of edges by rounding."""
     subject, clip = (engine.Polygon(rings) for rings in pair)
-    found, accuracy = engine.overlay(subject, clip, "union", report=True, workers=workers)
+    result, accuracy = engine.overlay(subject, clip, "union", report=True, workers=workers)
     batch = engine.overlay_batch([subject, subject], [clip, clip], "difference", workers=workers)
-    return 3, [found.largest_displacement, accuracy.coordinates_ulp, batch.displacement]
+    return 3, [result.largest_displacement, accuracy.coordinates_ulp, batch.displacement]
 
 
 family("displacements", "bounds_on_displacement", 10,
@@ -227,8 +227,8 @@ def _layer(draw: Draw) -> list[Rings]:
     return [*layer, layer[0][:1]] if draw.chance(0.3) else layer
 
 
-def _said_of_many(found: engine.Overlay) -> list[Any]:
-    return [*said(found), found.sources]
+def _said_of_many(result: engine.Overlay) -> list[Any]:
+    return [*said(result), result.sources]
 
 
 def united(layer: list[Rings], grid: float | None, workers: int | None) -> tuple[int, Any]:
@@ -237,14 +237,14 @@ def united(layer: list[Rings], grid: float | None, workers: int | None) -> tuple
 
 
 def filled_by(rings: Rings, workers: int | None) -> tuple[int, Any]:
-    found = [engine.filled(rings, rule) for rule in ("non_zero", "positive", "negative")]  # type: ignore[arg-type]
-    return 3, [[each.vertices, each.ring_offsets] for each in found]
+    result = [engine.filled(rings, rule) for rule in ("non_zero", "positive", "negative")]  # type: ignore[arg-type]
+    return 3, [[each.vertices, each.ring_offsets] for each in result]
 
 
 def overlaid_on_grid(pair: Pair, grid: float, workers: int | None) -> tuple[int, Any]:
     subject, clip = (engine.Polygon(rings) for rings in pair)
-    found = [engine.overlay(subject, clip, name, grid=grid, workers=workers) for name in OPERATIONS]
-    return 4, [_said_of_many(each) for each in found]
+    result = [engine.overlay(subject, clip, name, grid=grid, workers=workers) for name in OPERATIONS]
+    return 4, [_said_of_many(each) for each in result]
 
 
 @drawn_by("union_all", 12)

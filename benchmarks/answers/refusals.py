@@ -1,4 +1,4 @@
-"""Questions to bounds, and what constructors and operations refuse: names, codes, places and messages."""
+"""Questions to bounds, and errors of constructors and operations: names, codes, places and messages."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from benchmarks.answers.draws import FAR_PLACES, NEAR_PLACES, Draw
 
 
 def bounded(solid: Any, workers: int | None) -> tuple[int, Any]:
-    found = engine.bounds(solid, workers=workers)
-    return 1, [found.aabb.min, found.aabb.max, found.sphere.center, found.sphere.radius]
+    result = engine.bounds(solid, workers=workers)
+    return 1, [result.aabb.min, result.aabb.max, result.sphere.center, result.sphere.radius]
 
 
 _BOUNDED: dict[int, tuple[solids.Maker, ...]] = {
@@ -43,11 +43,12 @@ def bounds_of_many_vertices(draw: Draw) -> Iterator[Question]:
 
 
 REFUSED: dict[str, list[list[Any]]] = json.loads((Path(__file__).parent / "refused.json").read_text("utf-8"))
-"""Arguments of each public name that it refuses; {"engine": name, "of": arguments} is made, {"array": numbers} too."""
+"""Arguments of each public name that raise an error; {"engine": name, "of": arguments} is made, {"array": numbers}
+too."""
 
 
 def made(value: Any) -> Any:
-    """Return arguments as they are given to the engine."""
+    """Return the arguments as passed to the engine."""
     match value:
         case {"engine": name, "of": arguments}:
             return getattr(engine, name)(*made(arguments))
@@ -75,7 +76,7 @@ def _refused(name: str, row: Any, workers: int | None) -> tuple[int, Any]:
 
 @drawn_by("refusals", 10)
 def meshes_broken(draw: Draw) -> Iterator[Question]:
-    """Good meshes with a face left out, turned, doubled or renamed: which element is named, and how."""
+    """Valid meshes with a face removed, flipped, duplicated or renamed: which element the error names."""
     for make in shapes.MESHES:
         vertices, faces = make(draw)
         broken = faces.copy()

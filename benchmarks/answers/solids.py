@@ -1,4 +1,4 @@
-"""Solids of every type with the places where it is hard to tell in from out, made from a chunk's numbers."""
+"""Solids of every type with hard query points, drawn from a chunk's numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.answers.draws import HOME, Array, Draw, Place, put
 
 
 class Shape(NamedTuple):
-    """A solid, and points on its boundary or beside it."""
+    """A solid, and points on or near its boundary."""
 
     solid: Any
     targets: Array
@@ -115,9 +115,9 @@ def prism(draw: Draw, dimension: int = 3, place: Place = HOME) -> Shape:
 def surface(draw: Draw, dimension: int = 3, place: Place = HOME) -> Shape:
     """An open surface: part of a mesh."""
     vertices, faces = draw.pick(shapes.MESHES)(draw)
-    kept = faces[: draw.one(1, len(faces))]
-    used, renamed = np.unique(kept, return_inverse=True)
-    return polyhedron_of((vertices[used], renamed.reshape(kept.shape)), place, engine.Surface)
+    remaining = faces[: draw.one(1, len(faces))]
+    used, renamed = np.unique(remaining, return_inverse=True)
+    return polyhedron_of((vertices[used], renamed.reshape(remaining.shape)), place, engine.Surface)
 
 
 def implicit(draw: Draw, dimension: int, place: Place = HOME) -> Shape:
@@ -160,7 +160,7 @@ REGIONS: dict[int, tuple[Maker, ...]] = {
 
 
 def each(draw: Draw, makers: dict[int, tuple[Maker, ...]], places: Sequence[Place]) -> Iterator[Shape]:
-    """Yield a shape of every maker, each somewhere of its own."""
+    """Yield a shape of every maker, each at a place of its own."""
     for dimension, some in makers.items():
         for maker in some:
             yield maker(draw, dimension, draw.pick(places))
@@ -171,7 +171,7 @@ def pose(draw: Draw, dimension: int, place: Place = HOME) -> engine.Pose:
 
 
 def points_about(draw: Draw, targets: Array, n: int) -> Array:
-    """Return n points: anywhere, on targets, an ulp beside, in line with them along axes, between, of any exponent."""
+    """Return n points: random, on targets, an ulp off, aligned with targets, between them, of any exponent."""
     d, low, high = targets.shape[1], targets.min(axis=0), targets.max(axis=0)
     a, b = targets[draw.whole(0, len(targets) - 1, n)], targets[draw.whole(0, len(targets) - 1, n)]
     anywhere = low + (high - low) * (draw.unit(n, d) * 1.25 - 0.125)

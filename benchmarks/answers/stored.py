@@ -1,4 +1,4 @@
-"""Which chunks to ask, the digests that stand in the repository, and the command that compares them."""
+"""Selection of chunks, the stored digests, and the command that compares them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STORED = Path(__file__).resolve().parent / "answers.json"
 
 
 class Row(NamedTuple):
-    """A chunk that was asked."""
+    """The result of a chunk."""
 
     operation: str
     name: str
@@ -26,20 +26,20 @@ class Row(NamedTuple):
 
 def chosen(tenth: int | None = None, only: str = "") -> list[Chunk]:
     """Return the chunks of a tenth, or all, whose operation/family/number contains `only`."""
-    found = [chunk for chunks in CHUNKS.values() for chunk in chunks.values()]
+    result = [chunk for chunks in CHUNKS.values() for chunk in chunks.values()]
     return [
-        chunk for chunk in found
+        chunk for chunk in result
         if only in f"{chunk.operation}/{chunk.name}" and (tenth is None or chunk.tenth == tenth)
     ]  # fmt: skip
 
 
 def asked(chunks: Iterable[Chunk], workers: int | None = None) -> list[Row]:
-    """Ask chunks one after another."""
+    """Run chunks one after another."""
     return [Row(chunk.operation, chunk.name, *chunk.asked(workers)) for chunk in chunks]
 
 
 def load() -> dict[str, Any]:
-    """Return what is stored: for each operation the number of questions, the SHA-256, and each chunk's digest."""
+    """Return the stored table: for each operation the number of questions, the SHA-256, and each chunk's digest."""
     return json.loads(STORED.read_text("utf-8"))  # type: ignore[no-any-return]
 
 
@@ -57,7 +57,7 @@ def store(rows: Sequence[Row]) -> None:
 
 
 def differences(rows: Iterable[Row], table: dict[str, Any]) -> list[str]:
-    """Return a line for each chunk whose answers are not those stored."""
+    """Return a line for each chunk whose digest differs from the stored one."""
     lines = []
     for row in rows:
         expected = table.get(row.operation, {}).get("chunks", {}).get(row.name)
@@ -79,10 +79,10 @@ def main(words: list[str]) -> int:
     rows: list[Row] = []
     for operation in dict.fromkeys(chunk.operation for chunk in chunks):
         before = time.perf_counter()
-        found = asked([chunk for chunk in chunks if chunk.operation == operation], options.workers)
-        rows += found
-        n_questions, seconds = sum(row.n_questions for row in found), time.perf_counter() - before
-        total = joined(row.digest for row in found)
+        result = asked([chunk for chunk in chunks if chunk.operation == operation], options.workers)
+        rows += result
+        n_questions, seconds = sum(row.n_questions for row in result), time.perf_counter() - before
+        total = joined(row.digest for row in result)
         print(f"{operation:18}{n_questions:>9,} questions {seconds:7.1f} s  {total}", flush=True)
     if options.write:
         if options.tenth is not None or options.only:

@@ -24,11 +24,11 @@ Request = tuple[str, Any]
 """Path and body: a value for JSON, bytes for octets."""
 _KEPT_HEADERS = ("location", "etag", "allow", "accept-post", "content-type")
 _LEFT_OUT = ("memory", "largest_displacement")
-"""Members of answers that tell of structures, and a bound that depends on the order of edges."""
+"""Members of answers that depend on structures, and a bound that depends on the order of edges."""
 
 
 def answers_to(requests: list[Request], workers: int | None) -> tuple[int, Any]:
-    """Return status, some headers and body of the answers of a new service, asked one request after another."""
+    """Return status, some headers and body of the answers of a new service, one request after another."""
     with mock.patch.object(engine, "warm", return_value=None):  # kernels load when they are first used
         return len(requests), asyncio.run(_ask(requests))
 
@@ -56,10 +56,10 @@ def _said(answer: httpx.Response) -> Any:
 def _without_costs(body: Any) -> Any:
     if not isinstance(body, dict):
         return body
-    kept = {name: _without_costs(value) for name, value in body.items() if name not in _LEFT_OUT}
-    if "accuracy" in kept:
-        kept["accuracy"] = kept["accuracy"]["decisions"]
-    return kept
+    remaining = {name: _without_costs(value) for name, value in body.items() if name not in _LEFT_OUT}
+    if "accuracy" in remaining:
+        remaining["accuracy"] = remaining["accuracy"]["decisions"]
+    return remaining
 
 
 def _pose(draw: Draw, dimension: int) -> dict[str, Any]:
@@ -68,7 +68,7 @@ def _pose(draw: Draw, dimension: int) -> dict[str, Any]:
 
 
 def _shape(draw: Draw, makers: Any, dimension: int) -> tuple[dict[str, Any], Array]:
-    """Return a solid that JSON can name, and its targets."""
+    """Return a solid with a JSON form, and its targets."""
     while True:  # bound: a callable is rare
         shape = draw.pick(makers)(draw, dimension, draw.pick(NEAR_PLACES))
         if not _holds_callable(shape.solid):
@@ -82,8 +82,8 @@ def _holds_callable(solid: Any) -> bool:
 
 
 def _bodies(draw: Draw, makers: Any, dimension: int, n: int, share_posed: float) -> list[dict[str, Any]]:
-    found = [{"solid": _shape(draw, makers, dimension)[0]} for _ in range(n)]
-    return [body | ({"pose": _pose(draw, dimension)} if draw.chance(share_posed) else {}) for body in found]
+    result = [{"solid": _shape(draw, makers, dimension)[0]} for _ in range(n)]
+    return [body | ({"pose": _pose(draw, dimension)} if draw.chance(share_posed) else {}) for body in result]
 
 
 def _good(draw: Draw, dimension: int) -> Iterator[Request]:
@@ -114,7 +114,7 @@ def _good(draw: Draw, dimension: int) -> Iterator[Request]:
 
 
 def _broken(draw: Draw, request: Request) -> Request:
-    """Return a request with one thing wrong with it."""
+    """Return a request with one fault."""
     path, body = request
     match draw.one(0, 4):
         case 0:
@@ -136,17 +136,17 @@ def json_requests(draw: Draw) -> Iterator[Question]:
 
 @drawn_by("http", 10)
 def stored_solids(draw: Draw) -> Iterator[Question]:
-    """Solids put twice, named by their id in JSON, asked by octets; octets that do not fit."""
+    """Solids stored twice, referenced by id in JSON and in octets; octets of a wrong length."""
     requests: list[Request] = []
     for dimension in (2, 3):
         for makers in (solids.LOCATED[dimension], solids.REGIONS[dimension][:-1]):
             solid, targets = _shape(draw, makers, dimension)
             name = _id_of(solid)
             points, stored = points_about(draw, targets, 200).astype("<f8"), {"type": "stored", "id": name}
-            asked, clipped = f"/v1/solids/{name}/contains", f"/v1/solids/{name}/clip/segments"
+            queried, clipped = f"/v1/solids/{name}/contains", f"/v1/solids/{name}/clip/segments"
             requests += [
-                (asked, points.tobytes()), ("/v1/solids", solid), ("/v1/solids", solid), (asked, points.tobytes()),
-                (asked, b"1234567"), (clipped, points.tobytes()),
+                (queried, points.tobytes()), ("/v1/solids", solid), ("/v1/solids", solid), (queried, points.tobytes()),
+                (queried, b"1234567"), (clipped, points.tobytes()),
                 ("/v1/contains", {"solid": stored, "points": points.tolist()}), ("/v1/bounds", {"solid": stored}),
             ]  # fmt: skip
     yield partial(answers_to, requests)
@@ -160,7 +160,7 @@ def _id_of(solid: dict[str, Any]) -> str:
 
 @drawn_by("http", 2)
 def long_lists(draw: Draw) -> Iterator[Question]:
-    """So many items that they are encoded in parts."""
+    """Enough items that they are encoded in parts."""
     shape = solids.aabb(draw, 2)
     points = draw.uniform(-4.0, 4.0, 42_000, 2)
     box = document(shape.solid)

@@ -3,7 +3,7 @@
 A contender is one file, with_NAME.py, with `MAKERS`: for each kind of question a function ``(subject, threads[, knob])
 -> Prepared``, called once; that is its build. `PACKAGE` is the distribution that it needs, `NAMES` what it is called in
 tables, by kind ("" for all others). It imports its package when it is imported itself, so one that is not installed is
-found by `make`. The kinds, what they are about, the items they are asked about and the answers:
+detected by `make`. The kinds, their subjects, items and answers:
 
     points            Mesh, Rings, Convex     points                      bool: contained, the boundary too
     scene             Bodies                  points                      point * n_bodies + body, sorted
@@ -43,16 +43,16 @@ from benchmarks.workloads import Bodies, Mesh, Rings
 
 def files() -> dict[str, Path]:
     """Return the file of every contender."""
-    found = (path for folder in __path__ for path in Path(folder).glob("with_*.py"))
-    return {path.stem.removeprefix("with_"): path for path in found}
+    result = (path for folder in __path__ for path in Path(folder).glob("with_*.py"))
+    return {path.stem.removeprefix("with_"): path for path in result}
 
 
 @cache
 def stated(module: str) -> dict[str, Any]:
-    """Return what a contender's file says of itself, read and not imported: its package may not be there."""
+    """Return the constants of a contender's file, parsed and not imported: its package may be missing."""
     text = files()[module].read_text("utf-8") if is_there(module) else ""
-    told = [node for node in ast.parse(text).body if isinstance(node, ast.Assign)]
-    names = {getattr(node.targets[0], "id", ""): node.value for node in told}
+    reported = [node for node in ast.parse(text).body if isinstance(node, ast.Assign)]
+    names = {getattr(node.targets[0], "id", ""): node.value for node in reported}
     return {name: ast.literal_eval(names[name]) for name in ("PACKAGE", "NAMES") if name in names}
 
 
@@ -62,12 +62,12 @@ def packages() -> list[str]:
 
 
 def is_there(spec: str) -> bool:
-    """Return whether there is a file for a contender."""
+    """Return whether a contender has a file."""
     return re.split("[:@]", spec)[0] in files()
 
 
 def names_of(spec: str) -> Sequence[str]:
-    """Return what a contender is called, of whatever kind."""
+    """Return the names of a contender, of all kinds."""
     module = re.split("[:@]", spec)[0]
     return [module, *stated(module).get("NAMES", {}).values()] if is_there(spec) else []
 
@@ -84,7 +84,7 @@ class NotApplicable(Exception):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A body of a pair: a mesh, or a solid of ours without faces, and its rotation and translation."""
+    """A body of a pair: a mesh, or a solid of ours without faces, with its rotation and translation."""
 
     shape: Mesh | Rings | engine.Solid
     pose: tuple[np.ndarray, np.ndarray] | None = None
@@ -102,7 +102,7 @@ def without_poses(pair: Couple) -> Couple:
 
 
 def meshes_of(pair: Couple) -> list[Mesh]:
-    """Return the meshes of two bodies that stand where they are."""
+    """Return the meshes of two bodies without poses."""
     shapes = [body.shape for body in without_poses(pair)]
     if not all(isinstance(shape, Mesh) for shape in shapes):
         raise NotApplicable("meshes only")
@@ -131,24 +131,24 @@ def rings_of(region: Rings | engine.Solid) -> list[np.ndarray]:
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """One contender, ready for the questions of one workload."""
+    """One contender, built for the questions of one workload."""
 
     ask: Callable[[Any], Any]
-    """Answers for all of them; timed."""
+    """Answers all items; timed."""
     native: Callable[[Any], Any] = lambda items: items
-    """Converts the items to what the contender takes; not timed."""
-    answer: Callable[[Any], Any] = lambda found: found
-    """Reads the contender's answer; not timed."""
+    """Converts the items to the contender's types; not timed."""
+    answer: Callable[[Any], Any] = lambda result: result
+    """Converts the contender's answer; not timed."""
     memory: Callable[[], int] | None = None
-    """Bytes that it says it holds."""
+    """Bytes that it reports."""
     method: Callable[[], str] | None = None
-    """What it says it used."""
+    """The method that it reports."""
     share: Callable[[], float] | None = None
-    """Share of the items that needed more than floating point."""
+    """Share of the items beyond floating point."""
 
 
 def make(module: str, kind: str, subject: Any, threads: int = 2, *setting: float) -> Prepared:
-    """Return a contender ready for questions of a kind; ImportError or OSError where its package does not run here."""
+    """Build a contender for questions of a kind; ImportError or OSError if its package does not run here."""
     makers = importlib.import_module(f"benchmarks.contenders.with_{module}").MAKERS
     if kind not in makers:
         raise NotApplicable(f"has no answer to {kind}")
@@ -156,13 +156,13 @@ def make(module: str, kind: str, subject: Any, threads: int = 2, *setting: float
 
 
 def answers(module: str, kind: str, subject: Any, items: Any, threads: int = 1) -> Any:
-    """Return the answers of a contender asked once."""
+    """Return the answers of a contender to one call."""
     made = make(module, kind, subject, threads)
     return made.answer(made.ask(made.native(items)))
 
 
-def anew(module: str, kind: str, subject: Any, threads: int = 2) -> Prepared:
-    """Return a contender that starts from the subject's arrays at every question: build and answer are timed."""
+def rebuilt_each_call(module: str, kind: str, subject: Any, threads: int = 2) -> Prepared:
+    """Return a contender that is rebuilt from the subject's arrays at each call: build and answer are timed."""
     make(module, kind, subject, threads)  # whether its package runs
     return Prepared(lambda items: answers(module, kind, subject, items, threads))
 
@@ -174,26 +174,26 @@ def pool(threads: int) -> ThreadPoolExecutor:
 
 
 def in_threads(task: Callable[[slice], Any], n_items: int, threads: int) -> list[Any]:
-    """Return what `task` returns for each of as many equal parts as there are threads, all parts at once."""
+    """Return the results of `task` on as many equal parts as there are threads, run concurrently."""
     if threads == 1 or n_items < 1000:
         return [task(slice(0, n_items))]
     borders = [n_items * part // threads for part in range(threads + 1)]
     return list(pool(threads).map(task, map(slice, borders, borders[1:])))
 
 
-def rows_of(found: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """Return clipped segments as rows, NaN where not kept."""
-    return np.where(np.asarray(kept)[:, None], found.reshape(len(found), -1), np.nan)
+def rows_of(result: np.ndarray, remaining: np.ndarray) -> np.ndarray:
+    """Return clipped segments as rows, NaN for those that are clipped away."""
+    return np.where(np.asarray(remaining)[:, None], result.reshape(len(result), -1), np.nan)
 
 
 def pieces_of(make: Callable[..., Prepared]) -> Callable[..., Prepared]:
-    """Return the maker of `pieces` by one of `segments`: one piece a segment at most."""
+    """Return the maker of `pieces` from one of `segments`: at most one piece a segment."""
 
     def of(region: Any, threads: int) -> Prepared:
         made = make(region, threads)
 
-        def answer(found: Any) -> list[Any]:
-            ends = [np.split(row, 2) for row in made.answer(found)]
+        def answer(result: Any) -> list[Any]:
+            ends = [np.split(row, 2) for row in made.answer(result)]
             return [(i, *each) for i, each in enumerate(ends) if not np.isnan(each).any()]
 
         return replace(made, answer=answer)
@@ -202,7 +202,7 @@ def pieces_of(make: Callable[..., Prepared]) -> Callable[..., Prepared]:
 
 
 def each_or_nan(area: Callable[[Any], float]) -> Callable[[Any], np.ndarray]:
-    """Return what asks for the area of item after item; whatever a peer raises is a refusal, NaN."""
+    """Return a function that computes one number an item; an error of a peer becomes NaN, a refusal."""
 
     def one(item: Any) -> float:
         try:
@@ -223,7 +223,7 @@ def _made_or_none(made: Callable[[Any], Any], item: Any) -> Any:
 
 
 def each_alone(made: Callable[[Any], Any], ask: Callable[[Any], float]) -> Prepared:
-    """Return what makes item after item untimed, and asks each for a number; refusals as `each_or_nan` has them."""
+    """Return a function that makes each item untimed, then computes one number of each; errors as in `each_or_nan`."""
 
     def native(items: Any) -> list[Any]:
         return [_made_or_none(made, item) for item in items]
@@ -239,7 +239,7 @@ def each_alone(made: Callable[[Any], Any], ask: Callable[[Any], float]) -> Prepa
 def overlays(
     read: Callable[..., Any], run: Callable[[Any, str], Any], area: Callable[[Any, Any], float]
 ) -> dict[str, Callable[..., Prepared]]:
-    """Return the makers of overlay: from rings, all timed; and of pairs that were read before, the areas untimed."""
+    """Return the makers of overlay: from rings, all timed; and of pairs read before, the areas untimed."""
 
     def whole(operation: str, threads: int, *setting: float) -> Prepared:
         def one(pair: Any) -> float:
@@ -253,14 +253,14 @@ def overlays(
             return [(made, run(made, operation)) for made in pairs]
 
         return Prepared(
-            ask, lambda pairs: [read(pair) for pair in pairs], lambda found: np.array([area(*each) for each in found])
+            ask, lambda pairs: [read(pair) for pair in pairs], lambda result: np.array([area(*each) for each in result])
         )
 
     return {"overlay": whole, "overlay of made": apart}
 
 
 def box_of(body: Placed) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return low and high of a box that stands where it is; None of a ball; another body is out of domain."""
+    """Return low and high of a box without a pose; None for a ball; other bodies are out of domain."""
     match body.shape:
         case engine.Aabb() | engine.Sphere() if body.pose is not None or body.shape.dimension == 2:
             raise NotApplicable("poses of meshes only, and space only")
@@ -272,7 +272,7 @@ def box_of(body: Placed) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 class Library(NamedTuple):
-    """How a library of collision is called: one body a call, or one pose a call."""
+    """How to call a collision library: one body a call, or one pose a call."""
 
     model: Callable[[Mesh], Any]
     """Its tree of a mesh."""
@@ -290,7 +290,7 @@ class Library(NamedTuple):
 
 
 def makers_of(library: Library) -> dict[str, Callable[..., Prepared]]:
-    """Return the makers of pairs and poses; putting a body to its pose is part of a question, and so it is timed."""
+    """Return the makers of pairs and poses; setting a body's pose is part of a question, and so it is timed."""
 
     def posed(ask: Callable[[Any, Any], Any], model: Callable[[Mesh], Any]) -> Callable[..., Prepared]:
         def make(pair: Any, threads: int) -> Prepared:

@@ -19,12 +19,12 @@ NAMES = {"": "numba_celltree"}
 @numba.njit(nogil=True)
 def _clip(segments: Any, low: Any, high: Any) -> tuple[Any, Any]:
     box = Box(low[0], high[0], low[1], high[1])
-    clipped, kept = np.empty_like(segments), np.zeros(len(segments), np.bool_)
+    clipped, remaining = np.empty_like(segments), np.zeros(len(segments), np.bool_)
     for i in range(len(segments)):
         p, q = Point(segments[i, 0, 0], segments[i, 0, 1]), Point(segments[i, 1, 0], segments[i, 1, 1])
-        kept[i], p, q = cohen_sutherland_line_box_clip(p, q, box)
+        remaining[i], p, q = cohen_sutherland_line_box_clip(p, q, box)
         clipped[i, 0, 0], clipped[i, 0, 1], clipped[i, 1, 0], clipped[i, 1, 1] = p.x, p.y, q.x, q.y
-    return clipped, kept
+    return clipped, remaining
 
 
 def _segments(region: engine.Solid, threads: int) -> Prepared:
@@ -32,7 +32,7 @@ def _segments(region: engine.Solid, threads: int) -> Prepared:
         raise NotApplicable("boxes only")
     return Prepared(
         lambda segments: _clip(np.ascontiguousarray(segments, float), region.min, region.max),
-        answer=lambda found: rows_of(*found),
+        answer=lambda result: rows_of(*result),
     )
 
 

@@ -32,7 +32,7 @@ def _points(mesh: Mesh, threads: int) -> Prepared:
         raise NotApplicable("closed manifolds only")
     side = Side_of_triangle_mesh(body)
 
-    def ask(points: np.ndarray, kept: Any = body) -> np.ndarray:  # `side` borrows the body
+    def ask(points: np.ndarray, remaining: Any = body) -> np.ndarray:  # `side` borrows the body
         return np.array([side.bounded_side(Point_3(*point)) >= 0 for point in points.tolist()])
 
     return Prepared(ask)

@@ -71,26 +71,26 @@ def _crowd(crowd: Crowd, threads: int) -> Prepared:
     numbers = {tuple(place): number for number, place in enumerate(crowd.translations.tolist())}
 
     def pairs() -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
-        found = []
+        result = []
 
         def note(first: fcl.CollisionObject, second: fcl.CollisionObject, data: object) -> bool:
             if _meet(first, second):
-                found.append((first, second))
+                result.append((first, second))
             return False
 
         tree.collide(None, note)
-        return found
+        return result
 
     def ask(frames: list[list[fcl.Transform]]) -> list[tuple[fcl.CollisionObject, fcl.CollisionObject]]:
         for poses in frames:
             for item, pose in zip(objects, poses, strict=True):
                 item.setTransform(pose)
             tree.update()
-            found = pairs()
-        return found if frames else pairs()
+            result = pairs()
+        return result if frames else pairs()
 
-    def answer(found: list[tuple[fcl.CollisionObject, fcl.CollisionObject]]) -> np.ndarray:
-        named = [[numbers[tuple(item.getTranslation())] for item in pair] for pair in found]
+    def answer(result: list[tuple[fcl.CollisionObject, fcl.CollisionObject]]) -> np.ndarray:
+        named = [[numbers[tuple(item.getTranslation())] for item in pair] for pair in result]
         rows = np.sort(np.array(named, np.int64).reshape(-1, 2), axis=1)
         return np.sort(rows[:, 0] * len(objects) + rows[:, 1])
 

@@ -25,14 +25,14 @@ NAMES = {"overlay": "Clipper2 by manifold3d", "overlay of made": "Clipper2 by ma
 
 def _combined(pair: Any, operation: str) -> Any:
     first, second = pair
-    found = {
+    result = {
         "intersection": lambda: first ^ second,
         "union": lambda: first + second,
         "difference": lambda: first - second,
         "symmetric_difference": lambda: (first - second) + (second - first),
     }[operation]()
-    found.num_vert()  # a CrossSection may put its work off until asked
-    return found
+    result.num_vert()  # a CrossSection may put its work off until asked
+    return result
 
 
 def _read(pair: Any) -> Any:
@@ -67,5 +67,5 @@ MAKERS = {
     "pair": _pair,
     "clearance pairs": lambda _, threads: each_alone(_solids, lambda pair: pair[0].min_gap(pair[1], 1e3)),
     "polygon areas": _polygon_areas,
-    **overlays(_read, _combined, lambda made, found: found.area()),
+    **overlays(_read, _combined, lambda made, result: result.area()),
 }

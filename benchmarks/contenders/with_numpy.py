@@ -20,16 +20,16 @@ def _points(solid: engine.Convex, threads: int) -> Prepared:
     normals, offsets = np.ascontiguousarray(solid.planes[:, :-1].T), solid.planes[:, -1]
 
     def ask(points: np.ndarray) -> np.ndarray:
-        held = np.empty(len(points), np.bool_)
+        contained = np.empty(len(points), np.bool_)
 
         def part_of(part: slice) -> None:
             block = BLOCK // len(offsets)
             for start in range(part.start, part.stop, block):
                 stop = min(start + block, part.stop)
-                held[start:stop] = (points[start:stop] @ normals + offsets >= 0.0).all(axis=1)
+                contained[start:stop] = (points[start:stop] @ normals + offsets >= 0.0).all(axis=1)
 
         in_threads(part_of, len(points), threads)
-        return held
+        return contained
 
     return Prepared(ask)
 

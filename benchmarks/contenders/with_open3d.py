@@ -36,7 +36,7 @@ def _points(mesh: Mesh, threads: int, samples: float = 1) -> Prepared:
     return Prepared(
         lambda points: scene.compute_occupancy(points, nthreads=threads, nsamples=int(samples)),
         lambda points: Tensor(points.astype(np.float32)),
-        lambda found: found.numpy() > 0.5,
+        lambda result: result.numpy() > 0.5,
     )
 
 
@@ -50,18 +50,18 @@ def _scene(bodies: Bodies, threads: int) -> Prepared:
         along = points[order]
         starts = np.searchsorted(along[:, 0], lows[:, 0])
         stops = np.searchsorted(along[:, 0], highs[:, 0], side="right")
-        found = []
+        result = []
         for i_body, scene in enumerate(scenes):
             slab = along[starts[i_body] : stops[i_body]]
             y, z = slab[:, 1], slab[:, 2]
             low, high = lows[i_body], highs[i_body]
             near = np.flatnonzero((y >= low[1]) & (y <= high[1]) & (z >= low[2]) & (z <= high[2]))
             if len(near):
-                held = scene.compute_occupancy(Tensor(slab[near]), nthreads=threads).numpy() > 0.5
-                found.append(order[starts[i_body] + near[held]] * len(scenes) + i_body)
-        return found
+                contained = scene.compute_occupancy(Tensor(slab[near]), nthreads=threads).numpy() > 0.5
+                result.append(order[starts[i_body] + near[contained]] * len(scenes) + i_body)
+        return result
 
-    return Prepared(ask, lambda points: points.astype(np.float32), lambda found: np.sort(np.concatenate(found)))
+    return Prepared(ask, lambda points: points.astype(np.float32), lambda result: np.sort(np.concatenate(result)))
 
 
 def _through(keep: str) -> Callable[[Bodies, int], Prepared]:
@@ -74,18 +74,18 @@ def _through(keep: str) -> Callable[[Bodies, int], Prepared]:
         def native(segments: np.ndarray) -> Tensor:
             return Tensor(np.concatenate([segments[:, 0], segments[:, 1] - segments[:, 0]], axis=1).astype(np.float32))
 
-        def all_met(found: dict[str, Tensor]) -> np.ndarray:
-            hits = found["t_hit"].numpy() <= 1.0
-            rays, faces = found["ray_ids"].numpy().astype(np.int64)[hits], found["primitive_ids"].numpy()[hits]
+        def all_met(result: dict[str, Tensor]) -> np.ndarray:
+            hits = result["t_hit"].numpy() <= 1.0
+            rays, faces = result["ray_ids"].numpy().astype(np.int64)[hits], result["primitive_ids"].numpy()[hits]
             return np.unique(rays * len(bodies.bodies) + owners[faces])
 
         if keep == "all":
             return Prepared(lambda rays: scene.list_intersections(rays, nthreads=threads), native, all_met)
         if keep == "first":
             return Prepared(lambda rays: scene.cast_rays(rays, nthreads=threads), native,
-                            lambda found: found["t_hit"].numpy() <= 1.0)  # fmt: skip
+                            lambda result: result["t_hit"].numpy() <= 1.0)  # fmt: skip
         return Prepared(lambda rays: scene.test_occlusions(rays, 0.0, 1.0, nthreads=threads), native,
-                        lambda found: found.numpy())  # fmt: skip
+                        lambda result: result.numpy())  # fmt: skip
 
     return make
 

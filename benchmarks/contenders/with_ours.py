@@ -28,8 +28,8 @@ class _Said:
 
     report: Any = None
 
-    def keep(self, found: Any) -> Any:
-        answer, self.report = found
+    def keep(self, result: Any) -> Any:
+        answer, self.report = result
         return answer
 
     def beyond_filter(self) -> float:
@@ -43,16 +43,16 @@ def _points(subject: Any, threads: int) -> Prepared:
     solid, said = solid_of(subject), _Said()
     return Prepared(
         lambda points: said.keep(engine.locate(points, solid, workers=threads, report=True)),
-        answer=lambda found: found >= 0, memory=lambda: solid.memory, method=said.method, share=said.beyond_filter,
+        answer=lambda result: result >= 0, memory=lambda: solid.memory, method=said.method, share=said.beyond_filter,
     )  # fmt: skip
 
 
 def _scene(bodies: Bodies, threads: int) -> Prepared:
     solids = [solid_of(body) for body in bodies.bodies]
 
-    def answer(found: engine.SceneLocations) -> np.ndarray:
-        owners = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets))
-        return owners * len(solids) + found.indices
+    def answer(result: engine.SceneLocations) -> np.ndarray:
+        owners = np.repeat(np.arange(len(result.offsets) - 1), np.diff(result.offsets))
+        return owners * len(solids) + result.indices
 
     return Prepared(
         lambda points: engine.locate_scene(points, solids, workers=threads),
@@ -66,8 +66,8 @@ def _segments(subject: Any, threads: int) -> Prepared:
     def ask(segments: np.ndarray) -> tuple[int, engine.SegmentPieces]:
         return len(segments), said.keep(engine.clip_segments(segments, region, workers=threads, report=True))
 
-    def answer(found: tuple[int, engine.SegmentPieces]) -> np.ndarray:
-        n_segments, pieces = found
+    def answer(result: tuple[int, engine.SegmentPieces]) -> np.ndarray:
+        n_segments, pieces = result
         rows = np.full((n_segments, 2 * region.dimension), np.nan)
         backwards = slice(None, None, -1)  # of several pieces the first stays
         rows[pieces.source[backwards]] = np.hstack([pieces.start, pieces.end])[backwards]
@@ -79,9 +79,9 @@ def _segments(subject: Any, threads: int) -> Prepared:
 def _hits(subject: Any, threads: int) -> Prepared:
     region = solid_of(subject)
 
-    def answer(found: tuple[int, engine.SegmentPieces]) -> np.ndarray:
-        met = found[1].source[(found[1].faces >= 0).any(axis=1)]
-        return np.bincount(met, minlength=found[0]) > 0
+    def answer(result: tuple[int, engine.SegmentPieces]) -> np.ndarray:
+        met = result[1].source[(result[1].faces >= 0).any(axis=1)]
+        return np.bincount(met, minlength=result[0]) > 0
 
     return Prepared(
         lambda segments: (len(segments), engine.clip_segments(segments, region, workers=threads)), answer=answer
@@ -91,16 +91,16 @@ def _hits(subject: Any, threads: int) -> Prepared:
 def _kept_polygons(region: engine.Solid, threads: int) -> Prepared:
     return Prepared(
         lambda rings: engine.clip_polygons(rings, region, workers=threads),
-        answer=lambda found: np.diff(found.polygon_offsets) > 0,
+        answer=lambda result: np.diff(result.polygon_offsets) > 0,
     )
 
 
 def _polygon_areas(region: engine.Solid, threads: int) -> Prepared:
     def ask(rings: np.ndarray) -> np.ndarray:
         clipped = engine.clip_polygons(rings, region)
-        counts, found = np.diff(clipped.polygon_offsets), np.zeros(len(rings))
-        found[counts > 0] = np.abs(ring_areas(clipped.vertices, clipped.ring_offsets))  # one ring each at most
-        return found
+        counts, result = np.diff(clipped.polygon_offsets), np.zeros(len(rings))
+        result[counts > 0] = np.abs(ring_areas(clipped.vertices, clipped.ring_offsets))  # one ring each at most
+        return result
 
     return Prepared(ask)
 
@@ -144,7 +144,7 @@ def _poses(pair: Pair, threads: int, **options: bool) -> Prepared:
     return Prepared(
         lambda poses: engine.collide_poses(first, second, *poses, workers=threads, **options),  # type: ignore[call-overload]
         lambda rows: (pair.rotations[rows], pair.translations[rows]),
-        lambda found: (found[0] if isinstance(found, tuple) else found) != engine.Relation.DISJOINT,
+        lambda result: (result[0] if isinstance(result, tuple) else result) != engine.Relation.DISJOINT,
     )
 
 
@@ -168,11 +168,13 @@ def _crowd(crowd: Crowd, threads: int) -> Prepared:
 
     def ask(frames: list[list[engine.Pose]]) -> engine.ScenePairs:
         for poses in frames or [still]:
-            found = engine.collide_scene(solids, poses, workers=threads)
-        return found
+            result = engine.collide_scene(solids, poses, workers=threads)
+        return result
 
     return Prepared(
-        ask, lambda frames: [frame.poses() for frame in frames], lambda found: found.first * len(solids) + found.second
+        ask,
+        lambda frames: [frame.poses() for frame in frames],
+        lambda result: result.first * len(solids) + result.second,
     )
 
 
@@ -230,12 +232,12 @@ def _through(keep: Any) -> Callable[[Bodies, int], Prepared]:
         def ask(segments: np.ndarray) -> tuple[int, Any]:
             return len(segments), scene.clip_segments(segments, keep=keep, workers=threads)
 
-        def answer(found: tuple[int, Any]) -> np.ndarray:
+        def answer(result: tuple[int, Any]) -> np.ndarray:
             if keep == "any":
-                return found[1]
+                return result[1]
             if keep == "first":
-                return np.bincount(found[1].source, minlength=found[0]) > 0
-            return np.unique(found[1].source * n + found[1].body)
+                return np.bincount(result[1].source, minlength=result[0]) > 0
+            return np.unique(result[1].source * n + result[1].body)
 
         return Prepared(ask, answer=answer)
 
@@ -244,7 +246,9 @@ def _through(keep: Any) -> Callable[[Bodies, int], Prepared]:
 
 def _lines(subject: Any, threads: int) -> Prepared:
     region = solid_of(subject)
-    return Prepared(lambda lines: engine.clip_lines(lines, region, workers=threads), answer=lambda found: found.source)
+    return Prepared(
+        lambda lines: engine.clip_lines(lines, region, workers=threads), answer=lambda result: result.source
+    )
 
 
 def _layers(how: str, threads: int) -> Prepared:

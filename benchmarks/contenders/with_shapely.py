@@ -56,14 +56,14 @@ def _scene(bodies: Bodies, threads: int) -> Prepared:
 
     def ask(points: np.ndarray) -> list[np.ndarray]:
         def part_of(part: slice) -> np.ndarray:
-            found = tree.query(points[part], predicate="intersects")
-            found[0] += part.start
-            return found
+            result = tree.query(points[part], predicate="intersects")
+            result[0] += part.start
+            return result
 
         return in_threads(part_of, len(points), threads)
 
-    def answer(found: list[np.ndarray]) -> np.ndarray:
-        owners, indices = np.concatenate(found, axis=1)
+    def answer(result: list[np.ndarray]) -> np.ndarray:
+        owners, indices = np.concatenate(result, axis=1)
         return np.sort(owners * len(bodies.bodies) + indices)
 
     return Prepared(ask, shapely.points, answer)
@@ -92,8 +92,8 @@ def _rows_of(clipped: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _pieces_of(found: Any) -> list[Any]:
-    lines, owners = shapely.get_parts(found, return_index=True)
+def _pieces_of(result: Any) -> list[Any]:
+    lines, owners = shapely.get_parts(result, return_index=True)
     kept = (shapely.get_type_id(lines) == shapely.GeometryType.LINESTRING) & ~shapely.is_empty(lines)
     return [(int(i), line.coords[0], line.coords[-1]) for line, i in zip(lines[kept], owners[kept], strict=True)]
 
@@ -154,7 +154,7 @@ MAKERS = {
     "pieces": _pieces,
     "lines": _lines,
     "pieces by rectangle": _by_rectangle(shapely.linestrings, _pieces_of),
-    "kept polygons": _by_rectangle(shapely.polygons, lambda found: ~shapely.is_empty(found)),
+    "kept polygons": _by_rectangle(shapely.polygons, lambda result: ~shapely.is_empty(result)),
     "polygon areas": _polygon_areas,
     "pair": _pair,
     "clearance pairs": lambda _, threads: each_alone(
@@ -164,6 +164,6 @@ MAKERS = {
     **overlays(
         _gridded,
         lambda made, operation: getattr(shapely, operation)(*made[0], grid_size=made[1]),
-        lambda made, found: found.area,
+        lambda made, result: result.area,
     ),
 }

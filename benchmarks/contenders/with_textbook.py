@@ -45,9 +45,9 @@ def _book(of: Callable[..., methods.Methods], name: str) -> Maker:
     """Return the maker of one of the textbook's methods, for those subjects that it is meant for."""
 
     def make(subject: Any, threads: int) -> Prepared:
-        if name not in (found := of(_plain(subject))):
+        if name not in (result := of(_plain(subject))):
             raise NotApplicable(f"{name}: not for this")
-        return Prepared(found[name][0])
+        return Prepared(result[name][0])
 
     return make
 
@@ -75,10 +75,10 @@ def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
 
     def ask(rings: np.ndarray) -> np.ndarray:
         clipped = [next(iter(clip_polygons.on_convex([ring], rows)), np.empty((0, 2))) for ring in rings]
-        found, sizes = np.zeros(len(rings)), np.array([len(ring) for ring in clipped])
-        kept = sizes > 0
-        found[kept] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[kept]))))
-        return found
+        result, sizes = np.zeros(len(rings)), np.array([len(ring) for ring in clipped])
+        remaining = sizes > 0
+        result[remaining] = np.abs(ring_areas(np.concatenate(clipped), np.append(0, np.cumsum(sizes[remaining]))))
+        return result
 
     return Prepared(ask)
 
@@ -90,8 +90,8 @@ def _overlay(operation: str, threads: int) -> Prepared:
     def area(pair: Any) -> float:
         if len(pair[0]) > 1 or len(pair[1]) > 1:
             raise NotApplicable("single rings only")
-        found = [ring for ring in clip_polygons.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
-        return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in found)
+        result = [ring for ring in clip_polygons.intersection(pair[0][0], pair[1][0]) if len(ring) > 2]
+        return sum(abs(float(ring_areas(np.array(ring), np.array([0, len(ring)]))[0])) for ring in result)
 
     return Prepared(each_or_nan(area))
 

@@ -35,13 +35,13 @@ def _hits(mesh: Mesh, threads: int) -> Prepared:
         t = ((points - origins[ray]) * directions[ray]).sum(axis=1) / (directions[ray] ** 2).sum(axis=1)
         return len(origins), ray[t <= 1.0], face[t <= 1.0]
 
-    return Prepared(ask, native, lambda found: np.bincount(found[1], minlength=found[0]) > 0)
+    return Prepared(ask, native, lambda result: np.bincount(result[1], minlength=result[0]) > 0)
 
 
 def _through(bodies: Bodies, threads: int) -> Prepared:
     mesh, owners = merged(bodies)
     return replace(
-        _hits(mesh, threads), answer=lambda found: np.unique(found[1] * len(bodies.bodies) + owners[found[2]])
+        _hits(mesh, threads), answer=lambda result: np.unique(result[1] * len(bodies.bodies) + owners[result[2]])
     )
 
 
@@ -50,7 +50,7 @@ def _pieces(region: engine.Polyhedron, threads: int) -> Prepared:
     body = trimesh.Trimesh(region.vertices, region.triangles, process=False)
 
     def ask(segments: np.ndarray) -> list[Any]:
-        found = []
+        result = []
         for i, (a, b) in enumerate(np.array(segments, float)):
             direction = b - a
             hits, *_ = body.ray.intersects_location([a], [direction], multiple_hits=True)
@@ -58,8 +58,8 @@ def _pieces(region: engine.Polyhedron, threads: int) -> Prepared:
             cuts = np.unique(np.concatenate([[0.0, 1.0], t[(t > 0) & (t < 1)]]))
             ends = a + cuts[:, None] * direction
             kept = body.contains((ends[:-1] + ends[1:]) / 2)
-            found += [(i, start, end) for start, end, keep in zip(ends[:-1], ends[1:], kept, strict=True) if keep]
-        return found
+            result += [(i, start, end) for start, end, keep in zip(ends[:-1], ends[1:], kept, strict=True) if keep]
+        return result
 
     return Prepared(ask)
 
@@ -77,7 +77,7 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
             mesh = mesh.slice_plane(origin, normal)
         return mesh
 
-    return Prepared(ask, native, lambda found: None)
+    return Prepared(ask, native, lambda result: None)
 
 
 MAKERS = {

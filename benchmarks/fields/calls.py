@@ -1,4 +1,4 @@
-"""Single calls of ours, of 1, 10 and 100 items: what a call costs; making solids, and their bounds."""
+"""Single calls of ours, of 1, 10 and 100 items: the overhead of a call; constructors of solids, and bounds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from benchmarks.errors import same
 
 COUNTS = (1, 10, 100)
 TURNS = 64
-"""Different inputs, asked in turn: a single one would be learned by heart."""
+"""Different inputs, used in turn: a branch predictor learns a single one by heart."""
 UNBOUNDED = ("half-space 3D", "implicit 3D", "csg 3D")
 SEGMENTS = ("aabb 2D", "aabb 3D", "sphere 3D", "convex of 20", "polygon of 16", "polyhedron of 80")
 Call = tuple[str, Callable[[Any], object], Callable[[], list[Any]], int]
@@ -41,11 +41,11 @@ def _calls(size: Size) -> Iterator[Call]:
     solids = _solids(size.seed)
     for name, make in solids.items():
         yield f"make {name}", lambda _, make=make: make(), lambda: [None], 1
-        if name not in UNBOUNDED:  # bounds are kept, so of a new solid each time
+        if name not in UNBOUNDED:  # bounds are cached, so a new solid each time
             yield f"bounds of {name}", lambda _, make=make: engine.bounds(make()), lambda: [None], 1
-    asked = [("locate {} in", engine.locate, solids, ()), ("clip {} segments,", engine.clip_segments, SEGMENTS, (2,))]
-    asked.append(("clip {} polygons,", engine.clip_polygons, ("aabb 2D", "aabb 3D", "convex 2D"), None))
-    for shown, ask, names, shape in asked:
+    queried = [("locate {} in", engine.locate, solids, ()), ("clip {} segments,", engine.clip_segments, SEGMENTS, (2,))]
+    queried.append(("clip {} polygons,", engine.clip_polygons, ("aabb 2D", "aabb 3D", "convex 2D"), None))
+    for shown, ask, names, shape in queried:
         for name in names:
             for n in COUNTS:
                 solid = solids[name]()
@@ -73,7 +73,8 @@ def _calls(size: Size) -> Iterator[Call]:
 
 
 def _scenes(seed: int, solids: dict[str, Callable[[], Any]]) -> Iterator[Call]:
-    """Yield questions to ten posed balls, boxes and polyhedra of 80, in turn: given anew, and kept as a scene."""
+    """Yield questions to ten posed balls, boxes and polyhedra of 80, in turn: passed each time, and as a stored
+    scene."""
     names = ("sphere 3D", "aabb 3D", "polyhedron of 80")
     bodies, poses = [solids[names[k % 3]]() for k in range(10)], _poses(seed, 0)[:10]
     scene = engine.Scene(bodies, poses)
@@ -124,5 +125,5 @@ def _sides(seed: int, n_items: int) -> list[Any]:
 
 
 def _from_arrays(pair: Any) -> object:
-    found = engine.overlay(*map(engine.Polygon, pair))
-    return [piece.shell for piece in found.pieces]  # type: ignore[union-attr]
+    result = engine.overlay(*map(engine.Polygon, pair))
+    return [piece.shell for piece in result.pieces]  # type: ignore[union-attr]

@@ -57,16 +57,16 @@ def _hard(size: Size, dimension: int, peers: tuple[str, ...]) -> Contest:
     couples = [_couple(generator(f"clearance {dimension}/{k}", size.seed), dimension, k) for k in range(size.n(90, 12))]
     exact = exact_distances(couples)
     is_apart = exact > 0.0
-    couples, exact = [couple for couple, kept in zip(couples, is_apart) if kept], exact[is_apart]
+    couples, exact = [couple for couple, remaining in zip(couples, is_apart) if remaining], exact[is_apart]
 
     def asked(item: int) -> tuple[str, dict[str, Any]]:
         first, second = (document(body.shape) for body in couples[item])
         return "/v1/clearance", {"first": first, "second": second}
 
     about = "balls and boxes an ulp apart, turned boxes whose faces are flush, bars that cross, all of them apart"
-    found = field_of("clearance pairs", None, peers, 1)
+    result = field_of("clearance pairs", None, peers, 1)
     name = "nearly in contact" if dimension == 3 else "polygons nearly in contact"
-    return Contest("clearance", name, True, couples, exact, distances, found, about, request=asked)
+    return Contest("clearance", name, True, couples, exact, distances, result, about, request=asked)
 
 
 def _couple(draw: np.random.Generator, dimension: int, k: int) -> Couple:

@@ -1,4 +1,4 @@
-"""Do two bodies meet? Boolean beside boolean; most peers see surfaces, and miss a body inside another."""
+"""Do two bodies meet? Booleans are compared; most peers see surfaces, and miss a body inside another."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from benchmarks.workloads import Mesh, bumpy_sphere, document, generator, hard_p
 BOOKS = ("textbook:pair by vertices", "textbook:pair by edges", "textbook:pair by volumes")
 PEERS = (*BOOKS, "coal", "fcl", "open3d", "igl", "manifold3d")
 CALLED = ("coal", "fcl")
-"""Peers whose bare calls cost a part of what is measured."""
+"""Peers for which the overhead of a call is a part of the measured time."""
 NEAR: dict[str, Goals] = {"coal": (5.0, 8.0), "fcl": (3.3, 5.0)}
 SOUP: dict[str, Goals] = {"coal": (6.0, 10.0), "fcl": (5.0, 8.0)}
 CONVEX = {10: (3.0, 4.0), 32: (2.0, 3.0), 100: (1.3, 3.0), 200: (1.0, 3.0)}
@@ -80,13 +80,13 @@ def on_couples(
     name: str, is_hard: bool, couples: list[Any], exact: np.ndarray, about: str, peers: tuple[str, ...] = PEERS
 ) -> Contest:
     """Items are numbers of pairs: one call from Python for each, models are made beforehand."""
-    found = field_of("pair" if peers else "relation", None, peers, 1)
+    result = field_of("pair" if peers else "relation", None, peers, 1)
 
     def request(item: int) -> tuple[str, dict[str, Any]]:
         first, second = (document(body.shape) for body in couples[item])
         return "/v1/collide", {"first": first, "second": second}
 
-    made = [replace(_net(each), make=partial(_each, each, couples)) for each in found]
+    made = [replace(_net(each), make=partial(_each, each, couples)) for each in result]
     return Contest("collision", name, is_hard, np.arange(len(couples)), exact, same, made, about, request=request)
 
 
@@ -97,14 +97,14 @@ def _each(one: Contender, couples: list[Couple]) -> Prepared:
 
 
 def _net(one: Contender) -> Contender:
-    """Return the contender with what its bare calls cost."""
+    """Return the contender with the overhead of its calls."""
     module = one.make.args[0]  # type: ignore[attr-defined]
     return replace(one, overhead=partial(_overhead, module)) if module in CALLED else one
 
 
 @cache
 def _overhead(module: str) -> float:
-    """Return what one call costs on two triangles' worth of bodies far apart."""
+    """Return the seconds of one call on two bodies of a triangle each, far apart."""
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     couple = (Placed(Mesh("a", vertices, TETRAHEDRON)), Placed(Mesh("b", vertices + 100.0, TETRAHEDRON)))
     call = make(module, "pair", couple, 1).ask
@@ -130,16 +130,16 @@ def _easy(size: Size) -> Contest:
 
 
 def _poses(name: str, pair: Pair, kind: str, goals: Mapping[str, Goals], is_page: bool = False) -> Contest:
-    """Who is right where contenders differ is settled in rationals; a large mesh takes seconds."""
-    found = [_net(each) for each in field_of(kind, pair, goals, 1)]
+    """Pairs under poses; differing answers are decided in rationals; a large mesh takes seconds."""
+    result = [_net(each) for each in field_of(kind, pair, goals, 1)]
     if kind == "poses":
-        found.append(replace(contender("ours:relations", "", pair, 1), name="ours, five relations"))
+        result.append(replace(contender("ours:relations", "", pair, 1), name="ours, five relations"))
 
     def exact(chosen: np.ndarray) -> np.ndarray:
         return np.array([errors.collides(pair, row) for row in chosen])
 
     about = f"{pair.name}, {'solids' if pair.is_closed else 'surfaces'}, poses near contact"
-    return Contest("collision", name, True, np.arange(len(pair.rotations)), exact, same, found, about,
+    return Contest("collision", name, True, np.arange(len(pair.rotations)), exact, same, result, about,
                    n_sample=20 * is_page, most=20, request=partial(request, pair) if is_page else None)  # fmt: skip
 
 
@@ -161,23 +161,23 @@ def _convex(size: Size, n_vertices: int) -> Contest:
 
 def _alone(size: Size, kind: str) -> Contest:
     pair = pair_of_size("1k", size.n(400, 100), size.seed)
-    found, rows = field_of(f"{kind}", pair, (), 1), np.arange(len(pair.rotations))
-    return Contest("collision", f"near contact, 1k, {kind}", True, rows, None, same, found, count=len(rows))
+    result, rows = field_of(f"{kind}", pair, (), 1), np.arange(len(pair.rotations))
+    return Contest("collision", f"near contact, 1k, {kind}", True, rows, None, same, result, count=len(rows))
 
 
 def _crowd(size: Size, name: str, n_bodies: int) -> Contest:
-    """fcl updates its tree where bodies moved, ours starts from nothing as always."""
+    """Many bodies: fcl updates its tree for moved bodies, ours is rebuilt at each call."""
     bodies, is_moved = crowd(n_bodies, size.seed), name.endswith("before")
-    found = field_of("crowd", bodies, {"fcl": None if is_moved else (10.0, 20.0)}, 1)
+    result = field_of("crowd", bodies, {"fcl": None if is_moved else (10.0, 20.0)}, 1)
     frames = bodies.frames() if is_moved else []
-    return Contest("collision", name, False, frames, None, same, found, count=n_bodies * max(1, len(frames)))
+    return Contest("collision", name, False, frames, None, same, result, count=n_bodies * max(1, len(frames)))
 
 
 def _prepare(size: Size, faces: str) -> Contest:
     """From arrays to the tree."""
     mesh = pair_of_size(faces, 2, size.seed).first
-    found = field_of("tree", mesh, dict.fromkeys(CALLED, (1.0, 2.0)), 1)
-    return Contest("collision", f"prepare, {faces} faces", False, None, None, same, found, count=1)
+    result = field_of("tree", mesh, dict.fromkeys(CALLED, (1.0, 2.0)), 1)
+    return Contest("collision", f"prepare, {faces} faces", False, None, None, same, result, count=1)
 
 
 def _two_threads(size: Size) -> Contest:
@@ -225,7 +225,7 @@ def _run(name: str, ask: Any, count: int) -> Contest:
 
 
 def _simple_pairs() -> list[tuple[Any, Any]]:
-    """Return every simple solid with every other that collision is defined for, and a tetrahedron."""
+    """Return every pair of simple solids for which collision is defined, and a tetrahedron."""
     solids = [make() for make in workloads.SIMPLE.values()]
     solids.append(engine.Polyhedron([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]], TETRAHEDRON))
     return [pair for pair in product(solids, solids) if refusing(lambda each: engine.collide(*each), pair, None)]

@@ -1,4 +1,4 @@
-"""Points in polyhedra, polygons, convex and all other solids: easy points, and points on and beside the boundary."""
+"""Points in polyhedra, polygons, convex and all other solids: easy points, and points on and near the boundary."""
 
 from __future__ import annotations
 
@@ -73,9 +73,9 @@ def contest(
         f"containment {head}" if head in ("2D", "3D") else f"containment, {head}", tail)  # fmt: skip
     settle = (lambda rows: locations(points[rows], subject)) if peers else None
     exact = settle(slice(n_exact)) if n_exact and settle else settle
-    asked, is_hard = field_of("points", subject, peers, **more), bool(n_exact) and tail != "uniform"
+    queried, is_hard = field_of("points", subject, peers, **more), bool(n_exact) and tail != "uniform"
     how = partial(request, subject, points) if n_exact else None
-    return Contest(operation, shown, is_hard, points, exact, same, asked, about, request=how)
+    return Contest(operation, shown, is_hard, points, exact, same, queried, about, request=how)
 
 
 def request(subject: Any, points: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
@@ -109,14 +109,14 @@ def _hard_3d(size: Size, name: str) -> Contest:
     order = mixed.permutation(sum(map(len, points)))[: size.n(24_000)]
     owner, rows, exact = (np.concatenate(each)[order] for each in (owners, points, inside))
     about = "on vertices, edges and faces and ulps beside them, offsets to 1e9, slivers, non-manifold meshes"
-    found = [replace(each, make=partial(_on_many, each, meshes, owner, rows))
+    peers = [replace(each, make=partial(_on_many, each, meshes, owner, rows))
              for each in field_of("points", None, PAGE_PEERS)]  # fmt: skip
-    return Contest("containment 3D", "boundary", True, np.arange(len(rows)), exact[: size.n(4_000, 1_000)], same, found,
+    return Contest("containment 3D", "boundary", True, np.arange(len(rows)), exact[: size.n(4_000, 1_000)], same, peers,
                    about, request=lambda item: request(meshes[owner[item]], rows, item))  # fmt: skip
 
 
 def _on_many(each: Contender, meshes: list[Mesh], owner: np.ndarray, points: np.ndarray) -> Prepared:
-    """Return a contender whose items are rows of `points`, each asked of the mesh that owns it."""
+    """Return a contender whose items are rows of `points`, each located in the mesh that owns it."""
     module, kind, _, threads, *setting = each.make.args  # type: ignore[attr-defined]
 
     def built(mesh: Mesh) -> Prepared:
@@ -131,11 +131,11 @@ def _on_many(each: Contender, meshes: list[Mesh], owner: np.ndarray, points: np.
     made = [built(mesh) for mesh in meshes]
 
     def ask(rows: np.ndarray) -> np.ndarray:
-        found = np.empty(len(rows), np.int8)
+        result = np.empty(len(rows), np.int8)
         for i_mesh in np.unique(owner[rows]):
             mine, prepared = np.flatnonzero(owner[rows] == i_mesh), made[i_mesh]
-            found[mine] = prepared.answer(prepared.ask(prepared.native(points[rows[mine]])))
-        return found
+            result[mine] = prepared.answer(prepared.ask(prepared.native(points[rows[mine]])))
+        return result
 
     return Prepared(ask, share=made[-1].share)
 
@@ -209,7 +209,7 @@ def _row(size: Size, name: str, make: Callable[[], Any], place: str, peers: Mapp
 
 
 def _from_arrays(size: Size, faces: str, n_points: int) -> Contest:
-    """Everything from arrays; the build: asked so much that every structure is built."""
+    """Everything from arrays; the build includes every structure, after enough questions."""
     mesh = workloads.mesh_of_size(faces, size.seed)
     points = workloads.points_in_box(mesh, n_points or 8 * len(mesh.faces) + (1 << 17), size.seed)
     name = f"first {n_points}, {faces} faces" if n_points else f"build, {faces} faces"
@@ -222,22 +222,22 @@ def _bodies(what: str, n_bodies: int, seed: int) -> Bodies:
 
 
 def _scene(size: Size, name: str, what: str, n_bodies: int, is_new: bool) -> Contest:
-    """Points in many bodies; answers are told apart as `summed` has them."""
+    """Points in many bodies; answers are compared as `summed` returns them."""
     bodies, (peer, goals) = _bodies(what, n_bodies, size.seed), SCENES[what]
     points = _points(bodies, "uniform", size)
-    found = field_of("scene", bodies, {peer: None if is_new else goals}, is_new=is_new)
-    told = [replace(each, make=partial(summed, each, n_bodies)) for each in found]
+    result = field_of("scene", bodies, {peer: None if is_new else goals}, is_new=is_new)
+    reported = [replace(each, make=partial(summed, each, n_bodies)) for each in result]
     boxes = np.array([extent_of(body) for body in bodies.bodies])
 
     def exact(rows: np.ndarray) -> np.ndarray:
-        held = []
+        contained = []
         for point in points[rows]:
             near = np.flatnonzero(((boxes[:, 0] <= point) & (point <= boxes[:, 1])).all(axis=1)).tolist()
             owners = [number for number in near if locations(point[None], bodies.bodies[number])[0]]
-            held.append((len(owners), sum(owners)))
-        return np.array(held)
+            contained.append((len(owners), sum(owners)))
+        return np.array(contained)
 
-    return Contest("containment", name, False, points, None if is_new else exact, same_rows, told,
+    return Contest("containment", name, False, points, None if is_new else exact, same_rows, reported,
                    count=len(points) * is_new)  # fmt: skip
 
 
@@ -245,12 +245,12 @@ def summed(one: Contender, n_bodies: int) -> Prepared:
     """Return a contender that answers with how many bodies an item is in, and the sum of their numbers."""
     made = one.make()
 
-    def answer(found: tuple[int, Any]) -> np.ndarray:
-        owners, held = np.divmod(made.answer(found[1]), n_bodies)
-        return np.stack([np.bincount(owners, weights, found[0]) for weights in (None, held)], axis=1)
+    def answer(result: tuple[int, Any]) -> np.ndarray:
+        owners, contained = np.divmod(made.answer(result[1]), n_bodies)
+        return np.stack([np.bincount(owners, weights, result[0]) for weights in (None, contained)], axis=1)
 
     return Prepared(
-        lambda asked: (asked[0], made.ask(asked[1])),
+        lambda queried: (queried[0], made.ask(queried[1])),
         lambda points: (len(points), made.native(points)),
         answer,
         made.memory,

@@ -18,7 +18,7 @@ from benchmarks.workloads import Rings, document
 
 Pair = tuple[list[np.ndarray], list[np.ndarray]]
 MOST_VERTICES = 40
-"""Of a pair whose exact answer is found by the slow reference."""
+"""Largest pair whose exact answer the slow reference computes."""
 PEERS = ("textbook", "shapely", "shapely@1e-12", "shapely@1e-6", "manifold3d")
 """On the page: shapely also on grids of such a size."""
 PAGE = {
@@ -64,8 +64,8 @@ def _on_page(size: Size, name: str) -> Contest:
         pairs, is_hard = list(polygon_pairs.public(MOST_VERTICES))[: size.n(200, 60)], True
         about = f"at most {MOST_VERTICES} vertices, filed by users and suites of GEOS, polygon-clipping and Clipper"
     exact = np.array([overlay_area(pair) for pair in pairs])
-    found = field_of("overlay", "intersection", PEERS)
-    return Contest("overlay", name, is_hard, pairs, exact, areas, found, about, request=partial(request, pairs))
+    result = field_of("overlay", "intersection", PEERS)
+    return Contest("overlay", name, is_hard, pairs, exact, areas, result, about, request=partial(request, pairs))
 
 
 def request(pairs: list[Pair], item: int) -> tuple[str, dict[str, Any]]:
@@ -89,9 +89,9 @@ def by_ours(pair: Pair) -> tuple[float, float]:
     return engine.overlay(*map(engine.Polygon, pair)).area, scale_of(pair)
 
 
-def _contest(name: str, pairs: list[Pair], found: list[Any], is_judged: bool = True, **more: Any) -> Contest:
+def _contest(name: str, pairs: list[Pair], result: list[Any], is_judged: bool = True, **more: Any) -> Contest:
     exact = partial(_exact_areas, pairs) if is_judged else None
-    return Contest("overlay", name, False, pairs, exact, areas, found, count=len(pairs), **more)
+    return Contest("overlay", name, False, pairs, exact, areas, result, count=len(pairs), **more)
 
 
 def _large(size: Size, family: str, n: int) -> Contest:
@@ -106,16 +106,16 @@ def _batch(size: Size, family: str, n: int, how: str = "intersection") -> Contes
     if how == "two threads":
         return _contest(f"{name}, {how}", pairs, two_threads("overlay of made", "intersection"), False)
     peers: Mapping[str, Any] = SMALL if how == "intersection" else {}
-    found = field_of("overlay of made", how, peers, 1)
-    return _contest(name if peers else f"{name}, {how}", pairs, found, bool(peers),
+    result = field_of("overlay of made", how, peers, 1)
+    return _contest(name if peers else f"{name}, {how}", pairs, result, bool(peers),
                     n_sample=max(3, min(60, 1500 // n**2)), most=0)  # fmt: skip
 
 
 def _layers(size: Size, how: str) -> Contest:
     """Two layers of parcels, each meets some four of the other; from frame to frame, one thread. Ours alone."""
     layers = tuple(polygon_pairs.parcels(size.n(20_000, 2_000), size.seed + side) for side in range(2))
-    found = field_of("layers", how, (), 1)
-    return Contest("layers", f"layers of 20,000, {how}", False, layers, None, areas, found, count=len(layers[0]))
+    result = field_of("layers", how, (), 1)
+    return Contest("layers", f"layers of 20,000, {how}", False, layers, None, areas, result, count=len(layers[0]))
 
 
 def _union(size: Size, family: str) -> Figure:
@@ -146,8 +146,8 @@ def _public(size: Size) -> Contest:
     """Pairs of public suites, polygons made while the clock runs."""
     pairs = _filed(size)
     exact = np.array([by_ours(pair) for pair in pairs])
-    found = field_of("overlay", "intersection", ["shapely", "manifold3d"], 1)
-    return Contest("overlay", "public pairs", True, pairs, exact, areas, found, count=len(pairs))
+    result = field_of("overlay", "intersection", ["shapely", "manifold3d"], 1)
+    return Contest("overlay", "public pairs", True, pairs, exact, areas, result, count=len(pairs))
 
 
 def _area(size: Size) -> Contest:

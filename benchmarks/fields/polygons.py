@@ -43,12 +43,12 @@ def _stars(size: Size, name: str, is_hard: bool) -> Contest:
         about += ", on a lattice of halves, some an ulp off"
     box = SIMPLE["aabb 2D"]()
     exact = errors.areas_in_region(rings[: size.n(400, 100)], box)
-    found = field_of("polygon areas", box, ["textbook", "shapely", "manifold3d"])
+    result = field_of("polygon areas", box, ["textbook", "shapely", "manifold3d"])
 
     def request(item: int) -> tuple[str, dict[str, Any]]:
         return "/v1/clip/polygons", {"region": document(box), "polygons": [[rings[item].tolist()]]}
 
-    return Contest("clipping polygons", name, is_hard, rings, exact, errors.areas, found, about, request=request)
+    return Contest("clipping polygons", name, is_hard, rings, exact, errors.areas, result, about, request=request)
 
 
 def _row(size: Size, name: str, n_vertices: int, peers: dict[str, Goals]) -> Contest:

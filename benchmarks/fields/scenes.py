@@ -1,4 +1,4 @@
-"""Scenes that stay: segments through many bodies, what changed when some moved, single questions to a kept scene."""
+"""Stored scenes: segments through many bodies, changes after some moved, single questions."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from benchmarks.workloads import Bodies, Mesh, generator
 
 SINGLE: dict[str, Goals] = {"open3d": (1.0, 2.0), "trimesh": (1.0, 2.0)}
 KEEP: dict[str, dict[str, Goals]] = {"all": SINGLE, "first": {"open3d": (1.0, 2.0)}, "any": SINGLE}
-"""What is kept of the pieces: every body met, or whether any is; against rays that find all, the first, or any hit."""
+"""Which pieces are returned: of every body met, or whether any is; against rays with all hits, the first, or any."""
 Ways = dict[str, tuple[Callable[[Any], object], Goals]]
-"""Of ours: what follows the name, what is asked, and what the ratio must be."""
+"""Variants of ours: suffix of the name, question, and goal of the ratio."""
 
 
 def tasks(size: Size) -> Iterator[Task]:
@@ -69,23 +69,24 @@ def _segments(bodies: Bodies, n: int, is_grazing: bool, seed: int) -> np.ndarray
 
 
 def _through(size: Size, n_bodies: int, keep: str, n_segments: int, is_grazing: bool) -> Contest:
-    """Told apart by how many bodies a segment meets and the sum of their numbers, or by whether it meets any.
+    """Segments through a scene, compared by the number of bodies a segment meets and the sum of their numbers, or by
+    whether it meets any.
 
     Segments that graze are judged, without balls, whose meshes would have other answers.
     """
     bodies = scattered(n_bodies, size.seed, not is_grazing)
     segments = _segments(bodies, n_segments if n_segments <= 100 else size.n(n_segments), is_grazing, size.seed)
-    found = field_of(f"scene {keep}", bodies, KEEP[keep], 1)
+    result = field_of(f"scene {keep}", bodies, KEEP[keep], 1)
 
     def exact(rows: np.ndarray) -> np.ndarray:
         met = [[n for n, body in enumerate(bodies.bodies) if meets(segments[row], body)] for row in rows.tolist()]
         return np.array([(len(owners), sum(owners)) for owners in met] if keep == "all" else list(map(bool, met)))
 
     if keep == "all":
-        found = [replace(each, make=partial(summed, each, n_bodies)) for each in found]
+        result = [replace(each, make=partial(summed, each, n_bodies)) for each in result]
     name = f"{n_segments:,} segments{' that graze' * is_grazing}, {keep}"
     return Contest("scenes", name, is_grazing, segments, exact if is_grazing else None,
-                   same_rows if keep == "all" else same, found, most=50)  # fmt: skip
+                   same_rows if keep == "all" else same, result, most=50)  # fmt: skip
 
 
 @cache
@@ -99,10 +100,10 @@ def _scene(size: Size) -> tuple[engine.Scene, Crowd]:
 
 
 def _ours(name: str, asks: Ways, count: int) -> Contest:
-    """Return a contest between ways of ours, the first of them is ours."""
-    found = [Contender(f"ours{about}", lambda ask=ask: Prepared(ask, answer=lambda _: None), goals=goals)
+    """Return a contest between variants of ours; the first is the reference."""
+    result = [Contender(f"ours{about}", lambda ask=ask: Prepared(ask, answer=lambda _: None), goals=goals)
              for about, (ask, goals) in asks.items()]  # fmt: skip
-    return Contest("scenes", name, False, None, None, same, found, count=count)
+    return Contest("scenes", name, False, None, None, same, result, count=count)
 
 
 def _moved(size: Size) -> Contest:
@@ -123,7 +124,7 @@ def _moved(size: Size) -> Contest:
 
 
 def _frame(one: Contender, bodies: Crowd) -> Prepared:
-    """Return a contender that puts every body where it is, and asks for all pairs."""
+    """Return a contender that sets every body's pose, and computes all pairs."""
     made = one.make()
     frames = made.native([bodies])
     return Prepared(lambda _: made.ask(frames))

@@ -1,4 +1,4 @@
-"""Segments on boxes, convex solids, spheres, polygons and meshes: kept or not, and the coordinates of what is kept."""
+"""Segments clipped to boxes, convex solids, spheres, polygons and meshes: whether any is left, and where."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def _lines(size: Size, step: float) -> Contest:
     region, draw = _region("polygon of 1,000", size.seed), workloads.generator(f"lines/{step}", size.seed)
     walks = draw.normal(size=(size.n(100_000), 10, 2)) * step
     walks[:, 0] = draw.uniform(region.vertices.min(axis=0), region.vertices.max(axis=0), (len(walks), 2))
-    found, name = field_of("lines", region, {"shapely": (5.0, 10.0)}, 1), f"lines of 10, steps of {step}"
-    return Contest("lines", name, False, walks.cumsum(axis=1), None, errors.same, found)
+    result, name = field_of("lines", region, {"shapely": (5.0, 10.0)}, 1), f"lines of 10, steps of {step}"
+    return Contest("lines", name, False, walks.cumsum(axis=1), None, errors.same, result)
 
 
 def _region(name: str, seed: int) -> Any:
@@ -82,8 +82,8 @@ def _row(size: Size, name: str) -> Contest:
         exact = errors.first_pieces(segments[: size.n(1000 if len(peers) > 2 else 500, 200)], region)
     elif peers and "ours" not in peers:
         exact = partial(_settle, segments, region)
-    found = two_threads("segments", region) if "ours" in peers else field_of("segments", region, peers, 1)
-    return Contest("clipping segments", name, is_hard, segments, exact, errors.coordinates, found, HARD[kind],
+    result = two_threads("segments", region) if "ours" in peers else field_of("segments", region, peers, 1)
+    return Contest("clipping segments", name, is_hard, segments, exact, errors.coordinates, result, HARD[kind],
                    n_sample=100, request=partial(request, region, segments))  # fmt: skip
 
 
@@ -101,6 +101,6 @@ def _mesh(size: Size, faces: str, is_new: bool) -> Contest:
     mesh = workloads.mesh_of_size(faces, size.seed)
     n_segments = 100 if is_new else size.n(100_000)
     segments = np.ascontiguousarray(workloads.points_in_box(mesh, 2 * n_segments, size.seed).reshape(-1, 2, 3))
-    found = field_of("hits", mesh, {"trimesh": (3.0, 10.0)}, 1, is_new=is_new)
+    result = field_of("hits", mesh, {"trimesh": (3.0, 10.0)}, 1, is_new=is_new)
     name = f"first 100, {faces} faces" if is_new else f"{faces} faces"
-    return Contest("segments", name, False, segments, None, errors.same, found, count=n_segments)
+    return Contest("segments", name, False, segments, None, errors.same, result, count=n_segments)

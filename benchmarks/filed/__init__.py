@@ -1,7 +1,7 @@
-"""Cases that users of other libraries filed (benchmarks/filed), replayed on ours and on every peer.
+"""Bug reports of users of other libraries (benchmarks/filed), rerun on ours and on every peer.
 
     python -m benchmarks filed                 # the tables; --cases: also one line for each case
-    python -m benchmarks filed --answers       # compute the exact answers anew and write them into cases.json
+    python -m benchmarks filed --answers       # recompute the exact answers and write them into cases.json
     python -m benchmarks report --filed        # put the answers into the stored results, and write the pages again
 
 Each contender runs in a process of its own, so that one that crashes or never returns costs its own case only. Points
@@ -41,7 +41,7 @@ Case = dict[str, Any]
 
 
 class Peer(NamedTuple):
-    """One contender: its module, and for each kind of question what its maker is called."""
+    """One contender: its module, and its maker for each kind of question."""
 
     name: str
     module: str
@@ -87,11 +87,11 @@ def kind_of(case: Case) -> str:
 
 
 def is_right(case: Case, answer: Any) -> bool:
-    """Say whether a peer's answer is the exact one, up to rounding."""
+    """Return whether a peer's answer is the exact one, up to rounding."""
     exact, data = case["answer"], case["input"]
     match case["operation"]:
         case "locate":
-            return [bool(held) for held in answer] == [location >= 0 for location in exact]
+            return [bool(inside) for inside in answer] == [location >= 0 for location in exact]
         case "collide":
             return bool(answer) == (exact != "disjoint")
         case "overlay":
@@ -103,9 +103,9 @@ def is_right(case: Case, answer: Any) -> bool:
             return abs(np.sum(answer) - sum(abs(_area(ring)) for rings in exact for ring in rings)) <= TOLERANCE * size
     slack = TOLERANCE * _extent([data["segments"]]).max()
     pieces = _long_pieces([(piece["segment"], piece["start"], piece["end"]) for piece in exact], slack)
-    found = _long_pieces(answer, slack)
-    pairs = zip(pieces, found)
-    return len(pieces) == len(found) and all(i == j and np.abs(a - b).max() <= slack for (i, a), (j, b) in pairs)
+    result = _long_pieces(answer, slack)
+    pairs = zip(pieces, result)
+    return len(pieces) == len(result) and all(i == j and np.abs(a - b).max() <= slack for (i, a), (j, b) in pairs)
 
 
 def _area(ring: Any) -> float:
@@ -129,7 +129,7 @@ def _long_pieces(pieces: Sequence[Any], slack: float) -> list[tuple[int, np.ndar
 
 
 def _subject(solid: dict[str, Any], is_region: bool = False) -> Any:
-    """Return a solid as the contenders take it."""
+    """Return a solid as contenders accept it."""
     match solid["type"]:
         case "polyhedron" if is_region:
             return engine.Polyhedron(solid["vertices"], solid["faces"])
@@ -151,7 +151,7 @@ def _placed(data: dict[str, Any], key: str) -> Placed:
     return Placed(_subject(data[key]), placed, data[key]["type"] != "surface")  # type: ignore[arg-type]
 
 
-def _asked(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
+def _answer_of_peer(module: str, kind: str, operation: str, data: dict[str, Any]) -> Any:
     """Return a contender's answer to a case."""
     match operation:
         case "locate":
@@ -178,7 +178,7 @@ def _answer(peer: Peer, case: Case) -> tuple[str, str, list[int]]:
 
             is_ok = OPERATIONS[case["operation"]].by_engine(case["input"]) == case["answer"]
             return "right" if is_ok else "wrong", "", []
-        answer = _asked(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
+        answer = _answer_of_peer(peer.module, peer.calls[kind_of(case)], case["operation"], case["input"])
         return ("right", "", []) if is_right(case, answer) else ("wrong", *museum.said(case, answer))
     except NotApplicable:
         return "not applicable", "", []
@@ -199,8 +199,8 @@ def replay(names: Sequence[str] = (), limit: float = LIMIT, cases: list[Case] | 
 
     A contender that cannot be imported has one row, with the outcome `absent`. cases: those that users filed, if None.
     """
-    asked = load() if cases is None else cases
-    rows = [row for peer in PEERS if not names or peer.name in names for row in _replay_one(peer, asked, limit)]
+    queried = load() if cases is None else cases
+    rows = [row for peer in PEERS if not names or peer.name in names for row in _replay_one(peer, queried, limit)]
     return [row for row in rows if row["outcome"] != "not applicable"]
 
 

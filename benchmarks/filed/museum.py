@@ -1,4 +1,4 @@
-"""docs/museum.html: every filed case with its drawing, what is true, and what each contender says of it today."""
+"""docs/museum.html: every filed case with its drawing, the exact answer, and each contender's current answer."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def text_of(rows: list[dict[str, Any]], cases: list[Case], path: str) -> str:
 
 
 def request(case: Case) -> tuple[str, dict[str, Any]]:
-    """Return path and body that ask the service; posed bodies are asked as a scene of two."""
+    """Return path and body of the request to the service; posed bodies become a scene of two."""
     data = case["input"]
     if "first_pose" in data or "second_pose" in data:
         bodies = [{"solid": data[key]} | ({"pose": data[f"{key}_pose"]} if f"{key}_pose" in data else {})
@@ -49,7 +49,7 @@ def request(case: Case) -> tuple[str, dict[str, Any]]:
 
 
 def is_on_boundary(case: Case, where: list[int]) -> bool:
-    """Tell whether what is wrong lies on the boundary or only touches, where libraries may promise another answer."""
+    """Return whether the wrong items are on the boundary or only touch, where libraries may define another answer."""
     exact = case["answer"]
     if case["operation"] == "clip_segments":
         middles = np.array([[piece["start"], piece["end"]] for piece in exact]).mean(axis=1)
@@ -77,10 +77,12 @@ def exact_words(case: Case) -> str:
 
 
 def said(case: Case, answer: Any) -> tuple[str, list[int]]:
-    """Return what a contender answers in words, and the items that it gets wrong where there are some."""
+    """Return a contender's answer in words, and the items that it gets wrong, if any."""
     match case["operation"]:
         case "locate":
-            wrong = [i for i, (held, place) in enumerate(zip(answer, case["answer"])) if bool(held) != (place >= 0)]
+            wrong = [
+                i for i, (contained, place) in enumerate(zip(answer, case["answer"])) if bool(contained) != (place >= 0)
+            ]
             first = f"{'inside' if answer[wrong[0]] else 'outside'}, where exact is {PLACES[case['answer'][wrong[0]]]}"
             return (first if len(answer) == 1 else f"{len(wrong)} of {len(answer)} points, the first {first}"), wrong
         case "collide":

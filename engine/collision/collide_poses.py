@@ -28,7 +28,7 @@ from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
-from engine.solids.pose import Pose, check_rotations, is_surely_rotation, motion_of
+from engine.solids.pose import Pose, check_rotations, is_certified_rotation, motion_of
 from engine.solids.primitives import Sphere
 from engine.solids.shapes import as_pose_arrays, as_solid
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
@@ -174,7 +174,7 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
     move: Any = translations
     if is_ready(turn, dimension, dimension) and is_ready(move, dimension) and len(turn) == 1 == len(move):
         turn, move = read_only(turn), read_only(move)
-        if isfinite(sum(move[0].tolist())) and is_surely_rotation(turn):
+        if isfinite(sum(move[0].tolist())) and is_certified_rotation(turn):
             return turn, move
     turns, moves = as_floats(rotations, 3, ("rotations",)), as_floats(translations, 2, ("translations",))
     if len(turns) and turns.shape[1:] != (dimension, dimension):

@@ -1,7 +1,6 @@
-"""All that the engine takes from numba's inside; where a name is missing, importing a part fails and says which.
+"""Everything that the engine uses of numba's internals; if a name is missing, the import fails and names it.
 
-`compilers` are the steps by which kernels and inner functions are compiled, `caches` keep them on disk; neither needs
-the other.
+`compilers` compiles kernels and inner functions, `caches` stores them on disk; neither needs the other.
 """
 
 from __future__ import annotations
@@ -10,8 +9,8 @@ import numba
 
 
 def require(names: dict[type, tuple[str, ...]]) -> None:
-    """Raise ImportError unless classes of numba have these names."""
-    for owner, asked in names.items():
-        for name in asked:
+    """Raise ImportError unless the classes of numba have these attributes."""
+    for owner, needed in names.items():
+        for name in needed:
             if not hasattr(owner, name):
                 raise ImportError(f"numba {numba.__version__} has no {owner.__name__}.{name}")

@@ -1,4 +1,4 @@
-"""How kernels are kept on disk, and for which CPUs."""
+"""Stores compiled kernels on disk, for families of CPUs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,14 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from engine.compiling import require
-from engine.compiling.kernel_cache import COMPLETE, cache_folder, is_of_its_source, keep, kept, source_digest
+from engine.compiling.kernel_cache import (
+    COMPLETE,
+    cache_folder,
+    matches_its_source,
+    read_cached,
+    source_digest,
+    write_cached,
+)
 
 require(
     {
@@ -32,14 +39,14 @@ _V2 = ("cx16", "popcnt", "sse3", "sse4.1", "sse4.2", "ssse3")
 _V3 = (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 _V4 = (*_V3, "avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl")
 BASELINES: Final = {"x86-64-v4": _V4, "x86-64-v3": _V3, "x86-64-v2": _V2, "generic": ()}
-"""Families of CPUs whose kernels a host may take, and what it must be able to do for that."""
+"""Families of CPUs whose kernels a host may load, and the features that it needs for that."""
 
 
 @functools.cache
 def cpus() -> list[tuple[str, str]]:
-    """Return the CPUs whose kernels are taken, as numba names them (name, features): the one compiled for first.
+    """Return the CPUs whose kernels are loaded, as numba names them (name, features), first the one compiled for.
 
-    That alone where ``NUMBA_CPU_NAME`` names it, else the families that the host is of too.
+    Only the one that ``NUMBA_CPU_NAME`` names, else the host and the families that it belongs to.
     """
     name, features = numba_config.CPU_NAME, numba_config.CPU_FEATURES
     own = (
@@ -52,19 +59,19 @@ def cpus() -> list[tuple[str, str]]:
     return [own, *((family, "") for family, needed in BASELINES.items() if all(map(able.get, needed)))]
 
 
-def signs() -> list[str]:
-    """Return the names of the empty files that say that all is compiled for each of `cpus`."""
+def marker_files() -> list[str]:
+    """Return the names of the empty files that mark a complete cache for each of `cpus`."""
     return [f"{COMPLETE}-{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}" for name, features in cpus()]
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
-    """What one kernel was compiled to: a file for each kind of arguments and CPU.
+    """The cached machine code of one kernel: a file for each kind of arguments and CPU.
 
-    Machine code alone. numba puts the code from before the last steps of compiling beside it, for callers that are
-    compiled later, and parses that at each load: more than half of all loading. No compiled function calls a kernel (a
-    test looks), and should one, numba says that the kernel is unfit for linking. The constants of a function that has
-    none, and the annotated source, are left out too. numba's own files (an index, numbered data, both named by times of
-    sources) may end with another's code where two processes write, or one is killed.
+    numba also stores the bitcode before the last compiler steps, for callers that are compiled later, and parses it at
+    each load: more than half of all loading. No compiled function calls a kernel (a test looks), and should one, numba
+    says that the kernel is unfit for linking. Empty constants and the annotated source are left out too. numba's own
+    files (an index, numbered data, both named by times of sources) may end with another's code if two processes write,
+    or one is killed.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -79,13 +86,13 @@ class KernelCache(NullCache):  # type: ignore[misc]
         return f"{source_digest(self._function.__module__)}/{self._function.__qualname__}-{key}.nbc"
 
     def load_overload(self, types: Any, target_context: Any) -> CompileResult | None:
-        """Return the kernel for `types` and this CPU, else for a family that it is of; None if it is not there.
+        """Return the kernel for `types` and this CPU, else for a family that it belongs to; None if neither is cached.
 
-        numba first brings in everything that it can compile, a third of a second; compiling does that by itself.
+        numba first imports everything that it can compile, a third of a second; compiling does that by itself.
         """
         rtsys.initialize(target_context)
         for cpu in cpus() if source_digest(self._function.__module__) else ():
-            content = kept(self._name(types, cpu))
+            content = read_cached(self._name(types, cpu))
             if content:
                 try:
                     parts = pickle.loads(content)
@@ -95,19 +102,19 @@ class KernelCache(NullCache):  # type: ignore[misc]
         return None
 
     def save_overload(self, types: Any, result: CompileResult) -> None:
-        """Keep a kernel, where what it was compiled from is what its name says."""
+        """Store a kernel, if its sources are those that its name says."""
         module = self._function.__module__
-        if not result.library.has_dynamic_globals and source_digest(module) and is_of_its_source(module):
+        if not result.library.has_dynamic_globals and source_digest(module) and matches_its_source(module):
             (name, _, (code, _)), fndesc, environment, signature, *_, reload, constants = result._reduce()
             constants = [item for item in constants if item.consts]
             content = dumps((name, code, fndesc, environment, signature, reload, constants))
-            keep(self._name(types, cpus()[0]), content)
+            write_cached(self._name(types, cpus()[0]), content)
 
 
 def _rebuilt(
     context: Any, name: str, code: bytes, fndesc: Any, environment: Any, signature: Any, reload: Any, constants: Any
 ) -> CompileResult:
-    """Return the kernel that was kept, ready to be called."""
+    """Return a stored kernel, ready to be called."""
     for prepare in reload:
         prepare()
     codegen = context.codegen()

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from numba import config as numba_config
 
-from engine.compiling.jit import complete_signs
-from engine.compiling.kernel_cache import cache_folder, is_of_its_source, seed, source_digest
+from engine.compiling.jit import completion_markers
+from engine.compiling.kernel_cache import cache_folder, matches_its_source, seed, source_digest
 
 try:
     import fcntl
@@ -46,15 +46,14 @@ def fill_cache(
 ) -> Sequence[int]:
     """Call the functions in ``STEPS`` of the engine's `module`, one at a time in each of so many `processes`.
 
-    Returns the indices of those that ended well: none where the cache is known to hold everything, or where it cannot
-    be written. Other processes that ask meanwhile wait for the one that compiles. What a step failed to leave in the
-    cache (it was killed, the disk is full) is compiled by whoever calls it.
-    shares: how long each step takes, to any scale.
-    progress: called with the share of each step that ended.
+    Returns the indices of those that succeeded: none if the cache is already complete or cannot be written. Other
+    processes that call this meanwhile wait for the one that compiles. What a step failed to store (it was killed, the
+    disk is full) is compiled by its first caller. shares: relative duration of each step. progress: called with the
+    share of each step that ended.
     """
-    folder, found = cache_folder(), seed()
-    if found is not None and source_digest(module) is not None and not _has_all(found, module):
-        log.warning("the kernel seed %s lacks kernels of this version for this CPU: they are compiled", found)
+    folder, seed_folder = cache_folder(), seed()
+    if seed_folder is not None and source_digest(module) is not None and not _has_all(seed_folder, module):
+        log.warning("the kernel seed %s lacks kernels of this version for this CPU: they are compiled", seed_folder)
     digest = source_digest(module)
     if folder is None or digest is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable:
         return ()
@@ -63,7 +62,7 @@ def fill_cache(
     with contextlib.suppress(OSError):
         own = folder / digest
         own.mkdir(mode=0o755, parents=True, exist_ok=True)
-        with _alone(own / "lock"):
+        with _locked(own / "lock"):
             if not _is_full(module):
                 done = _run(module, shares, processes, progress)
                 if len(done) == len(shares):
@@ -73,30 +72,30 @@ def fill_cache(
 
 
 def note_full(module: str) -> None:
-    """Note that the cache holds all that the steps of `module` compile: every one of them was called."""
+    """Mark the cache as complete for the steps of `module`: every one of them was called."""
     folder, digest = cache_folder(), source_digest(module)
     if folder is None or digest is None or numba_config.DISABLE_JIT or _is_full(module):
         return
-    if is_of_its_source(module):
+    if matches_its_source(module):
         with contextlib.suppress(OSError):
             own = folder / digest
             own.mkdir(mode=0o755, parents=True, exist_ok=True)
-            for sign in complete_signs()[:1]:
-                (own / sign).touch()
+            for marker in completion_markers()[:1]:
+                (own / marker).touch()
 
 
 def _is_full(module: str) -> bool:
-    """Tell whether nothing is left to compile for a CPU whose kernels can be run here."""
+    """Return whether nothing is left to compile for a CPU whose kernels can run here."""
     return any(folder is not None and _has_all(folder, module) for folder in (cache_folder(), seed()))
 
 
 def _has_all(folder: Path, module: str) -> bool:
     digest = source_digest(module)
-    return digest is not None and any((folder / digest / sign).exists() for sign in complete_signs())
+    return digest is not None and any((folder / digest / marker).exists() for marker in completion_markers())
 
 
 @contextlib.contextmanager
-def _alone(path: Path) -> Iterator[None]:
+def _locked(path: Path) -> Iterator[None]:
     with path.open("w") as file:
         if fcntl is not None:
             fcntl.flock(file, fcntl.LOCK_EX)  # given back when the process ends, however it ends
@@ -104,7 +103,7 @@ def _alone(path: Path) -> Iterator[None]:
 
 
 def _run(module: str, shares: Sequence[int], processes: int, progress: Callable[[int], object] | None) -> Sequence[int]:
-    """Return the steps that ended well; processes take them from one pipe, and say in another what is done."""
+    """Return the steps that succeeded; processes take them from one pipe, and report to another."""
     log.info("compiling all kernels, once for these sources: %d parts, %d processes", len(shares), processes)
     done: list[int] = []
     begin, running = time.perf_counter(), []

@@ -1,4 +1,4 @@
-"""The steps by which kernels and inner functions are compiled: once for each kind of arguments, optimised once."""
+"""Compiler pipelines of kernels and inner functions: once for each kind of arguments, optimised once."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ require(
 
 
 class _CalledLower(Lower):  # type: ignore[misc] # numba carries no types
-    """Writes a function that the compiler may not copy into its callers."""
+    """Lowers a function that may not be inlined into its callers."""
 
     def setup_function(self, descriptor: Any) -> None:
         super().setup_function(descriptor)
@@ -61,9 +61,9 @@ class _CalledLower(Lower):  # type: ignore[misc] # numba carries no types
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]
-    """Code as it was written, that is optimised, with all that is below it, within the kernel.
+    """Unoptimised code; the kernel that links it optimises it together with all that it calls.
 
-    To optimise inner functions beforehand as well, again with each of their callers, was a quarter of all compiling.
+    Optimising inner functions separately, again with each of their callers, was a quarter of all compiling.
     """
 
     def __init__(self, codegen: JITCPUCodegen, name: str) -> None:
@@ -92,11 +92,11 @@ class _InnerLibrary(_Library):
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Return what a kernel links in beside all that is below."""
+        """Return the module that a kernel links, without the libraries it calls."""
         return super()._get_module_for_linking()
 
     def _get_module_for_linking(self) -> Any:
-        """Return all at once, for numba's own libraries: those of who calls our functions from another compiler."""
+        """Return one linked module, for callers compiled by stock numba."""
         module = self.own_module().clone()
         for library in reversed(self.below):
             module.link_in(library.own_module(), preserve=True)
@@ -104,21 +104,21 @@ class _InnerLibrary(_Library):
 
 
 class _KernelLibrary(_Library):
-    """Machine code that Python calls, and all that it needs."""
+    """Machine code that Python calls, with everything that it calls."""
 
     def finalize(self) -> None:
-        for library in reversed(self.below):  # callers first: the linker drops what nobody has asked for yet
+        for library in reversed(self.below):  # callers first: the linker drops unreferenced functions
             if hasattr(library, "_reload_init"):  # since numba 0.63
                 self._reload_init.update(library._reload_init)
             self._final_module.link_in(library.own_module(), preserve=True)
         super().finalize()
 
     def _optimize_final_module(self) -> None:
-        """Make all passes once: numba makes cheap ones before, for counted references, of which hardly any are here.
+        """Run all passes once: numba runs cheap ones before, for reference counts, of which hardly any are here.
 
-        What is linked in is nobody else's: with one call it is copied there whatever its size, and an argument that it
-        does not use, such as most arrays of a table, is not handed over. It has a name of its own, since the linker
-        would take it for what another compiler made of the same function, and finds no address.
+        What is linked in becomes private: a function with one call is inlined whatever its size, and an unused
+        argument, such as most arrays of a table, is not passed. It gets a name of its own, since the linker would take
+        it for stock numba's version of the same function, and finds no address.
         """
         for function in self._final_module.functions:
             if function.linkage == llvmlite.binding.Linkage.linkonce_odr:
@@ -129,7 +129,7 @@ class _KernelLibrary(_Library):
 
 
 class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
-    """numba's own generator of code, all of its state shared, but for the kind of library that it makes."""
+    """numba's code generator, with all of its state shared, that makes inner libraries."""
 
     _library_class = _InnerLibrary
 
@@ -137,12 +137,12 @@ class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
         self.__dict__.update(vars(shared))
 
     def set_env(self, env_name: str, env: Any) -> None:
-        """Leave that to the kernels: inner code stands nowhere that could be told of its constants."""
+        """Do nothing: inner libraries have no native environment."""
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _KernelLowering(NativeLowering):  # type: ignore[misc]
-    """Writes a kernel; what numba itself compiles to be called from there becomes inner libraries."""
+    """Lowers a kernel; the functions that numba itself compiles for it become inner libraries."""
 
     _name = "engine_kernel_lowering"
 
@@ -162,7 +162,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         return library
 
     def _set_constants(self, library: JITCodeLibrary) -> None:
-        """Tell the machine code where the constants of all functions in it are."""
+        """Set the address of the constants of all functions in the machine code."""
         for name in [variable.name for variable in library._final_module.global_variables]:
             if (environment := lookup_environment(name)) is not None:
                 library.codegen.set_env(name, environment)
@@ -186,7 +186,7 @@ class _CalledLowering(_InnerLowering):
 
 
 class _Typing(Context):  # type: ignore[misc]
-    """numba's own knowledge of types, all of its state shared, asked once what a built-in function gives for types.
+    """numba's typing context, with all of its state shared, that memoises the types of built-in functions.
 
     numba compiles those that it writes in Python (`max`, `np.empty`) with options of the first caller; of ours, one
     matters there: `_typing`.
@@ -200,31 +200,31 @@ class _Typing(Context):  # type: ignore[misc]
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
         if kws or isinstance(func, (Dispatcher, str)):  # "static_getitem" takes numbers, slices
             return self._shared.resolve_function_type(func, args, kws)
-        return self._once((func, args), self._shared.resolve_function_type, func, args, kws)
+        return self._memoized((func, args), self._shared.resolve_function_type, func, args, kws)
 
     def resolve_getattr(self, typ: Any, attr: str) -> Any:
-        return self._once((attr, typ), self._shared.resolve_getattr, typ, attr)
+        return self._memoized((attr, typ), self._shared.resolve_getattr, typ, attr)
 
-    def _once(self, key: Any, ask: Callable[..., Any], *asked: Any) -> Any:
+    def _memoized(self, key: Any, compute: Callable[..., Any], *arguments: Any) -> Any:
         if key not in self._known:
-            self._known[key] = ask(*asked)
+            self._known[key] = compute(*arguments)
         return self._known[key]
 
 
 @functools.cache
 def _typing(shared: Context, counts: bool) -> _Typing:
-    """Return the one for functions that do, or do not, count references."""
+    """Return the typing context for functions that count references, or that do not."""
     return _Typing(shared)
 
 
 def _check_result(context: Any, result: Any, name: str) -> None:
-    """Raise TypeError for a result in which there are arrays, where one side alone would count references to them."""
+    """Raise TypeError for a result with arrays, if only one side would count references to them."""
     if context.data_model_manager[result].contains_nrt_meminfo():
         raise TypeError(f"{name} returns {result}: that needs an allocating function below an allocating kernel")
 
 
 class KernelCompiler(CompilerBase):  # type: ignore[misc]
-    """numba's own steps, but for the library that a function is written into."""
+    """numba's own pipeline, but for the library that a function is lowered into."""
 
     lowering: type[NativeLowering] = _KernelLowering
 
@@ -233,9 +233,9 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         self.state.typingctx = _typing(typing, bool(self.state.flags.nrt))
 
     def compile_extra(self, function: Any) -> Any:
-        """Compile; to look for cycles as often as Python does, among so much that lives long, takes a tenth of it.
+        """Compile, with the garbage collector relaxed (10 % of compile time).
 
-        Raises: TypeError where a kernel that does not count references returns arrays: Python would free them.
+        Raises: TypeError if a kernel that does not count references returns arrays: Python would free them.
         """
         usual = gc.get_threshold()
         gc.set_threshold(50_000, 20, 50)
@@ -248,14 +248,14 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         return made
 
     def define_pipelines(self) -> list[Any]:
-        """Leave out what joins operations on whole arrays, and what looks for functions in a function that has none."""
-        if not compiles_rightly():
+        """Drop the passes for whole-array expressions, and for closures in a function that has none."""
+        if not compiles_correctly():
             return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
         has_inner = any(isinstance(item, types.CodeType) for item in self.state.func_id.code.co_consts)
         without = {NopythonRewrites} if has_inner else {NopythonRewrites, InlineClosureLikes}
-        kept = [item for item in steps.passes if item[0] not in without]
-        steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in kept]
+        retained = [item for item in steps.passes if item[0] not in without]
+        steps.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in retained]
         steps.finalize()
         return [steps]
 
@@ -269,35 +269,35 @@ class CalledCompiler(KernelCompiler):
 
 
 class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
-    """Compiles a function once for ``int``, not again for each number that a caller spells out.
+    """Compiles a function once for ``int``, not again for each integer literal.
 
-    Nor again for callers that count references to arrays and callers that do not: what it does to those it is handed
-    comes out even either way. Those that it returned, counted by one side alone, would be freed while in use, or never.
+    Nor again for callers that count references and callers that do not: its effect on the counts of its arguments is
+    neutral either way. Arrays that it returned, counted by one side alone, would be freed while in use, or never.
 
-    Raises: TypeError where a function that returns arrays, and its caller, do not both count.
+    Raises: TypeError if a function that returns arrays, and its caller, do not both count.
     """
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         plain = {name: unliteral(kind) for name, kind in kws.items()}
-        found = super().get_call_template(tuple(map(unliteral, args)), plain)
+        template = super().get_call_template(tuple(map(unliteral, args)), plain)
         if self.targetoptions["_nrt"] != bool(ConfigStack.top_or_none().nrt):
             for made in self.overloads.values():
                 _check_result(self.targetctx, made.signature.return_type, self.py_func.__qualname__)
-        return found
+        return template
 
 
 _canary = threading.local()
 
 
 @functools.cache
-def compiles_rightly() -> bool:
-    """Return whether a small kernel, compiled as ours are, answers as Python does; a warning says that it does not.
+def compiles_correctly() -> bool:
+    """Return whether a small kernel, compiled by our pipeline, answers as Python does; log a warning if not.
 
-    It is asked before the first function is compiled. Where the answer is no, numba's own steps are taken.
+    Called before the first function is compiled. If the answer is no, stock numba's pipeline is used.
     """
-    if getattr(_canary, "is_asked", False):
+    if getattr(_canary, "is_checked", False):
         return True
-    _canary.is_asked = True
+    _canary.is_checked = True
     try:
         options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
         inner = InnerDispatcher(
@@ -315,7 +315,7 @@ def compiles_rightly() -> bool:
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
     finally:
-        _canary.is_asked = False
+        _canary.is_checked = False
     text = f"numba {numba.__version__} does not compile as expected ({reason}): its own, slower steps are taken"
     warnings.warn(text, RuntimeWarning, stacklevel=1)
     return False

@@ -1,9 +1,9 @@
 """The only file that spells compiler options.
 
 Decorators. `kernel`: an outer loop over arrays, called from Python, releases the interpreter lock, cached on disk
-(kernel_cache.py). `inline`: a small function that compiled code calls. `merged`: one for which no call is ever left;
-`called`: one for which a call always is. None of them makes arrays, so none counts references to any: what it was
-handed, its caller keeps. `allocating_kernel` and `allocating` (a `called` one) are for what makes arrays. Arithmetic is
+(kernel_cache.py). `inline`: a small function that compiled code calls. `merged`: one that is always inlined; `called`:
+one that never is. None of them makes arrays, so none counts references: the caller owns the arguments.
+`allocating_kernel` and `allocating` (a `called` one) are for what makes arrays. Arithmetic is
 strict IEEE double: `fastmath` is off everywhere, and nothing is fused unless `fma` (error_free.py) is called by name.
 
 What is not in numba's documentation stands in compiling/, in two parts that do not need each other: `compilers` makes
@@ -43,18 +43,18 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "nu
 
 
 def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-    """Return what Python calls."""
+    """Return the callable of a decorated function."""
     more = {} if _compilers is None else {"pipeline_class": _compilers.KernelCompiler}
     return numba.njit(**more, **options)(function)
 
 
-def complete_signs() -> list[str]:
-    """Return the names of the files that say that all is compiled for a CPU, each CPU whose kernels can be run here."""
-    return [] if _caches is None else _caches.signs()
+def completion_markers() -> list[str]:
+    """Return the names of the marker files of a complete cache, for each CPU whose kernels can run here."""
+    return [] if _caches is None else _caches.marker_files()
 
 
 class _Kernel:
-    """A kernel whose dispatcher is made when it is first called: to make all of them is a third of the import."""
+    """A kernel whose dispatcher is made at its first call: making all of them is a third of the import time."""
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         functools.update_wrapper(self, function)
@@ -63,7 +63,7 @@ class _Kernel:
 
     @functools.cached_property
     def dispatcher(self) -> Any:
-        """What numba makes of it."""
+        """numba's dispatcher."""
         compiled = _compiled(self.py_func, **self._options)
         if _caches is not None:
             compiled._cache = _caches.KernelCache(self.py_func)
@@ -74,7 +74,7 @@ class _Kernel:
 
     @property
     def signatures(self) -> list[Any]:
-        """The types of arguments that it is compiled for by now."""
+        """The argument types for which it is compiled so far."""
         return self.dispatcher.signatures if "dispatcher" in vars(self) else []
 
 
@@ -96,9 +96,9 @@ def _kernel(function: Callable[..., Any], **options: Any) -> Any:
 
 
 class _Inline:
-    """A function for compiled callers only; the compiler is told of it when it first compiles a caller.
+    """A function for compiled callers only; its dispatcher is made when the first caller is compiled.
 
-    Where all callers come from the cache it never is: making a dispatcher takes half a millisecond, and there are
+    If all callers come from the cache it never is: making a dispatcher takes half a millisecond, and there are
     hundreds. The wrappers that let Python call it are left out, a third of all compile time; a call from Python (a
     test, a debugger) compiles it a second time, with them.
     """
@@ -119,7 +119,7 @@ class _Inline:
 
     @property
     def _numba_type_(self) -> Any:
-        """What numba asks any object for: it knows nothing of this class."""
+        """numba's protocol for the type of any object: it does not know this class."""
         return self._dispatcher._numba_type_
 
     @functools.cached_property
@@ -131,12 +131,12 @@ class _Inline:
 
 
 def inline(function: Callable[..., Any]) -> Any:
-    """Compile a function that kernels call, and that makes no arrays; it lives in the kernel's cached code."""
+    """Compile a function that kernels call, and that makes no arrays; its code is part of the kernel's."""
     return function if numba_config.DISABLE_JIT else _Inline(function)
 
 
 def merged(function: Callable[..., Any]) -> Any:
-    """Compile as `inline` does, and never leave a call: for work that costs less than handing over its arguments.
+    """Compile as `inline` does, and always inline: for work that costs less than passing its arguments.
 
     An array is seven numbers or more there, and a tuple of arrays all of theirs.
     """
@@ -144,9 +144,9 @@ def merged(function: Callable[..., Any]) -> Any:
 
 
 def called(function: Callable[..., Any]) -> Any:
-    """Compile as `inline` does, and always leave a call: for long code, the rare exact path of a decision above all.
+    """Compile as `inline` does, and never inline: for long code, above all the rare exact path of a decision.
 
-    What is copied into several callers is worked on in each. `inline` functions below a merged one are merged as well;
+    What is inlined into several callers is compiled in each. `inline` functions below a merged one are inlined as well;
     these are not.
     """
     return function if numba_config.DISABLE_JIT else _Inline(function, "CalledCompiler", forceinline=False)
@@ -161,13 +161,13 @@ _entries: dict[Any, Any] = {}
 
 
 def entry_of(kernel: Any, n_names: int = 0) -> Any:
-    """Return what calls a kernel directly.
+    """Return the compiled entry point of a kernel, called without dispatch on types.
 
-    n_names: where it is compiled for tuples of several lengths as its last argument, the length of this one.
+    n_names: length of the last argument, a tuple, if the kernel is compiled for several lengths.
 
-    Caller guarantees that arguments are of the types that the kernel is compiled for: arrays from `as_*` or of a solid,
-    and its own. The kernel itself where it is not called yet, or compiled for others as well; uncompiled it is kept
-    from warning of what overflows: filters look at that.
+    Caller guarantees that arguments have the types for which the kernel is compiled: arrays from `as_*` or of a solid.
+    The kernel itself is returned if it was not called yet, or is compiled for other types as well; uncompiled it is
+    wrapped to suppress warnings of overflow, which filters test.
     """
     key = (kernel, n_names) if n_names else kernel
     entry = _entries.get(key)
@@ -176,7 +176,7 @@ def entry_of(kernel: Any, n_names: int = 0) -> Any:
             entry = np.errstate(all="ignore")(kernel)
         else:
             made = kernel.dispatcher.overloads.items()
-            fitting = [found for types, found in made if n_names in (0, getattr(types[-1], "count", 0))]
+            fitting = [compiled for types, compiled in made if n_names in (0, getattr(types[-1], "count", 0))]
             if len(fitting) != 1:
                 return kernel
             entry = fitting[0].entry_point

@@ -1,4 +1,4 @@
-"""Where compiled code is kept, and what may be taken from there.
+"""Folder of the kernel cache, its seeds, and which of their files are trusted.
 
 numba looks at the file of the kernel only, so a cached kernel would not notice that a helper in another file changed.
 Each module therefore caches into a folder named by a hash of its own source and of every engine module it imports,
@@ -44,19 +44,19 @@ from numba import config as numba_config
 log = logging.getLogger(__name__)
 
 COMPLETE = "complete"
-"""How the name of the empty file begins that says that nothing is left to compile for a CPU (cold_start.py)."""
+"""Prefix of the empty file that marks a complete cache for a CPU (cold_start.py)."""
 
 _ROOT = Path(__file__).resolve().parents[1]
 _PREFIX = __name__.removesuffix("engine.compiling.kernel_cache")
-"""What stands before the names of our modules: nothing, or ``exact_geometry.`` where `engine` is another's."""
+"""Prefix of our modules' names: nothing, or ``exact_geometry.`` if `engine` is another package's."""
 _MADE_BY = "MADE_BY"
-"""The file of a seed that says what `tools` made it."""
+"""The file of a seed that names its `tools`."""
 _LARGEST_SEED = 1 << 28  # bytes, unpacked; all kernels for one CPU are 5 MB
 _OPTIONS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "LLVM_REFPRUNE_PASS", "LLVM_REFPRUNE_FLAGS", "DEBUGINFO_DEFAULT"),
     *("BOUNDSCHECK", "EXTEND_VARIABLE_LIFETIMES", "USING_SVML", "LLVM_PASS_TIMINGS"),
 )
-"""What of numba's configuration changes the code that it makes; the CPU is part of each kernel's key."""
+"""Options of numba's configuration that change the code; the CPU is part of each kernel's key."""
 
 _IMPORT = re.compile(
     r"^[ \t]*(?:from\s+engine([.\w]*)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+engine([.\w]+))", re.MULTILINE
@@ -69,7 +69,7 @@ def _stamp(path: str) -> tuple[int, ...]:
 
 
 def _stamps() -> dict[str, tuple[int, ...]]:
-    """Return what tells of each file of the engine whether it changes from now on."""
+    """Return times, size and inode of each file of the engine, to detect later changes."""
     archive = getattr(__spec__.loader, "archive", None)  # a zip file
     folders = os.walk(os.path.dirname(os.path.dirname(__file__)))
     paths = (os.path.join(folder, name) for folder, _, names in folders for name in names if name.endswith(".py"))
@@ -77,7 +77,7 @@ def _stamps() -> dict[str, tuple[int, ...]]:
 
 
 def _has_changed(spec: ModuleSpec) -> bool:
-    """Tell whether the file that a module was loaded from has changed since the engine was imported."""
+    """Return whether the file of a module has changed since the engine was imported."""
     path = getattr(spec.loader, "archive", None) or spec.origin or ""
     try:
         stamp = _stamp(path)
@@ -91,7 +91,7 @@ _AT_IMPORT = _stamps()
 
 @functools.cache
 def _spec(module: str) -> ModuleSpec | None:
-    """Return how a module is loaded, of the engine or one that has kernels of its own; None if there is none."""
+    """Return the spec of a module of the engine, or of one that has kernels of its own; None if there is none."""
     is_ours = module.partition(".")[0] == "engine"
     name = _PREFIX * is_ours + module
     if name in sys.modules or not is_ours:
@@ -101,7 +101,7 @@ def _spec(module: str) -> ModuleSpec | None:
 
 
 def _source(spec: ModuleSpec) -> bytes | None:
-    """Return the source that the loader of a module has, None if it has none."""
+    """Return the source of a module from its loader, None if it has none."""
     loader: Any = spec.loader
     try:
         if (spec.origin or "").endswith(".py"):
@@ -114,7 +114,7 @@ def _source(spec: ModuleSpec) -> bytes | None:
 
 @functools.cache
 def read_source(module: str) -> tuple[bytes, set[str]] | None:
-    """Return a hash of a module, and the engine modules that its import lines name, `engine` left out; None where its
+    """Return a hash of a module, and the engine modules that its import lines name, without `engine`; None if its
     source cannot be read."""
     spec = _spec(module)
     source = None if spec is None else _source(spec)
@@ -132,7 +132,7 @@ def read_source(module: str) -> tuple[bytes, set[str]] | None:
 
 @functools.cache
 def tools() -> str:
-    """Name what makes the code of kernels, beside their sources and the CPU."""
+    """Return the versions and options of the tools that compile kernels, without sources and CPU."""
     made_by = [
         f"numba {numba.__version__}, llvmlite {importlib.metadata.version('llvmlite')}",
         f"{sys.implementation.cache_tag} on {sys.platform} {platform.machine()}",
@@ -143,8 +143,8 @@ def tools() -> str:
 
 @functools.cache
 def source_digest(module: str) -> str | None:
-    """Return a hash of `module`, of all engine modules below it, of those that compile, and of `tools`; None where it
-    would not be that of the code that runs."""
+    """Return a hash of `module`, of all engine modules below it, of `compiling`, and of `tools`; None if the running
+    code may differ."""
     reached = _reached(module.removeprefix(_PREFIX))
     if reached is None:
         return None
@@ -155,8 +155,8 @@ def source_digest(module: str) -> str | None:
 
 
 def _reached(module: str) -> dict[str, bytes] | None:
-    """Return the hash of each module that the kernels of one are made of; None where one cannot be read, or changed
-    since the engine was imported."""
+    """Return the hash of each module that the kernels of one depend on; None if one cannot be read, or changed since
+    the import."""
     reached: dict[str, bytes] = {}
     waiting = {module, "engine.compiling.jit"}  # the compiler too
     while waiting:
@@ -173,9 +173,11 @@ def _reached(module: str) -> dict[str, bytes] | None:
     return reached
 
 
-def is_of_its_source(module: str) -> bool:
-    """Tell whether Python runs what the sources of a module's kernels say: it takes bytecode for that of any source of
-    the same size and second."""
+def matches_its_source(module: str) -> bool:
+    """Return whether the bytecode of a module's kernels is that of their sources.
+
+    Python accepts bytecode of any source of the same size and second.
+    """
     return all(map(_has_own_bytecode, _reached(module.removeprefix(_PREFIX)) or ()))
 
 
@@ -194,14 +196,14 @@ _reported: set[object] = set()
 
 
 def _uncached(reason: str, module: str) -> None:
-    """Say once why kernels are not cached."""
+    """Log once why kernels are not cached."""
     if reason not in _reported:
         _reported.add(reason)
         log.warning("kernels are compiled in each process again: %s (%s)", reason, module)
 
 
 def _is_writable(folder: Path) -> bool:
-    """Tell whether `folder` is nobody else's and a file can be made in it; make the folder if it is missing."""
+    """Return whether `folder` belongs to this user and is writable; make it if it is missing."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if not _is_trusted(folder):
@@ -223,12 +225,12 @@ def _candidates() -> Iterator[Path]:
 
 @functools.cache
 def cache_folder() -> Path | None:
-    """Return the folder that holds compiled code, None where nothing can be written."""
+    """Return the folder of compiled code, None if none can be written."""
     return next((folder for folder in _candidates() if _is_writable(folder)), None)
 
 
-def keep(name: str, content: bytes) -> None:
-    """Write the file `name` of the cache, whole or not at all, its seal in front; not where the disk is full."""
+def write_cached(name: str, content: bytes) -> None:
+    """Write the file `name` of the cache atomically, after its seal; skip it if the disk is full."""
     folder = cache_folder()
     if folder is None:
         return
@@ -243,8 +245,8 @@ def keep(name: str, content: bytes) -> None:
             part.unlink(missing_ok=True)
 
 
-def kept(name: str) -> bytes | None:
-    """Return the file `name` of the cache, else that of the seed; None where neither has it as it was written."""
+def read_cached(name: str) -> bytes | None:
+    """Return the file `name` of the cache, else of the seed; None if neither has it with a valid seal."""
     for folder in (cache_folder(), seed()):
         if folder is not None:
             try:
@@ -266,7 +268,7 @@ def _seal_of(name: str, content: bytes) -> bytes:
 
 
 def _is_trusted(folder: Path) -> bool:
-    """Tell whether nobody else can put files into a folder; say once if somebody can."""
+    """Return whether only this user or root can write to a folder; log once if not."""
     try:
         check_owner(folder)
     except ValueError as error:
@@ -279,7 +281,7 @@ def _is_trusted(folder: Path) -> bool:
 
 @functools.cache
 def seed() -> Path | None:
-    """Return the folder of what ``ENGINE_CACHE_SEED`` names, None where that is nothing or may not be used."""
+    """Return the folder that ``ENGINE_CACHE_SEED`` names, None if there is none or it is not trusted."""
     named = os.environ.get("ENGINE_CACHE_SEED")
     if not named:
         return None
@@ -296,7 +298,7 @@ def seed() -> Path | None:
 
 
 def check_owner(path: Path) -> None:
-    """Refuse what others may write: compiled code is run as found."""
+    """Raise for a file that others may write: compiled code is executed."""
     status = path.stat()
     if hasattr(os, "getuid") and (status.st_uid not in (0, os.getuid()) or status.st_mode & 0o022):
         raise ValueError(
@@ -306,7 +308,7 @@ def check_owner(path: Path) -> None:
 
 
 def _unpacked(archive: Path) -> Path:
-    """Return the folder with the files of `archive`, which is unpacked once."""
+    """Return the folder with the files of `archive`, unpacked once."""
     import io
     import tarfile
 
@@ -330,7 +332,7 @@ def _unpacked(archive: Path) -> Path:
 
 
 def seal(folder: Path, archive: Path | None = None) -> None:
-    """Make a seed of `folder`, by a file that says what made it; write it to `archive` (.tar.xz) if that is named."""
+    """Make a seed of `folder`: add the file that names its tools; write it to `archive` (.tar.xz) if given."""
     (folder / _MADE_BY).touch(mode=0o644)
     (folder / _MADE_BY).write_text(tools(), "utf-8")
     if archive is not None:

@@ -1,11 +1,10 @@
 """Public: where points lie with respect to one solid.
 
-The table of methods is locators.py. Here the arguments are checked, the batch is cut into chunks, and the report made.
+`locate` checks the arguments, cuts the batch into chunks and makes the report; locators.py has the table of methods.
 
-Fast path for small batches without options: compiled code is entered directly, with cached arguments.
-
-The general way costs some 15 us before the first decision: budget, chunks, the compiler's look at types. A plan names
-the compiled code and its arguments; it checks no types, so points become what it was compiled for before.
+Fast path for small batches without options: it calls the compiled kernel directly, with cached arguments. The general
+path costs some 15 us before the first decision (budget, chunks, dispatch on types). A `Plan` names the compiled code
+and its arguments and checks no types, so points are first brought to the type that the kernel was compiled for.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from typing import Any, Final, Literal, TypeAlias, Unpack, overload
 import numpy as np
 
 from engine.compiling.jit import entry_of
-from engine.containment.locators import Locator, locator_of, polygon_by, polyhedron_by, rational_half, settle
+from engine.containment.locators import Locator, exact_fallback, locator_of, polygon_by, polyhedron_by, settle
 from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.rational_locate import is_located
 from engine.containment.policy import Choice, choose_for_mesh, choose_for_rings
@@ -30,21 +29,24 @@ from engine.solids.registry import row_of
 from engine.solids.shapes import as_solid
 from engine.types import UNDECIDED, Accuracy, BoolArray, FloatArray, Int8Array
 
-MOST: Final = 1024
-"""Points: more are a chunk of the general way."""
+SMALL_BATCH: Final = 1024
+"""Largest number of points of the fast path: more are a chunk of the general path."""
 _SMALL: Final = 32
-"""Edges of a polygon that is passed over whatever the number of points."""
+"""Edges of a polygon that is always decided in one pass, whatever the number of points."""
 _NO_FLAG: Final = np.zeros(1, np.uint8)
 _KEYS: Final = {Choice.PASS: "pass_plan", Choice.LISTS: "list_plan", Choice.CELLS: "plan"}
 
 Plan: TypeAlias = tuple[Any, tuple[Any, ...], str]
-"""Compiled code, what stands between points and locations among its arguments, and the method's name."""
+"""Compiled code, the arguments between points and locations, and the name of the method."""
 Located: TypeAlias = tuple[Int8Array, int, int, str]
-"""Locations (n,), how many points took more than the filter, how many rational arithmetic, and the method."""
+"""Locations (n,), number of points beyond the filter, number decided in rationals, and the method."""
 
 
-def located_at_once(points: object, solid: Solid) -> Located | None:
-    """Return where points lie in a solid, None where the general way must be gone. Raises as `locate` does."""
+def locate_small_batch(points: object, solid: Solid) -> Located | None:
+    """Locate a small batch on the fast path; return None if the caller must use the general path.
+
+    Raises as `locate` does.
+    """
     if not isinstance(solid, Solid):
         return None
     array: Any = points
@@ -57,7 +59,7 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
     ):
         if not isinstance(points, (np.ndarray, list, tuple)) or getattr(points, "ndim", 1) == 0:
             return None
-        if not 0 < len(points) <= MOST:
+        if not 0 < len(points) <= SMALL_BATCH:
             return None
         if not is_located(row_of(solid)):
             return None
@@ -67,9 +69,9 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
         else:
             array = as_points(points, solid.dimension, must_be_finite=False)
     n_points = len(array)
-    if not 0 < n_points <= MOST:
+    if not 0 < n_points <= SMALL_BATCH:
         return None
-    plan = solid.kept("plan")
+    plan = solid.cached("plan")
     if plan is None:
         plan = _plan_of(solid, n_points)
         if plan is None:
@@ -77,32 +79,37 @@ def located_at_once(points: object, solid: Solid) -> Located | None:
     entry, prepared, method = plan
     locations = np.empty(n_points, np.int8)
     n_beyond = entry(array, *prepared, locations, _NO_FLAG)
-    return (locations, 0, 0, method) if n_beyond == 0 else _settled(array, solid, locations, n_beyond, method)
+    return (
+        (locations, 0, 0, method) if n_beyond == 0 else _with_exact_fallback(array, solid, locations, n_beyond, method)
+    )
 
 
-def _settled(array: FloatArray, solid: Solid, locations: Int8Array, n_beyond: int, method: str) -> Located:
+def _with_exact_fallback(array: FloatArray, solid: Solid, locations: Int8Array, n_beyond: int, method: str) -> Located:
     if n_beyond == NOT_FINITE:
         check_finite(array, ("points",))
     rest = np.flatnonzero(locations == UNDECIDED)
-    return locations, n_beyond, settle(rational_half(solid), array, locations, rest, UNLIMITED), method
+    return locations, n_beyond, settle(exact_fallback(solid), array, locations, rest, UNLIMITED), method
 
 
 def _plan_of(solid: Solid, n_points: int) -> Plan | None:
-    """Return a plan, kept where one is made; None where cells are chosen, or no kernel is compiled yet."""
+    """Return the cached plan of a solid, made if possible; None if policy.py chooses cells or no kernel is compiled
+    yet."""
     if isinstance(solid, Polygon) and len(solid.vertices) <= _SMALL:
-        return _kept(solid, "plan", polygon_by(solid, Choice.PASS, UNLIMITED))
+        return _cached_plan(solid, "plan", polygon_by(solid, Choice.PASS, UNLIMITED))
     if isinstance(solid, Polygon):
         choice = choose_for_rings(solid, n_points)
-        return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polygon_by(solid, choice, UNLIMITED))
+        return solid.cached(_KEYS[choice]) or _cached_plan(solid, _KEYS[choice], polygon_by(solid, choice, UNLIMITED))
     if isinstance(solid, Polyhedron):
         choice = choose_for_mesh(solid, n_points)
         if choice == Choice.CELLS:
             return None
-        return solid.kept(_KEYS[choice]) or _kept(solid, _KEYS[choice], polyhedron_by(solid, choice, UNLIMITED))
-    return _kept(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))
+        return solid.cached(_KEYS[choice]) or _cached_plan(
+            solid, _KEYS[choice], polyhedron_by(solid, choice, UNLIMITED)
+        )
+    return _cached_plan(solid, "plan", locator_of(solid).chosen(n_points, UNLIMITED))
 
 
-def _kept(solid: Solid, key: str, locator: Locator) -> Plan | None:
+def _cached_plan(solid: Solid, key: str, locator: Locator) -> Plan | None:
     if not locator.direct:
         return None
     kernel, *prepared = locator.direct
@@ -192,9 +199,9 @@ def locate(
     [1, 0, -1]
     """
     if isinstance(report, bool) and is_unlimited(workers, deadline, cancel, progress):
-        found = located_at_once(points, solid)
-        if found is not None:
-            return (found[0], Accuracy("exact", None, len(found[0]), *found[1:])) if report else found[0]
+        batch = locate_small_batch(points, solid)
+        if batch is not None:
+            return (batch[0], Accuracy("exact", None, len(batch[0]), *batch[1:])) if report else batch[0]
     check_options(workers, progress, report=report)
     solid = as_solid(solid, "solid")
     choice = locator_of(solid)
@@ -272,5 +279,5 @@ def contains(
     [True, False]
     """
     options = {"workers": workers, "deadline": deadline, "cancel": cancel, "progress": progress, "report": report}
-    found: Any = locate(points, solid, **options)  # type: ignore[call-overload]
-    return (found[0] >= 0, found[1]) if report else found >= 0
+    result: Any = locate(points, solid, **options)  # type: ignore[call-overload]
+    return (result[0] >= 0, result[1]) if report else result >= 0

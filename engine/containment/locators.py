@@ -1,7 +1,7 @@
-"""How the points of a batch are located in each type of solid: what the registry's rows name.
+"""The table of point location methods that the rows of the registry name: a `Locator` for each type of solid.
 
-A `Locator` has a compiled half, which fills in an int8 location for each point of a chunk and leaves UNDECIDED what is
-out of its range, and a rational half, which settles those. Structures are prepared once a solid.
+A `Locator` fills an int8 location for each point of a chunk: a compiled filter kernel leaves UNDECIDED what is out of
+its range, the exact fallback in rationals decides those points. Structures are prepared once a solid.
 """
 
 from __future__ import annotations
@@ -18,7 +18,13 @@ from engine.containment.methods.half_spaces import locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
 from engine.containment.methods.polyhedron_one_pass import locate_by_pass
 from engine.containment.methods.polyhedron_ray_parity import locate_by_tree
-from engine.containment.methods.rational_locate import combine, is_located, over_tree, rational_location, unsupported
+from engine.containment.methods.rational_locate import (
+    combine,
+    fold_csg_tree,
+    is_located,
+    rational_location,
+    unsupported,
+)
 from engine.containment.policy import LONG_PASS, Choice, choose_for_mesh, choose_for_rings
 from engine.containment.prepared import EXACT, edges_of, prism_rows, ring_cells_of, rings_of, tree_of
 from engine.errors import InvalidArrayError, NotFiniteError
@@ -37,14 +43,14 @@ Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 
 
 class Counts(NamedTuple):
-    """How many points of a chunk needed more than the filter, and how many rational arithmetic."""
+    """Numbers of points of a chunk that were beyond the filter, and that were decided in rationals."""
 
     beyond: int
     rational: int
 
 
 class Locator(NamedTuple):
-    """How to locate points in one solid."""
+    """A point location method for one solid."""
 
     method: str
     """Stable short name, for `Accuracy.method`."""
@@ -52,22 +58,23 @@ class Locator(NamedTuple):
     """Locates the points (n, dim) of a chunk into int8 (n,). Raises NotFiniteError unless a callable decides."""
     decisions: Literal["exact", "float64"] = "exact"
     for_batch: Callable[[int, Budget], Locator] | None = None
-    """Returns the locator to use for so many points, where that depends: it may build a structure that pays."""
+    """Returns the locator for a number of points, if the choice depends on it; may build a structure that amortises."""
     direct: tuple[Any, ...] = ()
-    """The kernel, and what stands between points and locations among its arguments, where that is all there is."""
+    """The kernel and its arguments between points and locations, if the locator is that kernel with its fallback
+    alone."""
     is_long: bool = False
-    """Whether a call takes long whatever the number of points, so that all of a batch are best asked at once."""
+    """Whether a call takes long whatever the number of points, so that a batch should be one chunk."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
         """Return the locator for a batch of `n_points`."""
         return self if self.for_batch is None else self.for_batch(n_points, budget)
 
 
-def settled(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) -> Fill:
-    """Return the fill that runs `kernel` over a chunk and asks another fill about what it leaves UNDECIDED.
+def with_exact_fallback(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) -> Fill:
+    """Wrap a filter kernel with an exact fallback for UNDECIDED points.
 
-    kernel: returns how many points needed more than its filter, those left UNDECIDED among them, or NOT_FINITE.
-    Raises NotFiniteError, which names no point, and what `Budget.check` raises, also when the kernel stopped early.
+    kernel: returns how many points were beyond its filter (UNDECIDED ones included), or NOT_FINITE. Raises:
+    NotFiniteError, which names no point; what `Budget.check` raises, also if the kernel stopped early.
     """
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
@@ -86,17 +93,17 @@ def settled(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) 
 
 
 def settle(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray, budget: Budget) -> int:
-    """Locate those points of a chunk that `items` numbers; return how many took rational arithmetic."""
+    """Locate the points of a chunk at the indices `items` by `fill`; return how many it decided in rationals."""
     if not len(items):
         return 0
-    found = np.empty(len(items), np.int8)
-    counts = fill(points[items], found, budget)
-    locations[items] = found
+    results = np.empty(len(items), np.int8)
+    counts = fill(points[items], results, budget)
+    locations[items] = results
     return counts.rational
 
 
 def locator_of(solid: Solid) -> Locator:
-    """Return how points are located in `solid`; prepares nothing yet.
+    """Return the locator of `solid`; prepares nothing yet.
 
     Raises: UnsupportedSolidError.
     """
@@ -106,11 +113,11 @@ def locator_of(solid: Solid) -> Locator:
         return made
     if not is_located(row):
         raise unsupported(solid)
-    return Locator("exact", rational_half(solid))
+    return Locator("exact", exact_fallback(solid))
 
 
-def rational_half(solid: Solid, pose: Pose | None = None) -> Fill:
-    """Return the fill that asks rational arithmetic about each point."""
+def exact_fallback(solid: Solid, pose: Pose | None = None) -> Fill:
+    """Return the fill that decides each point in rational arithmetic."""
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         for item, point in enumerate(points.tolist()):
@@ -123,12 +130,12 @@ def rational_half(solid: Solid, pose: Pose | None = None) -> Fill:
 def by_kernel(
     method: str, kernel: Callable[..., int], solid: Solid, *prepared: object, pose: Pose | None = None
 ) -> Locator:
-    """Return the locator by a kernel that takes points, what is prepared of the solid, locations and flag."""
-    return Locator(method, _filled_by(kernel, *prepared, rest=rational_half(solid, pose)), direct=(kernel, *prepared))
+    """Return the locator that calls ``kernel(points, *prepared, locations, flag)`` and falls back to rationals."""
+    return Locator(method, _filled_by(kernel, *prepared, rest=exact_fallback(solid, pose)), direct=(kernel, *prepared))
 
 
 def _filled_by(kernel: Callable[..., int], *prepared: object, rest: Fill) -> Fill:
-    return settled(lambda points, out, budget: kernel(points, *prepared, out, budget.flag), rest)
+    return with_exact_fallback(lambda points, out, budget: kernel(points, *prepared, out, budget.flag), rest)
 
 
 def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator:
@@ -138,23 +145,23 @@ def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator
 
 
 def rows_locator(solid: HalfSpace | Convex) -> Locator:
-    """Return the locator by the planes that bound a solid."""
+    """Return the locator of a half-space or convex solid, by the signs of its planes."""
     rows = rows_of(solid)
     return by_kernel("half_spaces", locate_in_half_spaces, solid, rows, np.ones(len(rows), np.bool_))
 
 
 def ball_locator(solid: Sphere) -> Locator:
-    """Return the locator by the distance from the centre."""
+    """Return the locator of a ball, by the squared distance from the centre."""
     return by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius)
 
 
 def box_locator(solid: Aabb) -> Locator:
-    """Return the locator by comparisons."""
+    """Return the locator of a box, by comparisons of coordinates."""
     return by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max)
 
 
 def triangle_locator(solid: Triangle) -> Locator:
-    """Return the locator in a triangle of the plane, or in the prism over one of space."""
+    """Return the locator of a planar triangle, or of the prism over a triangle of space."""
     if solid.dimension == 2:
         return _by_choice(
             "same_side", lambda *_: by_kernel("same_side", locate_in_rings, solid, EXACT, edges_of(solid))
@@ -163,14 +170,14 @@ def triangle_locator(solid: Triangle) -> Locator:
 
 
 def polygon_locator(solid: Polygon) -> Locator:
-    """Return the locator by rays through the rings."""
+    """Return the locator of a polygon, by ray parity."""
     return _by_choice(
         "ring_crossing", lambda n_points, budget: polygon_by(solid, choose_for_rings(solid, n_points), budget)
     )
 
 
 def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
-    """Return the locator by what policy.py chose; it builds that."""
+    """Return the locator of a polygon by the structure that policy.py chose, built if missing."""
     if choice == Choice.CELLS:
         return by_kernel("ring_cells", locate_in_rings, solid, EXACT, ring_cells_of(solid, budget.flag, budget.check))
     rings = edges_of(solid) if choice == Choice.PASS else rings_of(solid, budget.check)
@@ -178,14 +185,14 @@ def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
 
 
 def polyhedron_locator(solid: Polyhedron) -> Locator:
-    """Return the locator by rays through the faces."""
+    """Return the locator of a polyhedron, by ray parity."""
     return _by_choice(
         "ray_parity", lambda n_points, budget: polyhedron_by(solid, choose_for_mesh(solid, n_points), budget)
     )
 
 
 def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
-    """Return the locator by what policy.py chose; it builds that."""
+    """Return the locator of a polyhedron by the structure that policy.py chose, built if missing."""
     if choice == Choice.PASS:
         by_pass = by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
         return by_pass._replace(is_long=len(solid.triangles) > LONG_PASS)
@@ -196,7 +203,7 @@ def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
 
 
 def implicit_locator(solid: Implicit) -> Locator:
-    """Return the locator by the sign of a polynomial, or of a caller's function."""
+    """Return the locator of an implicit solid, by the sign of its polynomial or callable."""
     if solid.function is not None:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
@@ -204,7 +211,7 @@ def implicit_locator(solid: Implicit) -> Locator:
 
 
 def _call(solid: Implicit) -> Fill:
-    """Return the fill that takes the sign of the caller's own function."""
+    """Return the fill that evaluates the sign of the caller's function."""
     function = solid.function
     assert function is not None
 
@@ -225,19 +232,19 @@ def _call(solid: Implicit) -> Fill:
 
 
 def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator] = locator_of) -> Locator:
-    """Return the locator of a tree: every distinct node is located once a chunk, its operands first."""
+    """Return the locator of a CSG tree: each distinct leaf is located once a chunk, then locations are combined."""
     leaves: dict[int, Locator] = {}
-    over_tree(solid, lambda leaf: leaves.setdefault(id(leaf), leaf_locator(leaf)), lambda *_: None)
+    fold_csg_tree(solid, lambda leaf: leaves.setdefault(id(leaf), leaf_locator(leaf)), lambda *_: None)
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         counts: list[Counts] = []
 
         def locate_leaf(leaf: Solid) -> Int8Array:
-            found = np.empty(len(points), np.int8)
-            counts.append(leaves[id(leaf)].chosen(len(points), budget).fill(points, found, budget))
-            return found
+            of_leaf = np.empty(len(points), np.int8)
+            counts.append(leaves[id(leaf)].chosen(len(points), budget).fill(points, of_leaf, budget))
+            return of_leaf
 
-        locations[:] = over_tree(solid, locate_leaf, combine)
+        locations[:] = fold_csg_tree(solid, locate_leaf, combine)
         n_beyond, n_rational = sum(each.beyond for each in counts), sum(each.rational for each in counts)
         return Counts(min(n_beyond, len(points)), min(n_rational, len(points)))
 

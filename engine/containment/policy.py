@@ -1,8 +1,8 @@
-"""Which way of locating points a batch is worth: one rule by cost, from what was asked so far, this batch included.
+"""Choice of the point location method for a batch by amortised cost: a pass, lists (tree or slabs), or cells.
 
-The first question goes in one pass, with nothing prepared. A structure is built once the points asked so far would
-have paid for it: a tree or slabs soon, cells for many points. The answers are the same either way. Nanoseconds, one
-thread, measured on meshes of 10^3 to 10^6 faces and rings of 10 to 2 10^5 edges.
+The first batch is one pass over all faces or edges, with nothing prepared. A structure is built once the points so far,
+this batch included, would have paid for it: a tree or slabs soon, cells for many points. The choice never changes an
+answer. Costs are nanoseconds on one thread, measured on meshes of 10^3 to 10^6 faces and rings of 10 to 2 10^5 edges.
 """
 
 from __future__ import annotations
@@ -13,13 +13,20 @@ from typing import Final
 import numpy as np
 
 from engine.containment.cells.lattice import can_have_cells
-from engine.containment.prepared import IN_TREE, IN_TREE_A_FACE_OVER, SAMPLE, cost_in_tree, edges_met, faces_over
+from engine.containment.prepared import (
+    IN_TREE,
+    IN_TREE_A_FACE_OVER,
+    SAMPLE,
+    cost_in_tree,
+    mean_edges_met,
+    mean_faces_above,
+)
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 
 
 class Choice(IntEnum):
-    """How the points of a batch are located."""
+    """Structure by which the points of a batch are located."""
 
     PASS = 0
     """One pass over all faces or edges."""
@@ -29,17 +36,17 @@ class Choice(IntEnum):
 
 
 _FEW: Final = 192
-"""Points for which the tree, entered directly, is as fast as cells."""
+"""Number of points up to which the tree, called directly, is as fast as cells."""
 _FEW_RAYS: Final = 256
-"""Of points through faces: a pass over so many costs less than to hand over a tree."""
+"""Product of points and faces up to which one pass costs less than passing a tree to the kernel."""
 _POINTS_A_PASS: Final = 1024
 _PASS_A_FACE: Final = 20.0
 LONG_PASS: Final = 1 << 12
-"""Faces from which a pass takes so long, whatever the points, that one a chunk (`run_chunks`) is too many."""
+"""Number of faces from which one pass takes so long that a batch should be one chunk."""
 _TREE: Final = 40_000.0
 _TREE_A_FACE: Final = 280.0
 _SOON: Final = 1.0 / 16.0
-"""Share of the tree's cost that earlier passes may have taken: in general the second question builds it."""
+"""Share of the tree's cost that earlier passes may have taken: usually the second batch builds the tree."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 500.0
 
 _IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
@@ -53,9 +60,9 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
     seen, n_faces = _points_seen(solid, n_points), len(solid.triangles)
     if n_points * n_faces <= _FEW_RAYS:
         return Choice.PASS
-    if n_points > _FEW and (solid.kept("cells") is not None or _pay_cells(solid, seen)):
+    if n_points > _FEW and (solid.cached("cells") is not None or _cells_amortize(solid, seen)):
         return Choice.CELLS
-    if solid.kept("tree") is not None:
+    if solid.cached("tree") is not None:
         return Choice.LISTS
     if n_points > _POINTS_A_PASS and n_faces > LONG_PASS:
         return Choice.LISTS
@@ -63,14 +70,14 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
     earlier, tree = calls[0] * _PASS_A_FACE * n_faces, _TREE + _TREE_A_FACE * n_faces
     calls[0] += 1 + (n_points - 1) // _POINTS_A_PASS
     if earlier > 0.0 or n_points > SAMPLE:  # it takes 30 us to find out
-        more = _PASS_A_FACE * faces_over(solid) - cost_in_tree(solid)  # that a point costs in a pass
+        more = _PASS_A_FACE * mean_faces_above(solid) - cost_in_tree(solid)  # that a point costs in a pass
         earlier += (seen - n_points) * more
         tree -= n_points * more
     return Choice.PASS if calls[0] * _PASS_A_FACE * n_faces <= tree and earlier <= _SOON * tree else Choice.LISTS
 
 
-def _pay_cells(solid: Polyhedron, seen: int) -> bool:
-    """Tell whether so many points are worth cells: soon on bad shapes, where a point is dear in the tree."""
+def _cells_amortize(solid: Polyhedron, seen: int) -> bool:
+    """Return whether the points so far pay for cells; early on bad shapes, where the tree is slow."""
     n_faces = len(solid.triangles)
     least = _CELLS + _CELLS_A_FACE * n_faces
     if seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least or seen * cost_in_tree(solid) <= least:
@@ -81,11 +88,11 @@ def _pay_cells(solid: Polyhedron, seen: int) -> bool:
 def choose_for_rings(solid: Polygon, n_points: int) -> Choice:
     """Return PASS, LISTS (slabs) or CELLS."""
     seen, n_edges = _points_seen(solid, n_points), len(solid.vertices)
-    if solid.kept("ring_cells") is not None:
+    if solid.cached("ring_cells") is not None:
         return Choice.CELLS
     by_pass, by_slabs = _IN_RINGS + _PASS_AN_EDGE * n_edges, np.inf
-    if solid.kept("slabs") is not None or seen * by_pass > _SLABS + _SLABS_AN_EDGE * n_edges:
-        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * edges_met(solid)[1])
+    if solid.cached("slabs") is not None or seen * by_pass > _SLABS + _SLABS_AN_EDGE * n_edges:
+        by_slabs = _IN_SLABS + _PASS_AN_EDGE * max(8.0, 2.0 * mean_edges_met(solid)[1])
     if seen * min(by_pass, by_slabs) > _RING_CELLS + _RING_CELLS_AN_EDGE * n_edges:
         return Choice.CELLS
     return Choice.LISTS if by_slabs < by_pass else Choice.PASS

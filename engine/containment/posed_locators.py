@@ -1,10 +1,9 @@
 """Locates points in posed solids: filters in the body's own frame, exact on input and transform.
 
-A posed solid is the exact image of the solid under p -> R p + t, but for spheres, which keep their radius about the
-exact image of the centre. Points are moved into the solid's frame with a bound on the rounding (methods/filters.py),
-located there where that bound allows (filters.py), and settled in integers where it does not. Pure translations and
-quarter turns whose differences are exact use the unposed kernels, so that flush instances on a lattice never reach
-rationals.
+A posed solid is the exact image of the solid under p -> R p + t; a sphere has the same radius about the exact image of
+its centre. Points are moved into the solid's frame with a bound on the rounding and filtered there
+(methods/filters.py); the rest goes to the exact fallback. Translations and quarter turns with exact differences use
+the unposed kernels, so that flush instances on a lattice never reach rationals.
 """
 
 from __future__ import annotations
@@ -16,7 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from engine.containment.locators import Counts, Fill, Locator, by_kernel, csg_locator, locator_of, rational_half, settle
+from engine.containment.locators import (
+    Counts,
+    Fill,
+    Locator,
+    by_kernel,
+    csg_locator,
+    exact_fallback,
+    locator_of,
+    settle,
+)
 from engine.containment.methods.filters import (
     Frames,
     frames_of,
@@ -43,28 +51,31 @@ from engine.types import UNDECIDED, FloatArray, Int8Array, read_only
 
 
 def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
-    """Return how points are located in `solid` under `pose`. Raises: UnsupportedSolidError."""
+    """Return the locator of `solid` under `pose`.
+
+    Raises: UnsupportedSolidError.
+    """
     if pose is None or pose.is_identity:
         return locator_of(solid)
     row = row_of(solid)
     if row.posed is not None:
         made: Locator = row.posed(solid, pose)
         return made
-    return locator_of(solid)._replace(fill=rational_half(solid, pose), for_batch=None, direct=())
+    return locator_of(solid)._replace(fill=exact_fallback(solid, pose), for_batch=None, direct=())
 
 
 def posed_csg(solid: Csg, pose: Pose) -> Locator:
-    """Return the locator in a Boolean tree under a pose."""
+    """Return the locator of a CSG tree under a pose."""
     return csg_locator(solid, lambda leaf: posed_locator(leaf, pose))
 
 
 def posed_ball(solid: Sphere, pose: Pose) -> Locator:
-    """Return the locator in a ball about the image of its centre."""
+    """Return the locator of a ball about the image of its centre."""
     return by_kernel("squared_distance", locate_in_ball, solid, *posed_center(solid, pose), solid.radius, pose=pose)
 
 
 def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
-    """Return the locator by the polynomial, or the caller's function, at preimages."""
+    """Return the locator of an implicit solid under a pose: its function at preimages."""
     if solid.function is None:
         return by_filter(terms)(solid, pose)
     unposed, frames = locator_of(solid), _frames(pose)
@@ -73,10 +84,10 @@ def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
 
 
 def by_filter(prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Callable[[Any, Pose], Locator]:
-    """Return what makes locators that try exact preimages, then a filter at rounded ones, then integers.
+    """Return a factory of locators: exact preimages first, then a filter at rounded ones, then the exact fallback.
 
-    prepare: (solid, check) -> the filter's kernel, which takes points, bounds on the rounding of each, what follows the
-    kernel here, locations and flag.
+    prepare: (solid, check) -> the filter kernel, called with points, blurs, these arguments, locations and flag, and
+    its arguments.
     """
 
     def locator(solid: Solid, pose: Pose) -> Locator:
@@ -87,34 +98,34 @@ def by_filter(prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Callable[[Any
 
 
 def box_sides(solid: Aabb, _: Check) -> tuple[Any, ...]:
-    """Return the filter of a box."""
+    """Return the filter kernel of a box with its arguments."""
     return locate_in_box, solid.min, solid.max
 
 
 def rows(solid: HalfSpace | Convex, _: Check) -> tuple[Any, ...]:
-    """Return the filter of what planes bound."""
+    """Return the filter kernel of a solid bounded by planes with its arguments."""
     return locate_in_rows_blurred, rows_in_space(rows_of(solid))
 
 
 def triangle(solid: Triangle, check: Check) -> tuple[Any, ...]:
-    """Return the filter of a triangle of the plane, or of the prism over one of space."""
+    """Return the filter kernel of a planar triangle, or the prism over one of space with its arguments."""
     if solid.dimension == 2:
         return rings(solid, check)
     return locate_in_rows_blurred, rows_in_space(prism_rows(solid)[0])
 
 
 def rings(solid: Polygon | Triangle, check: Check) -> tuple[Any, ...]:
-    """Return the filter of a polygon."""
+    """Return the filter kernel of a polygon with its arguments."""
     return locate_in_rings, rings_of(solid, check)
 
 
 def faces(solid: Polyhedron, check: Check) -> tuple[Any, ...]:
-    """Return the filter of a polyhedron."""
+    """Return the filter kernel of a polyhedron with its arguments."""
     return locate_by_tree, tree_of(solid, check)
 
 
 def terms(solid: Implicit, _: Check) -> tuple[Any, ...]:
-    """Return the filter of a polynomial."""
+    """Return the filter kernel of a polynomial with its arguments."""
     return locate_by_polynomial, solid.powers, solid.coefficients, int(solid.powers.sum(axis=1).max())
 
 
@@ -131,7 +142,7 @@ def _moved(points: FloatArray, frames: Frames) -> tuple[FloatArray, FloatArray]:
 
 
 def _filtered(solid: Solid, pose: Pose, unposed: Locator, prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Fill:
-    frames, rest = _frames(pose), rational_half(solid, pose)
+    frames, rest = _frames(pose), exact_fallback(solid, pose)
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         (kernel, *prepared), (moved, blurs) = prepare(solid, budget.check), _moved(points, frames)
@@ -151,7 +162,7 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, prepare: Callable[[Any
 
 
 def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:
-    """Return the centre's exact image correctly rounded, and a bound on the rounding; infinite beyond float64."""
+    """Return the exact image of the centre, correctly rounded, and a bound on the rounding; infinite beyond float64."""
     exact = to_world_frame(solid.center.tolist(), pose)
     try:
         center = np.array([float(value) for value in exact])

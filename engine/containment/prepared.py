@@ -1,4 +1,4 @@
-"""What the edges of a polygon are listed by: the rings, slabs, and a grid of cells, each built once it pays.
+"""Prepared structures of point location, each built once a solid when it amortises: rings, slabs, cells, triangle tree.
 
 **Slabs.** An edge is listed in the slabs of both its heights and all between; edges of a slab that follow each other in
 a ring are one run.
@@ -9,10 +9,10 @@ between the computed places of its ends. That segment is taken row by row, 2^-7 
 and every column that this part reaches to within 2^-7 is marked MIXED. Where the part is cut off at a side of the row,
 the segment rises by 2^-7 at least, so its slope is at most 2^22 and the column there off by less than 2^-14.
 So no edge comes as near as 2^-8 to a cell that is not marked: all doubles of the cell have one location, the same as
-those of an unmarked cell beside it, and none is on an edge. One point of each stretch of such cells is located by the
-slabs. Below an extent of 2^-960 underflow could spoil this: there is no grid.
+those of an adjacent unmarked cell, and none is on an edge. One point of each connected stretch of such cells is
+located by the slabs. Below an extent of 2^-960 underflow could invalidate this: there is no grid.
 
-Structures that queries share, each built once a solid: the tree of triangles, rounded rows.
+Source: slabs after F. Preparata, M. Shamos, Computational Geometry, 1985; cells after C. Ericson, 2005, 7.1.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from engine.bounding.box_grid import Axis, cell_of, make_axis
 from engine.bounding.bvh import WIDTH, build_bvh, cache_aligned
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
-from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, lay_out
+from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, reorder_by_tree
 from engine.containment.methods.rational_locate import Check, no_check, prism_walls
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.faces import OVERHEAD_ROWS
@@ -49,7 +49,7 @@ _NO_STATUSES: Final = np.empty(0, np.int8)
 def close_rings(
     vertices: FloatArray, ring_offsets: IntArray, xs: FloatArray, ys: FloatArray, runs: Int32Array, box: FloatArray
 ) -> None:
-    """Fill xs and ys with the rings of vertices (n, 2), each ended by its first vertex, runs with one for each, and box
+    """Fill xs, ys with the rings of vertices (n, 2), each closed by its first vertex, runs with one run a ring, and box
     with xmin, xmax, ymin, ymax."""
     place, x_min, x_max, y_min, y_max = 0, np.inf, -np.inf, np.inf, -np.inf
     for ring in range(len(ring_offsets) - 1):
@@ -115,8 +115,9 @@ def mark_cells(
 
 
 @kernel
-def spread_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> None:
-    """Set the status of each cell that is not MIXED, from the cell to its left, that below, or by the slabs."""
+def propagate_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> None:
+    """Set the status of each cell that is not MIXED, from the cell to its left or below (flood fill), or by the
+    slabs."""
     u, v, slabs = rings.u, rings.v, rings.slabs
     for row in range(v.n_cells):
         if flag[0]:
@@ -142,7 +143,7 @@ def spread_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> None
 
 
 def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, FloatArray, Int32Array, FloatArray]:
-    """Return the xs and ys of rings, each ended by its first vertex, the run that each is, and their box."""
+    """Return xs and ys of rings, each closed by its first vertex, the run of each ring, and their box."""
     n_rings = len(ring_offsets) - 1
     xs, ys = np.empty((2, len(vertices) + n_rings))
     runs, box = np.empty((n_rings, 2), np.int32), np.empty(4)
@@ -151,7 +152,7 @@ def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArr
 
 
 def edges_of(solid: Polygon | Triangle) -> Rings:
-    """Return the edges in one slab, prepared once."""
+    """Return the edges of a polygon in one slab, built once."""
 
     def build() -> Rings:
         xs, ys, runs, box = closed_rings(solid.vertices, solid.ring_offsets)
@@ -163,15 +164,15 @@ def edges_of(solid: Polygon | Triangle) -> Rings:
 
 
 def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
-    """Return the slabs of a polygon, prepared once. check: called between the steps; what it raises ends the building.
+    """Return the slabs of a polygon, built once.
 
-    Cost: some 10 ns an edge, and 16 to 32 bytes.
+    check: called between the steps; what it raises ends the building. Cost: some 10 ns an edge, and 16 to 32 bytes.
     """
 
     def build() -> Rings:
         edges = edges_of(solid)
         check()
-        n_slabs = int(len(edges.xs) / max(_LEAST_IN_SLAB, edges_met(solid)[1]))
+        n_slabs = int(len(edges.xs) / max(_LEAST_IN_SLAB, mean_edges_met(solid)[1]))
         slabs = make_axis(*edges.box[2:], max(n_slabs, 1))
         offsets = np.zeros(slabs.n_cells + 1, np.int64)
         list_runs(edges.ys, edges.runs, slabs, offsets[1:], np.full(slabs.n_cells, -1), edges.runs, False)
@@ -185,13 +186,13 @@ def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
 
 
 def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> Rings:
-    """Return the slabs of a polygon with a grid of cells, prepared once; without one where there can be none.
+    """Return the slabs of a polygon with a grid of cells, built once; without the grid if its extent is too small.
 
     Cost: some 60 ns an edge, and 12 bytes.
     """
 
     def build() -> Rings:
-        rings, (across, along) = rings_of(solid, check), edges_met(solid)
+        rings, (across, along) = rings_of(solid, check), mean_edges_met(solid)
         x_min, x_max, y_min, y_max = rings.box
         if min(x_max * 0.5 - x_min * 0.5, y_max * 0.5 - y_min * 0.5) < _SMALLEST:
             return rings
@@ -204,35 +205,35 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
         edges, placed = edges_of(solid), rings._replace(u=u, v=v)
         mark_cells(edges.xs, edges.ys, edges.runs, u, v, statuses, flag)
         check()
-        spread_locations(placed, statuses, flag)
+        propagate_locations(placed, statuses, flag)
         check()
         return placed._replace(statuses=statuses)
 
     return solid.prepared("ring_cells", build, check)
 
 
-def edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
-    """Return how many edges a vertical and a horizontal line meet, in the mean; at most all; prepared once."""
+def mean_edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
+    """Return the mean number of edges that a vertical and a horizontal line meet; built once."""
 
     def find() -> tuple[float, float]:
-        edges, found = edges_of(solid), []
+        edges, means = edges_of(solid), []
         for values, low, high in ((edges.xs, *edges.box[:2]), (edges.ys, *edges.box[2:])):
             with np.errstate(all="ignore"):
                 met = float((np.abs(np.diff(values * 0.25)) / (high * 0.25 - low * 0.25)).sum())
-            found.append(met if met < len(values) else float(len(values)))
-        return found[0], found[1]
+            means.append(met if met < len(values) else float(len(values)))
+        return means[0], means[1]
 
     return solid.prepared("edges_met", find)
 
 
 EXACT: Final = np.zeros(0)
-"""In place of blurs: the points are what they are."""
+"""Empty blurs: the points are exact."""
 
 
 IN_TREE, IN_TREE_A_FACE_OVER = 150.0, 2.0
-"""Nanoseconds that a point takes in a tree, and more for each box of a face that it lies over (policy.py)."""
+"""Nanoseconds that a point takes in a tree, and for each face box above it (policy.py)."""
 SAMPLE: Final = 256
-"""Faces that are looked at to find out."""
+"""Number of faces sampled by `mean_faces_above`."""
 
 
 class TriangleTree(NamedTuple):
@@ -246,18 +247,18 @@ class TriangleTree(NamedTuple):
     child: Int32Array
     """As `Bvh` has them."""
     blocks: Float32Array
-    """``(n_nodes, 8, 8)``: what `overhead` reads of the triangles of a node."""
+    """``(n_nodes, 8, 8)``: the argument of `overhead` for the triangles of a node."""
     origin: tuple[float, float, float]
     scale: float
     low: tuple[float, float, float]
-    """The box of all triangles."""
+    """Low and high corner of the box of all triangles."""
     high: tuple[float, float, float]
 
 
 def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
-    """Return the tree over the triangles of `solid`, prepared once.
+    """Return the tree over the triangles of `solid`, built once.
 
-    check: called between the steps, a second's work for a million triangles; what it raises ends the building.
+    check: called between the steps (a second for a million triangles); what it raises ends the building.
     """
     return solid.prepared("tree", lambda: _build_tree(solid, check), check)
 
@@ -270,7 +271,7 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     tree = build_bvh(boxes)
     check()
     child, blocks = np.empty_like(tree.child), np.zeros((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
-    lay_out(solid.vertices, solid.triangles, tree, child, triangles, blocks)
+    reorder_by_tree(solid.vertices, solid.triangles, tree, child, triangles, blocks)
     check()
     x, y, z, u, v, w = boxes.T
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
@@ -280,8 +281,8 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     )
 
 
-def tree_line(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
-    """Return a solid's row of addresses, sizes and places."""
+def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
+    """Return a tree as a row of addresses, sizes and places."""
     arrays: Any = tree.vertices, tree.triangles, tree.boxes, tree.child, tree.blocks
     sizes = len(tree.vertices), len(tree.triangles), len(tree.child)
     return tuple(array.ctypes.data for array in arrays), sizes, (*tree.origin, tree.scale, *tree.low, *tree.high)
@@ -289,7 +290,7 @@ def tree_line(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tup
 
 @inline
 def tree_at(tables: Any, row: int) -> TriangleTree:
-    """Return the tree of a row of what has addresses, sizes and places (n, 5 / 3 / 10), as `tree_line` gives them."""
+    """Return the tree of a row of tables (n, 5 / 3 / 10) of addresses, sizes and places, see `tree_row`."""
     addresses, sizes, places = tables.addresses, tables.sizes, tables.places
     return TriangleTree(
         array_at(addresses[row, 0], (sizes[row, 0], 3), np.float64),
@@ -302,8 +303,8 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
     )  # fmt: skip
 
 
-def faces_over(solid: Polyhedron) -> float:
-    """Return in how many boxes of faces, seen from above, a point lies in the mean; thousands on bad shapes."""
+def mean_faces_above(solid: Polyhedron) -> float:
+    """Return the mean number of face boxes above a point; thousands on bad shapes."""
 
     def find() -> float:
         some = solid.vertices[solid.triangles[:: len(solid.triangles) // SAMPLE + 1], :2]
@@ -318,20 +319,19 @@ def faces_over(solid: Polyhedron) -> float:
 
 
 def cost_in_tree(solid: Polyhedron) -> float:
-    """Return what a point costs in the tree."""
-    return IN_TREE + IN_TREE_A_FACE_OVER * faces_over(solid)
+    """Return the nanoseconds that a point takes in the tree."""
+    return IN_TREE + IN_TREE_A_FACE_OVER * mean_faces_above(solid)
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
-    """Return the walls of the prism over a triangle, as `rounded_rows` does, prepared once."""
+    """Return the walls of the prism over a triangle, as `rounded_rows` does, built once."""
     return solid.prepared("rounded_walls", lambda: rounded_rows(prism_walls(solid)))
 
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:
-    """Return rational rows, each scaled to a largest coefficient near 1 and correctly rounded, and whether exactly so.
+    """Return rational rows scaled to a largest coefficient near 1 and correctly rounded, and whether that was exact.
 
-    A coefficient that is smaller than 2^-900 of the largest, and not zero, could underflow: such a row becomes NaN,
-    which no filter accepts.
+    A nonzero coefficient below 2^-900 of the largest could underflow: such a row becomes NaN, which no filter accepts.
     """
     rounded, is_exact = np.empty((len(rows), len(rows[0]))), np.empty(len(rows), np.bool_)
     for i_row, row in enumerate(rows):

@@ -224,7 +224,7 @@ Outline = tuple[FloatArray, IntArray, float, "_Names"]
 
 def outline_of(solid: Solid) -> Outline:
     """Return vertices (n, d), the end vertex of each edge, the radius, and names of vertices, then edges."""
-    cached: Outline | None = solid.kept("outline and names")
+    cached: Outline | None = solid.cached("outline and names")
     return solid.prepared("outline and names", lambda: _outline(solid)) if cached is None else cached
 
 

@@ -1,4 +1,4 @@
-"""Eight boxes against eight boxes of another body at once, one to a lane.
+"""Tests eight boxes against eight boxes of another body at once, one box a lane.
 
 Two nodes of two trees (`bvh.py`), each in the coordinates of its own tree, and the two maps between those (`frames`)
 give 64 answers in some 200 vector instructions: the images of eight boxes are boxes around turned ones, and a pair is
@@ -11,7 +11,7 @@ they spare). Boxes and margins hold whatever float32 rounds.
 While a tree is built a box is one row (low x, y, z, 0, -high x, -y, -z, 0): the least of two rows is the box around
 both, one comparison of eight lanes.
 
-Eight flat cylinders against eight of another body: which children of two nodes are beside each other.
+**Discs.** Eight flat cylinders against eight of another body: which children of two nodes a plane does not separate.
 
 The boxes of a tree stand along its axes, so two patches of surface that face each other askew have boxes that overlap
 long before they meet. Around each child stands therefore also a flat cylinder ("disc"): about a centre c, along a unit
@@ -43,6 +43,7 @@ from engine.lanes.lanes import (
     bits_of,
     bytes_of,
     dot,
+    filter_pairs,
     greater,
     lane_of,
     lesser,
@@ -50,7 +51,6 @@ from engine.lanes.lanes import (
     load_lane,
     root,
     select,
-    sift,
     store,
 )
 from engine.lanes.tracing import LANES, Lanes, Mask, Number, Rows, Triple, traced
@@ -61,23 +61,25 @@ SHIFT_ROW: Final = 18
 MARGIN_ROW: Final = 21
 BOX_ROWS: Final = 6
 EMPTY: Final = -(2**31)
-"""What a node of a tree names in a lane without a child (`bvh.py`)."""
+"""Child number of an unused lane of a node (`bvh.py`)."""
 
 Bounds = tuple[list[Lanes], list[Lanes]]
 
 
 @traced
 def meeting(first: Rows, i: int, second: Rows, j: int, frames: Rows) -> tuple[int, int]:
-    """Return which children of node i and node j may meet: bit 8 a + b for the lanes a and b, lanes a < 4 and the
-    others apart, each in 32 bits."""
+    """Return the pairs of children of node i and node j that may meet, as two 32-bit masks.
+
+    Bit 8 a + b stands for lanes a and b; the first mask has lanes a < 4, the second the others.
+    """
     a = [load(first, BOX_ROWS * i + row) for row in range(BOX_ROWS)]
     b = [load(second, BOX_ROWS * j + row) for row in range(BOX_ROWS)]
     image, own, their_image, theirs = _image(b, frames, 0), _ends(a), _image(a, frames, FRAME_ROWS), _ends(b)
-    return bytes_of([~are_parted(lane, own, image, their_image, theirs) for lane in range(LANES)])
+    return bytes_of([~are_separated(lane, own, image, their_image, theirs) for lane in range(LANES)])
 
 
-def are_parted(lane: int, own: Bounds, image: Bounds, their_image: Bounds, theirs: Bounds) -> Mask:
-    """Tell which boxes of the second body an axis of either tree parts from the one in a lane of the first."""
+def are_separated(lane: int, own: Bounds, image: Bounds, their_image: Bounds, theirs: Bounds) -> Mask:
+    """Return the boxes of the second body that an axis of either tree separates from the one in a lane of the first."""
     pairs = []
     for (low, high), (their_low, their_high) in ((own, image), (their_image, theirs)):
         for k in range(3):
@@ -92,7 +94,7 @@ def _ends(box: list[Lanes]) -> Bounds:
 
 
 def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
-    """Return low and high of the eight boxes around the images of eight boxes."""
+    """Return low and high of the boxes around the images of eight boxes."""
     frame = [load(frames, first + row) for row in range(FRAME_ROWS)]
     centre = [dot(frame[3 * k : 3 * k + 3], box[:3]) + frame[SHIFT_ROW + k] for k in range(3)]
     half = [dot(frame[9 + 3 * k : 12 + 3 * k], box[3:]) + frame[MARGIN_ROW] for k in range(3)]
@@ -101,7 +103,7 @@ def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
 
 @traced
 def inside_box(boxes: Rows, node: int, low: Triple, high: Triple) -> int:
-    """Return the lanes of a node, a bit each, that meet the box of two triples of float32."""
+    """Return the mask of a node's lanes that meet the box of two float32 triples."""
     own_low, own_high = _ends([load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)])
     pairs = [(own_low[k], high[k]) for k in range(3)] + [(low[k], own_high[k]) for k in range(3)]
     return bits_of(~any_above(pairs))
@@ -111,15 +113,16 @@ def inside_box(boxes: Rows, node: int, low: Triple, high: Triple) -> int:
 def enter_boxes(
     boxes: Rows, node: int, middle: Triple, inverse: Triple, slack: Number, last: Number, entered: Rows
 ) -> int:
-    """Return the lanes of a node (`bvh.py`), a bit each, in whose boxes the segment middle + t half may be at a t of
-    -1 to `last`; set entered (1, 8) to parameters before which it is in none of them. All numbers are float32.
+    """Return the mask of a node's lanes (`bvh.py`) whose boxes the segment middle + t half may meet for t in [-1,
+    last].
 
-    inverse: 1 / half. With u = 2^-24 and S + 2 above all coordinates (`local_segment`), at a point of the box
+    Sets entered (1, 8) to lower bounds of the entry parameters. All numbers are float32; inverse: 1 / half. With u =
+    2^-24 and S + 2 above all coordinates (`local_segment`), at a point of the box
 
-        |w - t e| <= h + 3 u (S + 2),    w = c - m as it is computed here, e the half in float32,
-
-    so t >= w / e - (h + 3 u (S + 2)) / |e|. Both quotients are off by 3.1 u of themselves, their difference by 1 u of
-    its parts, all of which are below S + 4.1 over |e|: 11 u (S + 2) / |e| in all, and a slack is 16 u (S + 2).
+        |w - t e| <= h + 3 u (S + 2),    w = c - m as computed here, e the half in float32,
+        t >= w / e - (h + 3 u (S + 2)) / |e|
+        errors: 3.1 u of each quotient, 1 u of their difference, parts below (S + 4.1) / |e|
+        together: 11 u (S + 2) / |e| < slack / |e|,    slack = 16 u (S + 2)
     """
     first, end = -1.0, last
     for k in range(3):
@@ -134,19 +137,19 @@ def enter_boxes(
 
 @traced
 def fill(rows: Rows, row: int, value: Number) -> None:
-    """Set all numbers of a row to one."""
+    """Set all numbers of a row to one value."""
     store(rows, row, value)
 
 
 @traced
 def join(boxes: Rows, box: int, others: Rows, other: int) -> None:
-    """Set a row to the least of itself and a row of another array, number by number."""
+    """Set a row to the elementwise minimum of itself and a row of another array."""
     store(boxes, box, lesser(load(boxes, box), load(others, other)))
 
 
 @traced
 def exchange(rows: Rows, i: int, j: int) -> None:
-    """Exchange two rows."""
+    """Swap two rows."""
     first, second = load(rows, i), load(rows, j)
     store(rows, i, second)
     store(rows, j, first)
@@ -161,26 +164,28 @@ def discs_meeting(
     low: int, high: int, first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array,
     scales: tuple[float, float], work: Float32Array,
 ) -> tuple[int, int]:  # fmt: skip
-    """Return those of the pairs of children (`boxes.meeting`) whose discs may meet.
+    """Return the pairs of children (`boxes.meeting`) whose discs may meet.
 
     scales: of the two trees. work (DISC_ROWS or more, 8) float32.
     """
     if low | high == 0:
         return low, high
     place_discs(second, j, frames, np.float32(scales[1] / scales[0]), inverse_ratio(scales[1], scales[0]), work)
-    return sift(low, 0, beside_disc, (first, i, work)), sift(high, LANES // 2, beside_disc, (first, i, work))
+    return filter_pairs(low, 0, unseparated_discs, (first, i, work)), filter_pairs(
+        high, LANES // 2, unseparated_discs, (first, i, work)
+    )
 
 
 @inline
 def inverse_ratio(their: float, own: float) -> Any:
-    """Return what makes normals in the units of another tree unit vectors; infinity, which separates nothing, where
-    those are so small that float32 has lost bits of them."""
+    """Return the factor that makes normals in the units of another tree unit vectors; infinity, which separates
+    nothing, if float32 loses bits of them."""
     return np.float32(own / their if own / their <= 2.0**60 else np.inf)
 
 
 @traced
 def place_discs(second: Rows, j: int, frames: Rows, ratio: Number, inverse: Number, work: Rows) -> None:
-    """Write the discs of node j, in the tree of the first body, to `work`; to their radii, twice the margin."""
+    """Write the discs of node j, in the tree of the first body, to `work`; twice the margin is added to their radii."""
     b = [load(second, DISC_ROWS * j + row) for row in range(DISC_ROWS)]
     for k in range(3):
         turn = [load(frames, 3 * k + column) for column in range(3)]
@@ -193,8 +198,8 @@ def place_discs(second: Rows, j: int, frames: Rows, ratio: Number, inverse: Numb
 
 
 @traced
-def beside_disc(lane: int, first: Rows, i: int, work: Rows) -> int:
-    """Return the discs in `work`, a bit each, that are not apart from one child of node i."""
+def unseparated_discs(lane: int, first: Rows, i: int, work: Rows) -> int:
+    """Return the mask of the discs in `work` that no normal separates from one child of node i."""
     a = [load_lane(first, DISC_ROWS * i + row, lane) for row in range(DISC_ROWS)]
     b = [load(work, row) for row in range(DISC_ROWS + 1)]
     gap = [b[k] - a[k] for k in range(3)]

@@ -1,4 +1,4 @@
-"""The parity of a segment over the triangles of a cell, eight at once: what a cell keeps of them, one to a lane.
+"""Parity of a segment's crossings with the triangles of a cell, eight at once: one entry a lane.
 
 A cell has a reference point R whose location is known. A point q of the cell is on the other side of the surface if
 the segment from R to q crosses it an odd number of times. For one triangle a, b, c and x = q - R, in units of the
@@ -37,20 +37,20 @@ from engine.types import UNDECIDED, Float32Array
 
 _UNSURE: Final = 2.0**-24
 _ROUNDING: Final = 16.0 * 2.0**-53
-"""A component of u x v is off by less than this part of the sizes of its two products: 2 u for the two factors, each a
-rounded difference times a power of two, u for the product, u for the sum; taken four times."""
+"""Relative error of a component of u x v to the sizes of its two products: 2 u for the factors (rounded differences), u
+for the product, u for the sum; times four."""
 _FAR: Final = 4.0
 BAND: Final = np.float32(2.0**-18)
-"""Planes of an entry are this far from a point at least where they decide."""
+"""Least distance from a plane of an entry at which it decides."""
 ROWS: Final = 14
-"""Numbers a triangle: n and d, the three m, and 1.0 in the last group of a leaf, else 0.0."""
+"""Numbers of an entry: n and d, the three m, and 1.0 in the last group of a list, else 0.0."""
 _LINE: Final = 16
-"""Numbers that a line of the cache holds."""
+"""Numbers of a cache line."""
 
 
 @inline
 def _set_normal(row: Float32Array, place: int, u: tuple[float, ...], v: tuple[float, ...]) -> float:
-    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on its error."""
+    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return its error bound."""
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     size = max(
         abs(u[1] * v[2]) + abs(u[2] * v[1]), abs(u[2] * v[0]) + abs(u[0] * v[2]), abs(u[0] * v[1]) + abs(u[1] * v[0])
@@ -78,8 +78,7 @@ def set_entry(
 ) -> None:  # fmt: skip
     """Write the entry of a triangle to row (13,) or longer.
 
-    a, b, c: corners less R; u, v: b - a and c - a; all of them differences of the given numbers, each rounded once, in
-    units of the cell.
+    a, b, c: corners minus R; u, v: b - a and c - a; each difference rounded once, in units of the cell.
     """
     normal_error = _set_normal(row, 0, u, v)
     distance = row[0] * a[0] + row[1] * a[1] + row[2] * a[2]
@@ -102,8 +101,8 @@ def set_entry(
 
 @traced
 def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> int:
-    """Return the parity of the segment from R to (x, y, z) over a group of (n, 14, 8) float32, with the bit
-    UNDECIDED where a lane is within the band."""
+    """Return the parity of the segment from R to (x, y, z) over a group of (n, 14, 8) float32, with the bit UNDECIDED
+    if a lane is within the band."""
     side, least, most = planes_of(groups, group, (x, y, z))
     is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
     is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
@@ -112,17 +111,19 @@ def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> i
 
 @merged
 def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: float) -> int:
-    """Return the parity of the segment from the reference point to w, over all groups of a leaf, plus UNDECIDED."""
+    """Return the parity of the segment from the reference point to w over all groups of a list, with the bit
+    UNDECIDED."""
     parity = group_parity(groups, group, wx, wy, wz)
     while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
         group += 1
-        found = group_parity(groups, group, wx, wy, wz)
-        parity = ((parity ^ found) & 1) | ((parity | found) & UNDECIDED)
+        of_group = group_parity(groups, group, wx, wy, wz)
+        parity = ((parity ^ of_group) & 1) | ((parity | of_group) & UNDECIDED)
     return parity
 
 
 def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, Lanes, Lanes]:
-    """Return where the point is to the planes of the triangles, and to the lowest and highest of their edges."""
+    """Return the signed distances of a point to the planes of the triangles, and the least and largest to their edge
+    planes."""
     rows = [load(groups, ROWS * group + row) for row in range(ROWS - 1)]
     side = dot(rows[0:3], point) - rows[3]
     a, b, c = dot(rows[4:7], point), dot(rows[7:10], point), dot(rows[10:13], point)
@@ -131,11 +132,11 @@ def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, 
 
 @traced
 def prefetch_group(groups: Rows, group: int) -> None:
-    """Ask for a group to be brought near."""
+    """Prefetch a group into the cache."""
     for place in range(0, ROWS * LANES, _LINE):
         prefetch(groups, ROWS * LANES * group + place)
 
 
 def groups_of(n_groups: int) -> Any:
-    """Return (n_groups, 14, 8) float32, uninitialised, that begins with a line of the cache: a group is seven."""
+    """Return (n_groups, 14, 8) float32, uninitialised, aligned to a cache line (a group is seven lines)."""
     return aligned((n_groups, ROWS, LANES), np.float32)

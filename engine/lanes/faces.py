@@ -1,10 +1,12 @@
-"""Eight triangles against eight triangles of another body at once, one to a lane: which pairs may meet.
+"""Tests eight triangles at once, one a lane: against eight triangles of another body, a segment, or a point.
+
+**Pairs.** Which pairs of triangles of two blocks may meet.
 
 A block (9, 8) float32 holds the corners of up to eight triangles, px py pz qx ... rz, in the coordinates of their tree
 (`bvh.py`); lanes without one hold `NOWHERE`. Each block is taken to the tree of the other by `frames` (`boxes.py`),
-and a pair is apart where one of eight directions separates it: the axes of either tree (`meet_boxes`), and the
-normals of the two planes (`set_normals`, `beside_planes`). That spares most of the exact signs: two surfaces that come
-near each other are side by side there, and it is the planes of their triangles that part them.
+and a pair is apart if one of eight directions separates it: the axes of either tree (`meet_boxes`), and the normals of
+the two planes (`set_normals`, `unseparated_faces`). That saves most of the exact signs: surfaces near each other are
+locally parallel, and the planes of their triangles separate them.
 
 **margin.** A direction w, however it was rounded, separates two triangles where the numbers w . x of their corners do;
 so only the corners and the products have errors. In the tree of w a corner is off by at most a quarter of `margin`
@@ -12,8 +14,7 @@ so only the corners and the products have errors. In the tree of w a corner is o
 which is below a quarter of margin |w|_1; both bodies together: `margin` |w|_1. What underflows is below `_TINY`.
 Normals are taken from a tree's own coordinates, at most 2, so nothing overflows where the other tree is large.
 
-A segment or a point against eight triangles at once, one to a lane: which of a block's triangles a segment may meet,
-and which lie over a point.
+**A segment.** Which of a block's triangles a segment may meet.
 
 Seen along the segment, from its middle m, a triangle that the segment meets covers the origin. With k the longest axis
 of the half e, i and j the others, and r = e_i / e_k, s = e_j / e_k,
@@ -43,10 +44,10 @@ underflows is far below 2^-117. The blur itself moves it by 4 R b, so the growth
 Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997; the shear is that of S. Woop,
 C. Benthin, I. Wald, Watertight ray/triangle intersection, 2013. Changed: conservative, exact signs decide behind it.
 
-Lower bounds on distances, eight at once: of eight children of a node and a child of another tree, of triangles.
+**Distances.** Lower bounds of eight distances: of a node's children to a child of another tree, and of triangles.
 
 The children are those of an inner node (`bvh.py`), boxes with flat cylinders (`boxes.py`), the triangles those of a
-block (`faces.py`); what they are held against is of another body. `frames` (`boxes.py`) take either tree to the other.
+block (`faces.py`), against one of another body. `frames` (`boxes.py`) take either tree to the other.
 Distances are counted in the units of a tree: that of the eight children, for triangles that of the first body.
 
 **Directions.** Along any direction the gap between two bodies, over the direction's length, is below their distance.
@@ -67,19 +68,19 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from engine.compiling.jit import inline
-from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, FRAME_ROWS, MARGIN_ROW, ROUND, SHIFT_ROW, Bounds, are_parted
+from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, FRAME_ROWS, MARGIN_ROW, ROUND, SHIFT_ROW, Bounds, are_separated
 from engine.lanes.lanes import (
     any_above,
     bits_of,
     bytes_of,
     dot,
+    filter_pairs,
     greater,
     lane_of,
     lesser,
     load,
     load_lane,
     root,
-    sift,
     store,
 )
 from engine.lanes.tracing import LANES, Lanes, Number, Rows, Triple, traced
@@ -88,12 +89,12 @@ from engine.types import Float32Array
 CORNER_ROWS: Final = 9
 """ax ay az bx by bz cx cy cz."""
 AXES_BEFORE: Final = (1, 2, 0, 1, 2)
-"""The other two of axis k: AXES_BEFORE[k], AXES_BEFORE[k + 1]."""
+"""The other two axes of axis k: AXES_BEFORE[k], AXES_BEFORE[k + 1]."""
 
 
 @inline
 def longest_axis(half: tuple[float, ...]) -> int:
-    """Return the axis along which a half is longest."""
+    """Return the axis of the largest component of a half."""
     x, y, z = abs(half[0]), abs(half[1]), abs(half[2])
     if x >= y and x >= z:
         return 0
@@ -104,7 +105,7 @@ def longest_axis(half: tuple[float, ...]) -> int:
 def near_triangles(
     corners: Rows, node: int, i: int, j: int, k: int, middle: Triple, r: Number, s: Number, reach: Number, slack: Number
 ) -> int:
-    """Return the lanes of a block, a bit each, that the segment may meet. All numbers are float32.
+    """Return the mask of a block's lanes that the segment may meet. All numbers are float32.
 
     middle: on the axes i, j, k; reach: |e_k| + slack.
     """
@@ -133,9 +134,9 @@ LEAST_REACH: Final = 2.0**-50
 
 @traced
 def overhead(blocks: Rows, boxes: Rows, node: int, x: Number, y: Number, z: Number, blur: Number) -> tuple[int, int]:
-    """Return the lanes of a node whose triangles surely lie over a point, and those that it is surely beside.
+    """Return the mask of a node's lanes whose triangles are certainly above a point, and of those certainly not.
 
-    x, y: less the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
+    x, y: relative to the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
     """
     rows = [load(blocks, OVERHEAD_ROWS * node + row) for row in range(OVERHEAD_ROWS)]
     u, v = [rows[k] - x for k in (0, 2, 4)], [rows[k] - y for k in (1, 3, 5)]
@@ -144,12 +145,12 @@ def overhead(blocks: Rows, boxes: Rows, node: int, x: Number, y: Number, z: Numb
     band = rows[6] + rows[7] * blur + blur * blur * BAND
     is_above = load(boxes, BOX_ROWS * node + 2) - load(boxes, BOX_ROWS * node + 5) > z
     is_within = (least - band > 0.0) | (most + band < 0.0)
-    is_beside = (least + band < 0.0) & (most - band > 0.0)
-    return bits_of(is_within & is_above), bits_of(is_beside)
+    is_apart = (least + band < 0.0) & (most - band > 0.0)
+    return bits_of(is_within & is_above), bits_of(is_apart)
 
 
 NOWHERE: Final = 1e30
-"""Coordinate of the corners of a lane that is not used: beyond every image and every margin."""
+"""Coordinate of the corners of an unused lane: beyond every image and every margin."""
 
 WORK_ROWS: Final = 28
 _SECOND_IMAGE, _FIRST_IMAGE, _FIRST_NORMAL, _SECOND_NORMAL = 0, 9, 18, 23
@@ -163,13 +164,15 @@ _BEYOND: Final = 2.0**98  # a float32 between all coordinates with their margins
 def faces_meeting(
     first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array, work: Float32Array
 ) -> tuple[int, int]:
-    """Return which triangles of block i and block j may meet: bit 8 a + b for the lanes a and b, lanes a < 4 and the
-    others apart, each in 32 bits. work (WORK_ROWS, 8) float32: what it holds after the call is of no use."""
+    """Return the pairs of triangles of block i and block j that may meet, as two masks (see `boxes.meeting`).
+
+    work (WORK_ROWS, 8) float32: scratch.
+    """
     low, high = meet_boxes(first, i, second, j, frames, work)
     if low | high == 0:
         return low, high
     set_normals(first, i, second, j, frames, work)
-    return sift(low, 0, beside_planes, (work,)), sift(high, LANES // 2, beside_planes, (work,))
+    return filter_pairs(low, 0, unseparated_faces, (work,)), filter_pairs(high, LANES // 2, unseparated_faces, (work,))
 
 
 def _block(rows: Rows, block: int) -> list[Lanes]:
@@ -186,20 +189,22 @@ def _greatest(a: Lanes, b: Lanes, c: Lanes) -> Lanes:
 
 @traced
 def meet_boxes(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> tuple[int, int]:
-    """Return as `faces_meeting` does the pairs that the axes of the trees leave; write the images to `work`."""
+    """Return the pairs, as `faces_meeting` does, that the axes of the trees do not separate; write the images to
+    `work`."""
     own, image = _bounds(first, i, second, j, frames, 0, work, _SECOND_IMAGE)
     theirs, their_image = _bounds(second, j, first, i, frames, FRAME_ROWS, work, _FIRST_IMAGE)
     masks = []
     for lane in range(LANES):
         apart = lane_of(own[0][0], lane) > _BEYOND  # case: neither lane is used
-        masks.append(~(apart | are_parted(lane, own, image, their_image, theirs)))
+        masks.append(~(apart | are_separated(lane, own, image, their_image, theirs)))
     return bytes_of(masks)
 
 
 def _bounds(
     own_rows: Rows, own_block: int, rows: Rows, block: int, frames: Rows, frame_row: int, work: Rows, image_row: int
 ) -> tuple[Bounds, Bounds]:
-    """Return low and high of a block, by its margin, and of the image of another block; write that to `work`."""
+    """Return low and high of a block, widened by its margin, and of the image of another block; write that to
+    `work`."""
     own, other = _block(own_rows, own_block), _block(rows, block)
     frame = [load(frames, frame_row + row) for row in range(FRAME_ROWS)]
     margin, image = frame[MARGIN_ROW], []
@@ -214,7 +219,7 @@ def _bounds(
 
 @traced
 def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> None:
-    """Write the normals of two blocks to `work`, and what their own corners reach along them."""
+    """Write the normals of two blocks to `work`, with the range of their own corners along them."""
     for rows, block, frame_row, row in ((first, i, 0, _FIRST_NORMAL), (second, j, FRAME_ROWS, _SECOND_NORMAL)):
         own = _block(rows, block)
         p, q, r = own[0:3], own[3:6], own[6:9]
@@ -227,8 +232,8 @@ def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: R
 
 
 @traced
-def beside_planes(lane: int, work: Rows) -> int:
-    """Return the triangles of the second block, a bit each, that no normal parts from one lane of the first."""
+def unseparated_faces(lane: int, work: Rows) -> int:
+    """Return the mask of the second block's triangles that no normal separates from one lane of the first."""
 
     def rows(first: int, n_rows: int) -> list[Lanes]:
         return [load(work, first + row) for row in range(n_rows)]
@@ -253,7 +258,7 @@ _MIDDLES: Final = 9
 _LEAST_SIZE: Final = 2.0**-120
 _BELOW_ONE: Final = 1.0 - 2.0**-18
 _MOST: Final = 2.0**60
-"""A bound beyond, in the units of either tree, is told as this: squares of more overflow."""
+"""Largest bound in the units of either tree: squares of larger ones overflow."""
 
 
 def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
@@ -261,14 +266,14 @@ def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
 
 
 def _gaps(v: Sequence[Lanes], reach: Sequence[Lanes]) -> Lanes:
-    """Return the square of the vector of gaps between two boxes along three axes."""
+    """Return the squared length of the vector of gaps between two boxes along three axes."""
     gaps = [greater(abs(x) - r, 0.0) for x, r in zip(v, reach)]
     return dot(gaps, gaps)
 
 
 def _width(disc: Sequence[Lanes], cosine: Lanes) -> Lanes:
-    """Return how far a disc, its radius and half thickness, reaches from its middle along a direction not longer than 1
-    whose product with its normal is given."""
+    """Return the half width of a disc (radius, half thickness) along a direction of length <= 1, from its product with
+    the normal."""
     radius, half = disc
     return abs(cosine) * half + root(greater((1.0 + ROUND) - cosine * cosine, ROUND)) * radius
 
@@ -278,11 +283,10 @@ def child_bounds(
     boxes: Rows, discs: Rows, node: int, fixed: Rows, frames: Rows, own: int, theirs: int, ratio: Number,
     inverse: Number, work: Rows,
 ) -> None:  # fmt: skip
-    """Write lower bounds on the distances of the eight children of a node and what is fixed to the first row of work.
+    """Write lower bounds on the distances of a node's eight children to a fixed box and disc to the first row of work.
 
-    fixed (FIXED_ROWS, 8): in its first column a box and a disc, in the tree of the other body. own, theirs: the rows of
-    frames where the maps begin to the tree of the node and from it; ratio: the other tree's scale over this one's, and
-    its inverse.
+    fixed (FIXED_ROWS, 8): in its first column a box and a disc, in the tree of the other body. own, theirs: first frame
+    rows of the maps to and from the tree of the node; ratio: the other tree's scale over this one's, and its inverse.
     """
     box, disc = (
         [load(rows, n * node + row) for row in range(n)] for rows, n in ((boxes, BOX_ROWS), (discs, DISC_ROWS))
@@ -337,8 +341,8 @@ def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
 
 @traced
 def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number, work: Rows) -> int:
-    """Return the triangles in work, a bit each, that may be as near as `most` to one in a lane of a block; lanes that
-    are not used count as near."""
+    """Return the mask of the triangles in work that may be within `most` of one lane of a block; unused lanes count as
+    near."""
     own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
     theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
     d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]

@@ -1,4 +1,4 @@
-"""Eight float32 numbers as one value: arithmetic on `Lanes` is eight items at once, one to a lane.
+"""Eight float32 numbers as one SIMD value: arithmetic on `Lanes` works on eight items at once, one a lane.
 
 Code on lanes is written like code on numbers (+, -, *, comparisons, `abs`), and what would be a branch becomes
 `select`. A comparison gives a `Mask` of eight truth values (&, |, ~); what is no number compares false. Constants are
@@ -6,10 +6,10 @@ written as they are. Compiled, a value is one vector register; in Python it is a
 results (`tracing.py`). Rows of an array are counted through all its axes but the last: row k of item i of (n, m, 8) is
 m i + k.
 
-Arrays by their address: lets one kernel go through the prepared arrays of thousands of solids.
+Arrays by address let one kernel go through the prepared arrays of thousands of solids.
 
-A table of addresses is made by what holds the arrays, and kept no longer than these. Compiled code makes an array of an
-address in no time; with the compiler disabled a plain twin does the same by ctypes.
+The owner of the arrays makes a table of their addresses, which must not outlive them. Compiled code makes an array of
+an address for free; with the compiler disabled a plain twin does the same by ctypes.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _ALIGNED = 4  # of a float: numpy promises no more
 
 @instruction(lambda value: value)
 def spread(value: Number) -> Lanes:
-    """Return a number in all lanes."""
+    """Return a number in all lanes (broadcast)."""
     return np.full(LANES, value, np.float32)
 
 
@@ -96,7 +96,7 @@ def _emit_lane_of(value: EmittedLanes, lane: int) -> EmittedLanes:
 
 @instruction(_emit_lane_of)
 def lane_of(value: Lanes, lane: int) -> Lanes:
-    """Return one lane, known when the code is written, in all lanes."""
+    """Return one lane, a compile-time constant, in all lanes."""
     return spread(value[lane])
 
 
@@ -148,7 +148,7 @@ def any_of(mask: Mask) -> int:
 
 @instruction(lambda bits: EmittedWord(bits.builder, bits.builder.cttz(bits.value, ir.Constant(ir.IntType(1), 1))))
 def lowest_bit(bits: int) -> int:
-    """Return the place of the lowest bit set; bits > 0."""
+    """Return the index of the lowest bit set; bits > 0."""
     return (int(bits) & -int(bits)).bit_length() - 1
 
 
@@ -159,15 +159,16 @@ def count_bits(bits: int) -> int:
 
 
 @inline
-def sift(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
-    """Return those of four lanes' pairs (`bytes_of`) of which ``remaining(lane, *arguments)`` leaves the second."""
-    kept = 0
+def filter_pairs(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
+    """Filter four lanes' pairs (`bytes_of`): ``remaining(lane, *arguments)`` is the mask of each lane's second
+    members."""
+    left = 0
     while bits != 0:  # bound: each turn ends a lane
         shift = lowest_bit(bits) & -LANES
         lane_bits = bits & 255 << shift
         bits ^= lane_bits
-        kept |= lane_bits & remaining(first_lane + shift // LANES, *arguments) << shift
-    return kept
+        left |= lane_bits & remaining(first_lane + shift // LANES, *arguments) << shift
+    return left
 
 
 # ---- of memory ------------------------------------------------------------------------------------------------------
@@ -179,9 +180,9 @@ def _emit_move(target: EmittedArray, at: Any, source: EmittedArray, first: Any, 
 
 @instruction(_emit_move)
 def move(target: Array, at: int, source: Array, first: int, n: int) -> None:
-    """Set n numbers of `target` from `at` on to those of `source` from `first` on.
+    """Copy n numbers of `source` from `first` on to `target` from `at` on.
 
-    Flat float64 arrays, not the same one; the caller guarantees that both places are within them.
+    Flat float64 arrays, not the same one; the caller guarantees that both ranges are within them.
     """
     target[at : at + n] = source[first : first + n]
 
@@ -191,17 +192,16 @@ def _emit_prefetch(array: EmittedArray, place: Any) -> None:
     kind = ir.FunctionType(ir.VoidType(), [cgutils.voidptr_t, word, word, word])
     function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
     there = builder.bitcast(array.address(place), cgutils.voidptr_t)
-    builder.call(function, [there, *(ir.Constant(word, number) for number in (0, 3, 1))])  # to read, to be kept
+    builder.call(function, [there, *(ir.Constant(word, number) for number in (0, 3, 1))])  # read, keep in cache
 
 
 @instruction(_emit_prefetch)
 def prefetch(array: Array, place: int) -> None:
-    """Ask for the line of the cache that holds number `place` of an array, so that a kernel works on one item while
-    those of the next are on their way; beyond the end is harmless."""
+    """Prefetch the cache line of number `place` of an array; harmless beyond its end."""
 
 
 def aligned(shape: tuple[int, ...], dtype: Any) -> Any:
-    """Return an uninitialised array that begins with a line of the cache."""
+    """Return an uninitialised array aligned to a cache line."""
     n_bytes = math.prod(shape) * np.dtype(dtype).itemsize
     room = np.empty(n_bytes + 64, np.uint8)
     start = -room.ctypes.data % 64
@@ -222,16 +222,16 @@ def greater(a: Lanes, b: Lanes) -> Lanes:
 
 
 def dot(a: Sequence[Lanes], b: Sequence[Lanes]) -> Lanes:
-    """Return the products of two triples, summed from the first."""
+    """Return the dot product of two triples, summed from the first."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def any_above(pairs: Sequence[tuple[Lanes, Lanes]]) -> Mask:
-    """Tell whether the first of some pair is greater than the second."""
-    found = pairs[0][0] > pairs[0][1]
+    """Return whether a > b in some pair (a, b)."""
+    is_any = pairs[0][0] > pairs[0][1]
     for above, below in pairs[1:]:
-        found |= above > below
-    return found
+        is_any |= above > below
+    return is_any
 
 
 def bytes_of(masks: Sequence[Mask]) -> tuple[int, int]:
@@ -246,7 +246,7 @@ def bytes_of(masks: Sequence[Mask]) -> tuple[int, int]:
 
 
 def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
-    """Return the C-contiguous array of a shape and type that begins at `address`."""
+    """Return the C-contiguous array of this shape and type at `address`."""
     n_bytes = int(np.prod(shape)) * np.dtype(dtype).itemsize
     if n_bytes == 0:
         return np.empty(shape, dtype)
@@ -254,7 +254,7 @@ def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
 
 
 def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) -> Any:
-    """Return what `plain_array_at` does; nothing is counted."""
+    """Return what `plain_array_at` does, without reference counting."""
     made = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

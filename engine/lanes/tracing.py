@@ -43,7 +43,7 @@ Triple: TypeAlias = tuple[Number, Number, Number]
 
 
 class Emitted:
-    """Stands for a value of the code that is being written."""
+    """A value of the code that is being generated."""
 
     __array_ufunc__ = None  # numpy leaves the operators to the stand-in
 
@@ -52,17 +52,17 @@ class Emitted:
 
     @classmethod
     def of(cls, builder: Any, number: Any) -> Any:
-        """Return a stand-in as it is, else what stands for a number that is known by now."""
+        """Return an emitted value as it is, and a number as an emitted constant."""
         return number if isinstance(number, cls) else cls(builder, cls.constant(number))
 
     @staticmethod
     def constant(number: Any) -> Any:
-        """Return a number as a value of this kind."""
+        """Return a number as an emitted constant of this kind."""
         raise TypeError(f"an array or a mask was expected, not {number!r}")
 
 
 def _writes(name: str) -> Any:
-    """Return an operator on two values that writes the instruction `name`."""
+    """Return an operator on two values that emits the instruction `name`."""
 
     def write(a: Any, b: Any) -> Any:
         return type(a)(a.builder, getattr(a.builder, name)(a.value, a.of(a.builder, b).value))
@@ -71,7 +71,7 @@ def _writes(name: str) -> Any:
 
 
 def _compares(word: str) -> Any:
-    """Return an operator that tells of each lane how two values compare, false where one is no number."""
+    """Return an operator that compares two values lane by lane, false for NaN."""
 
     def write(a: Any, b: Any) -> EmittedMask:
         return EmittedMask(a.builder, a.builder.fcmp_ordered(word, a.value, a.of(a.builder, b).value))
@@ -80,10 +80,10 @@ def _compares(word: str) -> Any:
 
 
 class EmittedArray(Emitted):
-    """A C-contiguous array: where it begins."""
+    """A C-contiguous array, by its base address."""
 
     def address(self, place: Any) -> Any:
-        """Return where number `place` stands; counted through all axes."""
+        """Return the address of number `place`, counted through all axes."""
         return self.builder.gep(self.value, [EmittedWord.of(self.builder, place).value])
 
 
@@ -156,18 +156,18 @@ _TYPES: Final = {
     "None": types.none,
     "tuple[int, int]": types.UniTuple(types.int64, 2),
 }
-"""Of what is annotated, but for arrays, which keep the type that they have."""
+"""Types of annotations; arrays have their own type."""
 _ROUNDED: Final[dict[str, Callable[[Any], Any]]] = {
     "Number": np.float32,
     "Triple": lambda numbers: tuple(map(np.float32, numbers)),
 }
-"""What Python hands over as compiled code would."""
+"""Conversions of Python arguments that compiled callers do by type."""
 register_model(_LanesType)(lambda manager, kind: models.PrimitiveModel(manager, kind, VECTOR))
 register_model(_MaskType)(lambda manager, kind: models.PrimitiveModel(manager, kind, TRUTHS))
 
 
 def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """Return what stands for an argument of a type in `_TYPES`, or for an array."""
+    """Return the emitted value of an argument of a type in `_TYPES`, or of an array."""
     if isinstance(kind, types.Array):
         return EmittedArray(builder, context.make_array(kind)(context, builder, value).data)
     if kind == _NUMBERS:
@@ -181,7 +181,7 @@ def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 class _Traced(_Intrinsic):  # type: ignore[misc]
-    """A function that writes itself into its compiled callers; `emit` where stand-ins need another form of it."""
+    """A function that emits itself into its compiled callers; `emit` if emitted values need another form of it."""
 
     def __init__(self, function: Callable[..., Any], emit: Callable[..., Any] | None = None) -> None:
         signature = inspect.signature(function)
@@ -217,12 +217,12 @@ class _Traced(_Intrinsic):  # type: ignore[misc]
                 return None
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            found = self._emit(*(_stand_in(context, builder, *pair) for pair in zip(signature.args, values)))
-            if found is None:
+            emitted = self._emit(*(_stand_in(context, builder, *pair) for pair in zip(signature.args, values)))
+            if emitted is None:
                 return context.get_dummy_value()
-            if isinstance(found, tuple):
-                return cgutils.pack_array(builder, [part.value for part in found])
-            return found.value
+            if isinstance(emitted, tuple):
+                return cgutils.pack_array(builder, [part.value for part in emitted])
+            return emitted.value
 
         return self._result(*kinds), generate
 

@@ -184,7 +184,7 @@ def clip_polygons(
         check_options(workers, progress, report=report)
     if not isinstance(region, Solid):
         region = as_solid(region, "region")
-    plan = region.kept("clipping_plan")
+    plan = region.cached("clipping_plan")
     if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:

@@ -1,4 +1,4 @@
-"""Deadline and cancel switch of one call, and the flag that kernels poll."""
+"""Deadline and cancel switch of a call, and the flag that kernels poll."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from engine.types import FlagArray
 
 
 class Cancel:
-    """A switch that another thread may set: every call given it ends soon with `CancelledError`."""
+    """A switch that another thread may set: every call with it ends soon with `CancelledError`."""
 
     __slots__ = ("_flags", "_lock", "is_set")
 
@@ -55,7 +55,7 @@ class Cancel:
             One that `attach` was given.
         """
         with self._lock:
-            self._flags = [kept for kept in self._flags if kept is not flag]
+            self._flags = [other for other in self._flags if other is not flag]
 
     def take(self, n_bytes: int) -> None:
         """Note that an answer is about to allocate memory; a subclass that bounds it overrides this, and raises.
@@ -69,14 +69,14 @@ class Cancel:
 
 @dataclass(order=True, slots=True)
 class _Waiting:
-    """A flag and when to raise it."""
+    """A flag and the time at which to set it."""
 
     end: float
     flag: FlagArray | None = field(compare=False)  # None: no longer
 
 
 class _Clock:
-    """Raises flags when their time has come, all from one thread: to start one takes as long as a small call."""
+    """Sets flags at their time, all from one thread: starting a thread takes as long as a small call."""
 
     def __init__(self) -> None:
         self._heap: list[_Waiting] = []
@@ -85,7 +85,7 @@ class _Clock:
         self._runs = False
 
     def add(self, end: float, flag: FlagArray) -> _Waiting:
-        """Have `flag` raised at the time `end` of the monotonic clock."""
+        """Schedule `flag` to be set at the time `end` of the monotonic clock."""
         waiting = _Waiting(end, flag)
         with self._changed:
             heapq.heappush(self._heap, waiting)
@@ -97,12 +97,12 @@ class _Clock:
         return waiting
 
     def drop(self, waiting: _Waiting) -> None:
-        """Forget a flag, raised or not."""
+        """Forget a flag, set or not."""
         with self._changed:
             waiting.flag = None
             self._n_dropped += 1
             if 2 * self._n_dropped > len(self._heap) + 100:
-                self._heap = [kept for kept in self._heap if kept.flag is not None]
+                self._heap = [other for other in self._heap if other.flag is not None]
                 heapq.heapify(self._heap)
                 self._n_dropped = 0
 
@@ -121,7 +121,7 @@ _clock = _Clock()
 
 
 def _forget_clock() -> None:
-    """A forked child has the clock's object but not its thread."""
+    """Reset the clock in a forked child, which has its object but not its thread."""
     global _clock
     _clock = _Clock()
 
@@ -131,19 +131,19 @@ if hasattr(os, "register_at_fork"):
 
 
 _here = threading.local()
-_AT_ONCE: Final = 1 << 26
-"""Bytes copied without a look at the clock."""
+_BLOCK: Final = 1 << 26
+"""Bytes copied between two polls."""
 _POLL: Final = 0x3FF
 Item = TypeVar("Item")
 
 
 def work_under(budget: Budget) -> None:
-    """Have `poll` know, in this thread, of a budget that was entered in another."""
+    """Make `poll` check, in this thread, a budget that was entered in another."""
     _here.budget = budget
 
 
 def poll() -> None:
-    """Check every `Budget` that the work of this thread is done under, if any: for what is built deep below a call.
+    """Check every `Budget` under which this thread works, if any: for code deep below a call.
 
     Raises: what `Budget.check` raises.
     """
@@ -154,7 +154,7 @@ def poll() -> None:
 
 
 def polled(items: Iterable[Item]) -> Iterator[Item]:
-    """Return items one after another and poll every thousand: for loops of a microsecond or so a turn.
+    """Yield items and poll every thousand: for loops of about a microsecond a turn.
 
     Raises: what `poll` raises.
     """
@@ -165,15 +165,15 @@ def polled(items: Iterable[Item]) -> Iterator[Item]:
 
 
 def concatenated(parts: Sequence[Any], axis: int = 0) -> Any:
-    """Return arrays of one dtype one after another along an axis, as numpy does, but poll while gigabytes are copied.
+    """Return arrays of one dtype concatenated along an axis, as numpy does, but poll while gigabytes are copied.
 
     Raises: what `poll` raises.
     """
     n_bytes, n_rows = sum(part.nbytes for part in parts), sum(part.shape[axis] for part in parts)
-    if n_bytes < _AT_ONCE:
+    if n_bytes < _BLOCK:
         return np.concatenate(parts, axis)
     shape, n = parts[0].shape, 0
-    whole, step = np.empty((*shape[:axis], n_rows, *shape[axis + 1 :]), parts[0].dtype), _AT_ONCE * n_rows // n_bytes
+    whole, step = np.empty((*shape[:axis], n_rows, *shape[axis + 1 :]), parts[0].dtype), _BLOCK * n_rows // n_bytes
     into = np.moveaxis(whole, axis, 0)
     for rows in (np.moveaxis(part, axis, 0) for part in parts):
         for first in range(0, len(rows), step):
@@ -185,10 +185,10 @@ def concatenated(parts: Sequence[Any], axis: int = 0) -> Any:
 
 
 class Budget:
-    """Deadline and cancel switch of one call; use as a context manager, which `poll` then knows of.
+    """Deadline and cancel switch of one call; as a context manager it is also checked by `poll`.
 
-    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. around: the one
-    that this one was entered under. `flag` is the one-element uint8 array that kernels poll.
+    deadline: seconds from now, None for no limit. cancel: a switch shared with other threads, or None. around: the
+    budget under which this one was entered. `flag` is the one-element uint8 array that kernels poll.
     """
 
     def __init__(self, deadline: float | None = None, cancel: Cancel | None = None) -> None:
@@ -230,7 +230,7 @@ class Budget:
     def check(self) -> None:
         """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops.
 
-        A raised `flag` counts by itself: a kernel may have seen it and left its answers incomplete.
+        A set `flag` suffices: a kernel may have seen it and left its results incomplete.
         """
         if self._cancel is not None and self._cancel.is_set:
             raise CancelledError("the call was cancelled by its caller")
@@ -243,16 +243,16 @@ class Budget:
             raise CancelledError("another part of the call failed")
 
     def take(self, n_bytes: int) -> None:
-        """Say, before it is gathered, by how many bytes an answer grows whose size the question does not tell."""
+        """Announce by how many bytes an answer is about to grow, if the arguments do not bound its size."""
         if self._cancel is not None:
             self._cancel.take(n_bytes)
 
 
 UNLIMITED: Final = Budget()
-"""Shared by all calls without a limit that hand it to no other thread: nothing ever raises its flag."""
+"""The budget of all calls without a limit and without threads: nothing ever sets its flag."""
 
 
 def shown(value: object) -> str:
-    """Return a number as it is, of anything else its type: its text could be endless."""
+    """Return a number as it is, and the type of any other value: its text could be endless."""
     is_short = isinstance(value, float) or (isinstance(value, int) and abs(value) < 10**20)
     return repr(value) if is_short else f"a value of type {type(value).__name__}"

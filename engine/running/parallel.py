@@ -1,4 +1,4 @@
-"""Splits a batch into chunks of 1-3 ms over a thread pool, within a budget, and tells progress.
+"""Splits a batch into chunks of 1-3 ms over a thread pool, within a budget, and reports progress.
 
 Kernels are serial and release the interpreter lock, so plain threads run them side by side; two kernels that each start
 threads of their own would abort the process under numba's workqueue layer. Between chunks there is room for other
@@ -24,14 +24,14 @@ Progress = Callable[[int], object]
 """Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""
 
 CHUNK_SECONDS: Final = 0.002
-"""What one chunk should take: short enough for fairness between requests, long against 20 us of hand-over."""
+"""Target duration of a chunk: short enough for fairness between requests, long against 20 us of hand-over."""
 
 _SMALLEST: Final = 8
-"""The last chunks are not smaller than this part of a full one."""
+"""Least size of the last chunks, as a part of a full one."""
 
 
 class Options(TypedDict, total=False):
-    """What every public function takes by keyword, as its overloads spell it."""
+    """Keyword arguments of every public function, for its overloads."""
 
     workers: int | None
     deadline: float | None
@@ -53,7 +53,7 @@ def check_options(workers: object, progress: object, **flags: object) -> None:
 
 
 def is_unlimited(workers: object, deadline: object, cancel: object, progress: object) -> bool:
-    """Tell whether a call may be answered at once where its items are few: no limit, and any number of threads."""
+    """Return whether a small batch may take the fast path: no limit, and any number of threads."""
     is_any = workers is None or (type(workers) is int and workers > 0)
     return is_any and deadline is None and cancel is None and progress is None
 
@@ -66,11 +66,11 @@ def default_workers() -> int:
 _pool: ThreadPoolExecutor | None = None
 _pool_lock = threading.Lock()
 _n_calls = 0
-"""Calls that use the pool now."""
+"""Number of calls that use the pool now."""
 
 
 def _forget_pool() -> None:
-    """A forked child has the pool's object but none of its threads."""
+    """Reset the pool in a forked child, which has its object but none of its threads."""
     global _pool, _pool_lock, _n_calls
     _pool, _pool_lock, _n_calls = None, threading.Lock(), 0
 
@@ -98,9 +98,9 @@ def run_chunks(
 ) -> None:
     """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
 
-    The first chunks run in the calling thread and are timed, the very first only where it is long enough to tell: it
-    may load what the others find. Later ones are sized to take `CHUNK_SECONDS`. With one worker, or as long as what is
-    left would take less than twice that, no other thread is involved: to wake one takes up to half a millisecond.
+    The first chunks run in the calling thread and are timed, the very first only if it is long enough: it may load code
+    and data for the others. Later ones are sized to take `CHUNK_SECONDS`. With one worker, or if the rest would take
+    less than twice that, no other thread is started: waiting for one takes up to half a millisecond.
     Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
 
     task: must not call `run_chunks` with more than one worker (the pool is shared and could wait on itself).
@@ -129,12 +129,12 @@ def run_chunks(
 
 
 def _next_chunk(n_items: int, seconds: float) -> int:
-    """Return the chunk that should take `CHUNK_SECONDS`, at most eight times the last (the first may be untypical)."""
+    """Return the size of a chunk that should take `CHUNK_SECONDS`, at most eight times the last."""
     return max(1, int(n_items * min(8.0, CHUNK_SECONDS / max(seconds, 1e-9))))
 
 
 class _Ranges:
-    """What is left of a batch. Towards the end chunks get smaller, so that all threads end together."""
+    """The remaining ranges of a batch. Chunks get smaller towards the end, so that all threads end together."""
 
     def __init__(self, start: int, n_items: int, chunk: int, n_workers: int) -> None:
         self._start, self._n_items = start, n_items
@@ -156,7 +156,7 @@ class _Ranges:
             return first, self._start
 
     def took(self, n_items: int, seconds: float) -> None:
-        """Size the chunks to come by one that is done."""
+        """Size the next chunks by the duration of one that is done."""
         self._chunk = _next_chunk(n_items, seconds)
 
 
@@ -169,10 +169,10 @@ def _run_threaded(
     budget: Budget,
     progress: Progress | None,
 ) -> None:
-    """Keep `n_workers` threads at work; on the first error raise the flag, wait for those at work, re-raise.
+    """Run `n_workers` threads; on the first error set the flag, wait for running tasks, re-raise.
 
-    A thread goes from chunk to chunk by itself: to wake this one after each costs a tenth of the time. It comes back
-    after a chunk where another call uses the pool, for a fair turn of both, or where `progress` is to be told.
+    A thread takes chunk after chunk by itself: notifying this one after each costs a tenth of the time. It returns
+    after a chunk if another call uses the pool, for fairness, or if `progress` is due.
     """
     global _n_calls
     ranges, pool = _Ranges(start, n_items, chunk, n_workers), _shared_pool()
@@ -181,8 +181,8 @@ def _run_threaded(
     def work() -> int:
         work_under(budget)
         n_done = 0
-        while not failures and (found := ranges.take()) is not None:
-            first, stop = found
+        while not failures and (next_range := ranges.take()) is not None:
+            first, stop = next_range
             before = time.perf_counter()
             try:
                 task(first, stop)

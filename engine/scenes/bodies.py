@@ -19,7 +19,7 @@ from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check
 from engine.compiling.jit import entry_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.methods.filters import frames_of
-from engine.containment.methods.rational_locate import Check, is_located, over_tree
+from engine.containment.methods.rational_locate import Check, fold_csg_tree, is_located
 from engine.containment.posed_locators import posed_locator
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
@@ -180,7 +180,7 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray,
     check: as for `Solid.prepared`.
     """
     if isinstance(solid, Csg):
-        box: tuple[FloatArray, FloatArray] = over_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
+        box: tuple[FloatArray, FloatArray] = fold_csg_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
         return box
     low, high, _ = own_box(solid, check)
     if np.isinf(low).any():

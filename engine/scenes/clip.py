@@ -24,8 +24,8 @@ from engine.scenes.segment_kernels import MET, Firsts, cut_near, find_first
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.decide_then_cut import FEW
 from engine.segment_clipping.on_boundary.boundary import clip_chunk
-from engine.segment_clipping.pieces import Pieces, first_of, room_for
-from engine.segment_clipping.profiles import ExactPiece, exact_pieces, settled
+from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of
+from engine.segment_clipping.profiles import ExactPiece, clip_exactly, exact_pieces
 from engine.solids.base import Solid
 from engine.solids.checks import is_ready
 from engine.solids.pose import Pose
@@ -84,7 +84,7 @@ def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces
     solids = scene.base.solids
     if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) <= _FEW:
         return None
-    if scene.base.kept("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
+    if scene.base.cached("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
         return None
     segments = read_only(segments)  # of the one kind that kernels are compiled for: this may be their first call
     n, is_any, order = len(segments), keep == "any", order_of(segments, 0.5, None)
@@ -207,7 +207,7 @@ def _cut_near(
     words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(scene.n_rows)
     while n[0] < last:  # bound: each turn has room for a body, or prepares one
-        out, names = room_for(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
+        out, names = allocate_pieces(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
         pairs = np.empty((_LEFT + last - first, 2), np.int64)
         entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
         budget.check()
@@ -269,4 +269,4 @@ def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budg
     if pose is None and solid.type in (("polygon", "triangle") if solid.dimension == 2 else ("polyhedron",)):
         locator = None if n <= FEW else locator_of(solid).chosen(n, budget)
         return *clip_chunk(segments, 0, n, shape, locator, budget), True
-    return settled(segments, every, solid, pose, budget), every, False
+    return clip_exactly(segments, every, solid, pose, budget), every, False

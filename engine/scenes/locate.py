@@ -13,8 +13,8 @@ from typing import Any, ClassVar, Final, Literal
 import numpy as np
 
 from engine.compiling.jit import entry_of, kernel
-from engine.containment.cells.build import MOST_FACES, sides_if_they_pay
-from engine.containment.locate import located_at_once
+from engine.containment.cells.build import MOST_FACES, sides_if_profitable
+from engine.containment.locate import locate_small_batch
 from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
 from engine.containment.prepared import tree_of
@@ -137,7 +137,7 @@ def locate_all(
         none = SceneLocations(np.zeros(n + 1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_))
         return none, Accuracy("exact", None, n, 0, 0, "box_grid")
     points, beyond, query_counts, has_new = read_only(points), [0], list[IntArray](), False
-    if 0 < n <= _FEW_POINTS and n_bodies <= _FEW_BODIES and not scene.base.kept("can_locate"):
+    if 0 < n <= _FEW_POINTS and n_bodies <= _FEW_BODIES and not scene.base.cached("can_locate"):
         if all(len(getattr(solid, "vertices", ())) <= _FEW_VERTICES for solid in scene.base.solids):
             return _locate_small_batch(points, scene, budget, progress)
     where, tables = scene.where(budget), scene.tables(budget)
@@ -185,7 +185,7 @@ def _locate_small_batch(
     scene.base.check_located(budget)
     for body in range(len(located)):
         solid, pose = scene.placed(body)
-        answer = located_at_once(points, solid) if pose is None else None
+        answer = locate_small_batch(points, solid) if pose is None else None
         if answer is None:
             more = scene.locator(body).chosen(n, budget).fill(points, located[body], budget)
         else:
@@ -238,13 +238,13 @@ def _build_trees(scene: Placements, query_counts: IntArray, budget: Budget, work
     chosen = list[tuple[Polyhedron, int]]()
     for solid, n_queries in zip(scene.base.solid_tables(budget).meshes, query_counts.tolist()):
         if n_queries and len(solid.triangles) <= MOST_FACES:
-            if n_queries >= _FEWEST_FOR_TREES or solid.kept("tree") is not None:
+            if n_queries >= _FEWEST_FOR_TREES or solid.cached("tree") is not None:
                 chosen.append((solid, n_queries))
 
     def build(start: int, stop: int) -> None:
         for solid, n_queries in chosen[start:stop]:
             tree_of(solid, budget.check)
-            sides_if_they_pay(solid, n_queries, budget)
+            sides_if_profitable(solid, n_queries, budget)
 
     run_chunks(build, len(chosen), budget=budget, first_chunk=1, workers=workers)
     return bool(chosen) and scene.has_new_trees([solid for solid, _ in chosen])

@@ -13,11 +13,19 @@ import numpy as np
 from engine.bounding.aabb import place_boxes
 from engine.compiling.jit import merged
 from engine.containment.cells.locate import side_in_cell
-from engine.containment.methods.filters import Frames, frames_of, in_space, located, side_of_box, side_of_rows, to_frame
+from engine.containment.methods.filters import (
+    Frames,
+    frames_of,
+    in_space,
+    location_in_ball,
+    side_of_box,
+    side_of_rows,
+    to_frame,
+)
 from engine.containment.methods.polygon_ray_parity import locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import locate_in_tree
 from engine.containment.posed_locators import posed_locator
-from engine.containment.prepared import closed_rings, tree_at, tree_line
+from engine.containment.prepared import closed_rings, tree_at, tree_row
 from engine.errors import EngineError
 from engine.running.budget import Budget
 from engine.solids.base import Solid
@@ -68,7 +76,7 @@ class LocateTables(NamedTuple):
     addresses: IntArray
     sizes: IntArray
     places: FloatArray
-    """What `tree_line` has of a polyhedron, 0 where there is no tree."""
+    """What `tree_row` has of a polyhedron, 0 where there is no tree."""
 
 
 @merged
@@ -92,7 +100,7 @@ def locate_in_body(
     elif kind == BodyKind.BALL:
         c, radius, blur = in_space(tables.centers, slot), tables.balls[slot, 0], tables.balls[slot, 1]
         square, reach = radius * radius, radius + 2.0 * blur
-        location = int(located(p[0] - c[0], p[1] - c[1], p[2] - c[2], square, reach, blur))
+        location = int(location_in_ball(p[0] - c[0], p[1] - c[1], p[2] - c[2], square, reach, blur))
     elif kind == BodyKind.ROWS:
         location = side_of_rows(tables.rows, tables.row_offsets[slot], tables.row_offsets[slot + 1], q, blur)
     return location, False
@@ -177,8 +185,8 @@ class Tables:
 
 def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
     """Return the cells and the trees of polyhedra, where they are cached."""
-    cells, trees = [solid.kept("sides") for solid in solids], [solid.kept("tree") for solid in solids]
-    lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_line(tree) for tree in trees]
+    cells, trees = [solid.cached("sides") for solid in solids], [solid.cached("tree") for solid in solids]
+    lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_row(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())
     return (
         np.array([np.zeros(6) if each is None else each.frame for each in cells]).reshape(-1, 6),

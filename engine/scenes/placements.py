@@ -56,7 +56,7 @@ class Placements(Preparing):
     @property
     def all_cached(self) -> list[Any]:
         """All cached structures."""
-        others = (self.kept("few"), self.kept("whole"))
+        others = (self.cached("few"), self.cached("whole"))
         return [self.base._prepared, self._placed, *(each._prepared for each in others if each is not None)]
 
     def after(self, poses: Mapping[int, Pose | None]) -> Placements:
@@ -187,10 +187,10 @@ class Placements(Preparing):
         """Return whether tables lack a structure of some solids that is cached by now; then the tables are rebuilt on
         next use."""
         known: set[int] = self.base.prepared("trees", lambda: set())
-        new = {2 * id(solid) + (solid.kept("sides") is not None) for solid in solids} - known
+        new = {2 * id(solid) + (solid.cached("sides") is not None) for solid in solids} - known
         if new:
             known |= new
-            for bodies in (self.base, self.kept("few"), self):
+            for bodies in (self.base, self.cached("few"), self):
                 if bodies is not None:
                     bodies.drop("tables", "solid_tables")
         return bool(new)

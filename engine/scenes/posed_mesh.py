@@ -25,7 +25,7 @@ from engine.predicates.error_free import dd_div, dd_sub
 from engine.scenes.near_boxes import MOST_MET, Scratch, scratch_at
 from engine.scenes.posed_cut import in_frame
 from engine.segment_clipping.on_boundary.boundary_cut import sort_crossings
-from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_one, place_of
+from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_same_point, decode_place
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts, corner, triangle_at
 from engine.segment_clipping.pieces import put_point, slack_of
@@ -40,9 +40,9 @@ WANTS_TREE: Final = -3
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
 """The fields of `Mesh` that are read here."""
 MESH_WORDS: Final = 37
-"""Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_line`'s
+"""Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_row`'s
 addresses, 0 without a tree, and sizes (8,); then as doubles origin, inverse, whether all is in range, low and high of
-its box (11,), and `tree_line`'s places (10,)."""
+its box (11,), and `tree_row`'s places (10,)."""
 TREE, PLACES, TREE_PLACES = 8, 16, 27
 """Offsets of these."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
@@ -84,7 +84,7 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
     n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
     for i in range(n_met):
         kind = cuts.codes[i]
-        if kind == Kind.DEGENERATE or (not is_any and kind != Kind.PROPER and place_of(kind) >= Place.START):
+        if kind == Kind.DEGENERATE or (not is_any and kind != Kind.PROPER and decode_place(kind) >= Place.START):
             return UNSURE
         cuts.codes[i] = CROSSED if kind == Kind.PROPER else kind
     return max(n_met, UNSURE)
@@ -104,7 +104,9 @@ def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_c
         first, turns = order[begin], False
         if place < n and cuts.t[order[place]] == cuts.t[first]:
             other = order[place]
-            if not are_one(mesh.elements, cuts.met[first], cuts.codes[first], cuts.met[other], cuts.codes[other]):
+            if not are_same_point(
+                mesh.elements, cuts.met[first], cuts.codes[first], cuts.met[other], cuts.codes[other]
+            ):
                 return UNSURE
             continue
         for rank in range(begin, place):
@@ -141,7 +143,7 @@ def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame
         return False
     cuts.faces[place], code = mesh.faces[element], cuts.codes[place]
     for other in range(place if code != CROSSED else 0):
-        if are_one(mesh.elements, cuts.met[other], cuts.codes[other], element, code):
+        if are_same_point(mesh.elements, cuts.met[other], cuts.codes[other], element, code):
             cuts.t[place] = cuts.t[other]
             for k in range(3):
                 cuts.points[place, k] = cuts.points[other, k]
@@ -157,7 +159,7 @@ def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame
     d, d_low, d_bound = _values(dot(normal, along), along_blur, normal)
     slack = slack_of(s, s_bound, d, d_bound)
     t, low = dd_div(-s, -s_low, d, d_low)
-    cuts.t[place], n = t + low, place_of(code)
+    cuts.t[place], n = t + low, decode_place(code)
     if n > 2:
         is_proven = put_point(cuts.points[place], segments, item, t, low, slack)
     else:

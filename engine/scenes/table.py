@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from engine.containment.methods.rational_locate import exact_inverse, to_world_frame
-from engine.containment.prepared import tree_line, tree_of
+from engine.containment.prepared import tree_of, tree_row
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.rational import nearest_pair
 from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
@@ -48,7 +48,7 @@ class Table:
         solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)
-            addresses, sizes, places = tree_line(tree_of(solid))
+            addresses, sizes, places = tree_row(tree_of(solid))
             words = self._cached[id(solid)]
             words[TREE + 5 : TREE + 8], words.view(np.float64)[TREE_PLACES:] = sizes, places
             words[TREE + 1 : TREE + 5] = addresses[1:]

@@ -1,16 +1,16 @@
-"""Segments on a closed ball, in the plane too: the interval between two roots of a quadratic, 2D and 3D.
+"""Clips segments to a closed ball or disc: the piece is the interval between the two roots of a quadratic, 2D and 3D.
 
-With d = q - p and f = p - c the points of the ball have
+With d = q - p and f = p - c the points of the ball satisfy
 
     a t^2 + 2 b t + c' <= 0,     a = d.d,  b = d.f,  c' = f.f - r^2,     t = (-b -+ sqrt(D)) / a,     D = b^2 - a c'
 
-The signs of c' and of a + 2 b + c' say which ends are within. With both without, the ball is met exactly if D >= 0 and
-the foot of the centre lies between the ends: b < 0 < a + b. Doubles with a bound settle most segments, double-doubles
-those that are nearly tangent or nearly end on the sphere. What is still open (tangents, ends on the sphere, a
-coordinate that may round either way) goes to integers and their square roots (profiles.py).
+The signs of c' and a + 2 b + c' decide whether p and q are inside. If both are outside, the segment meets the ball if
+and only if D >= 0 and the foot of the centre is between the ends: b < 0 < a + b. Doubles with a bound decide most
+segments, double-doubles those that are nearly tangent or end near the sphere. The rest (tangents, ends on the sphere, a
+coordinate that may round either way) goes to the exact fallback (profiles.py).
 
-blur: the centre of a ball that is placed is off by so much a coordinate. Sums of products in doubles lose 6 u of their
-size, in double-doubles 12 u^2 (u = 2^-53).
+blur: error bound of each coordinate of a posed ball's centre. A sum of products of size s has the error 6 u s in
+doubles and 12 u^2 s in double-doubles (u = 2^-53).
 
 Source: the textbook's exercise, a segment on a sphere.
 """
@@ -36,13 +36,13 @@ from engine.segment_clipping.pieces import (
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 _LOST: Final = 2.0**-1060
-"""What sums of products lose where these underflow."""
+"""Error of a sum of products that underflow."""
 
 Pair = tuple[float, float]
 
 
 class _Quadratic(NamedTuple):
-    """a, 2 b and c' of the quadratic, its value at 1, D, and how far each may be off."""
+    """a, 2 b and c' of the quadratic, its value at 1, D, and an error bound of each."""
 
     a: Pair
     b: Pair
@@ -64,7 +64,7 @@ def difference(p: Triple, q: Triple) -> Vector:
 
 @inline
 def sign_of(value: float, bound: float) -> int:
-    """Return the sign of what a value is that may be off by a bound, or UNDECIDED."""
+    """Return the sign of a value with an error bound, or UNDECIDED."""
     if value > bound:
         return 1
     return -1 if value < -bound else UNDECIDED
@@ -86,7 +86,7 @@ def _dot(a: Vector, b: Vector) -> Pair:
 
 @inline
 def _in_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
-    """Return the quadratic by the heads of the pairs."""
+    """Return the quadratic computed in doubles, from the heads of the pairs."""
     d_size, f_size = _size(d), _size(f)
     a = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[2][0] * d[2][0]
     b = d[0][0] * f[0][0] + d[1][0] * f[1][0] + d[2][0] * f[2][0]
@@ -122,8 +122,8 @@ def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Qua
 
 
 @inline
-def _verdict(e: _Quadratic) -> tuple[int, int, int]:
-    """Return what `meets_ball` does, as far as a quadratic says."""
+def _meets(e: _Quadratic) -> tuple[int, int, int]:
+    """Return the result of `meets_ball` as far as a quadratic decides it."""
     a, b, gap = e.a[0], e.b[0], e.gap[0]
     past = e.a_bound + e.b_bound + 2.0**-50 * (a + abs(b))
     of_p, of_q = sign_of(e.c, e.c_bound), sign_of(e.at_q, e.q_bound)
@@ -134,24 +134,32 @@ def _verdict(e: _Quadratic) -> tuple[int, int, int]:
 
 
 @called
-def _meets_closely(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
-    return _verdict(_in_double_doubles(d, f, blur, radius))
+def _meets_in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
+    return _meets(_in_double_doubles(d, f, blur, radius))
 
 
 @inline
 def meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
-    """Return 1, -1 or UNDECIDED for a segment that meets a ball, or not, or may, and whether either end lies within
-    (-1) or without (1), or UNDECIDED."""
-    meets, of_p, of_q = _verdict(_in_doubles(d, f, blur, radius))
+    """Return whether a segment meets a ball, and on which side of the sphere its ends are.
+
+    | result | 1 | -1 | UNDECIDED |
+    |---|---|---|---|
+    | first | meets | misses | not proven |
+    | second, third (p, q) | outside | inside | not proven |
+    """
+    meets, of_p, of_q = _meets(_in_doubles(d, f, blur, radius))
     if meets == UNDECIDED or (meets == 1 and (of_p == UNDECIDED or of_q == UNDECIDED)):
-        return _meets_closely(d, f, blur, radius)
+        return _meets_in_double_doubles(d, f, blur, radius)
     return meets, of_p, of_q
 
 
 @inline
 def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, of_q: int) -> tuple[int, End, End]:
-    """Return the ends of the piece of a segment that meets the ball, its ends without it where of_p and of_q are 1, as
-    `put_piece` takes them, after a 1, or UNDECIDED if they are not known well enough."""
+    """Return 1 and the two ends of the piece of a segment in the ball, as `put_piece` takes them; UNDECIDED if not
+    precise.
+
+    of_p, of_q: 1 where that end is outside, and so replaced by a root.
+    """
     first, last = OWN_START, OWN_END
     if of_p < 0 and of_q < 0:
         return 1, first, last
@@ -178,7 +186,7 @@ def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, o
 
 @inline
 def _ball_of(segments: FloatArray, item: int, center: FloatArray) -> tuple[Vector, Vector]:
-    """Return d and f of a segment; in the plane z is 0."""
+    """Return d and f of a segment, with z = 0 in 2D."""
     is_flat = segments.shape[2] == 2
     p, c = point_of(segments, item, 0, is_flat), (center[0], center[1], 0.0 if is_flat else center[2])
     return difference(p, point_of(segments, item, 1, is_flat)), difference(c, p)
@@ -189,8 +197,8 @@ def decide_on_sphere(
     segments: FloatArray, center: FloatArray, radius: float, first: int, last: int, stop: FlagArray, items: Int32Array,
     planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the closed ball: see `decide_on_boxes`."""
-    kept, n_open = 0, 0
+    """Decide which ``segments[first:last]`` ((n, 2, dim) float64) meet the closed ball: see `decide_on_boxes`."""
+    n_accepted, n_open = 0, 0
     for i in range(first, last):
         if stop[0]:
             return
@@ -200,9 +208,9 @@ def decide_on_sphere(
             still[n_open] = i
             n_open += 1
         elif meets == 1:
-            items[kept], planes[kept, 0], planes[kept, 1] = i, min(of_p, 0), min(of_q, 0)
-            kept += 1
-    n[0], n[1], n[2] = kept, n_open, 0
+            items[n_accepted], planes[n_accepted, 0], planes[n_accepted, 1] = i, min(of_p, 0), min(of_q, 0)
+            n_accepted += 1
+    n[0], n[1], n[2] = n_accepted, n_open, 0
 
 
 @kernel
@@ -210,15 +218,15 @@ def fill_on_sphere(
     segments: FloatArray, center: FloatArray, radius: float, items: Int32Array, planes: Int32Array, begin: int,
     size: int, stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
+    """Write the pieces of ``segments`` ((n, 2, dim) float64) in the ball: see `fill_on_boxes`."""
     n_open = 0
     for place in range(size):
         if stop[0]:
             return
         i, row = items[place], begin + place
         d, f = _ball_of(segments, i, center)
-        found, first, last = between_roots(d, f, 0.0, radius, 1 + 2 * planes[place, 0], 1 + 2 * planes[place, 1])
-        if not put_piece(pieces, row, i, segments, i, first, last) or found == UNDECIDED:
+        state, first, last = between_roots(d, f, 0.0, radius, 1 + 2 * planes[place, 0], 1 + 2 * planes[place, 1])
+        if not put_piece(pieces, row, i, segments, i, first, last) or state == UNDECIDED:
             still[n_open] = row
             n_open += 1
     n[0], n[1] = n_open, n_open

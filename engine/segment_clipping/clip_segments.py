@@ -1,4 +1,4 @@
-"""Public: what remains of segments on a region."""
+"""Public: clip segments to a region."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def clip_segments(
 
     Examples
     --------
-    >>> from engine.solids.aabb import Aabb
+    >>> from engine.solids.primitives import Aabb
     >>> pieces = clip_segments([[[-1.0, 1.0], [3.0, 1.0]]], Aabb(min=[0.0, 0.0], max=[2.0, 2.0]))
     >>> pieces.start.tolist(), pieces.end.tolist(), pieces.t.tolist(), pieces.faces.tolist()
     ([[0.0, 1.0]], [[2.0, 1.0]], [[0.25, 0.75]], [[0, 1]])
@@ -141,24 +141,27 @@ def clip_segments(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     if not is_free or report is not False:
         check_options(workers, progress, report=report)
-    plan: Plan | None = region.kept("segment_plan") if isinstance(region, Solid) else None
+    plan: Plan | None = region.cached("segment_plan") if isinstance(region, Solid) else None
     array: Any = segments
     if plan is None or not is_ready(array, 2, region.dimension):
         region = as_solid(region, "region")
         plan = plan_for(region)
         array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks at it
     if is_free and len(array) <= plan.few:
-        found, n_beyond, n_rational = plan.cut(array, region, plan, UNLIMITED, workers, None)
+        clipped, n_beyond, n_rational = plan.cut(array, region, plan, UNLIMITED, workers, None)
     else:
         with Budget(deadline, cancel) as budget:
-            found, n_beyond, n_rational = plan.cut(array, region, plan, budget, workers, progress)
-    source, (start, end), t, faces = found
+            clipped, n_beyond, n_rational = plan.cut(array, region, plan, budget, workers, progress)
+    source, (start, end), t, faces = clipped
     pieces = SegmentPieces(source, start, end, t, faces)
     return (pieces, Accuracy("exact", 0.5, len(array), n_beyond, n_rational, plan.name)) if report else pieces
 
 
 def plan_for(region: Solid) -> Plan:
-    """Return how segments are clipped on this solid, kept with it. Raises: UnsupportedSolidError."""
+    """Return the cached clipping plan of a solid.
+
+    Raises: UnsupportedSolidError.
+    """
     make = row_of(region).clip
     if make is None:
         raise refused(region, "clip_segments does not take", lambda row: row.clip, where=("region",))
@@ -167,41 +170,41 @@ def plan_for(region: Solid) -> Plan:
 
 
 def on_box(region: Aabb) -> Plan:
-    """Return how segments are clipped on a box."""
+    """Return the clipping method of a box."""
     low, high = region.min, region.max
 
     def with_columns(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         return low, high, as_columns(rows_between(low, high))
 
     def scale(segments: FloatArray) -> Scaled | None:
-        found = scaled(segments, low, high)
-        return found and replace(found, region=with_columns(*found.region))
+        batch = scaled(segments, low, high)
+        return batch and replace(batch, region=with_columns(*batch.region))
 
     method = Method(decide_on_boxes, fill_on_boxes, with_columns(low, high), scale)
     return Plan("cohen_sutherland", clip_on_convex, method=method)
 
 
 def on_planes(region: HalfSpace | Convex) -> Plan:
-    """Return how segments are clipped on what planes bound."""
+    """Return the clipping method of a half-space or convex solid."""
     rows = rows_of(region)
     plain = balanced_rows(rows, 0)
 
     def scale(segments: FloatArray) -> Scaled | None:
-        found = scaled(segments)
-        balanced = None if found is None else balanced_rows(rows, found.exponent)
-        return None if found is None or balanced is None else replace(found, region=(as_columns(balanced),))
+        batch = scaled(segments)
+        balanced = None if batch is None else balanced_rows(rows, batch.exponent)
+        return None if batch is None or balanced is None else replace(batch, region=(as_columns(balanced),))
 
     method = Method(decide_on_rows, fill_on_rows, (as_columns(rows if plain is None else plain),), scale)
     return Plan("cyrus_beck", clip_on_convex, method=method)
 
 
 def on_ball(region: Sphere) -> Plan:
-    """Return how segments are clipped on a ball."""
+    """Return the clipping method of a ball."""
     center, radius = region.center, float(region.radius)
 
     def scale(segments: FloatArray) -> Scaled | None:
-        found = scaled(segments, center, np.array([radius]))
-        return found and replace(found, region=(found.region[0], float(found.region[1][0])))
+        batch = scaled(segments, center, np.array([radius]))
+        return batch and replace(batch, region=(batch.region[0], float(batch.region[1][0])))
 
     method = Method(decide_on_sphere, fill_on_sphere, (center, radius), scale)
     return Plan("sphere_interval", clip_on_convex, method=method)

@@ -1,4 +1,4 @@
-"""Segments on an axis-parallel box by outcodes, decided exactly: 2D and 3D.
+"""Cohen-Sutherland clipping of segments to a box by outcodes, decided exactly: 2D and 3D.
 
                  |        |                One bit for each plane a point lies outside of, in the order
         0101     |  0100  |   0110         xmin, xmax, ymin, ymax, zmin, zmax (drawn: ymax ymin xmax xmin
@@ -7,25 +7,25 @@
        ----------+--------+----------      cut by planes it crosses, of which at most one per axis is
         1001     |  1000  |   1010         entered and one left.
 
-The textbook cuts the outside end at one plane after another until the codes say accept or reject. Two departures:
+The textbook clips the outside end at one plane after another until the codes accept or reject. Two differences:
 
-1. Its loop can run for ever by rounding, (1, 1)-(-1, -1) on the box [1e-9, 3]^2. Here each plane is looked at once:
-   the last plane entered and the first one left bound the piece, if in this order.
+1. Its loop can run for ever by rounding, (1, 1)-(-1, -1) on the box [1e-9, 3]^2. Here each plane is tested once: the
+   last plane entered and the first plane left bound the piece, if in this order.
 2. It decides from rounded points. Here the parameters of the planes, quotients of differences of original coordinates,
-   are compared in doubles beyond their bound, then in double-doubles, else exactly, as rows of planes are
-   (cyrus_beck.py). The cut coordinate is the plane's own value.
+   are compared in doubles with a bound, then in double-doubles, then exactly, as plane rows are (cyrus_beck.py). The
+   clipped coordinate is the plane's own value.
 
-The first two comparisons are made for a block of segments at once, without branches: so the compiler uses vectors, and
-no processor has to foretell on which side of a plane a point lies. In the plane z is 0 throughout.
+The first two comparisons run on a block of segments without branches, so that the compiler vectorises them. In 2D z is
+0 throughout. Two kernels: `decide_on_boxes` decides which planes bound each piece, `fill_on_boxes` (planes_cut.py)
+computes the ends.
 
-Two kernels: `decide_on_boxes` says which planes bound each piece, `fill_on_boxes` (planes_cut.py) makes the points of
-the pieces that there are.
+**Bound of a crossing.** t = n / d with n = at - p and d = q - p on the plane's axis, exact pairs n + n', d + d' of a
+rounded difference and its rounding error, u = 2^-53:
 
-**Bound of a meeting.** t = n / d with n = at - p and d = q - p on the plane's axis, each known as what rounding left
-and what it lost. With u = 2^-53, the quotient t of the rounded n and d is within u, so n - t d is a double (fma finds
-it) of at most u n; what n lost is as small, and so is t times what d lost. Adding the three up costs 6 u^2 n, their
-quotient by d 3 u^2 t, leaving out what d lost there 3 u^2 t: t + t_low is within 13 u^2 of itself, and t_low at most
-3.1 u t.
+    t = fl(n / d)                          |t - n / d| <= u t
+    r = n - t d (exact by fma)             |r| <= u n,  |n'| <= u n,  |t d'| <= u n
+    t_low = fl((r + n' - t d') / d)        sum: 6 u^2 n, quotient: 3 u^2 t, d' left out of the divisor: 3 u^2 t
+    |t + t_low - exact| <= 13 u^2 t        |t_low| <= 3.1 u t
 
 Source: Cohen and Sutherland in W. M. Newman, R. F. Sproull, Principles of Interactive Computer Graphics, 1979; the
 textbook's section on clipping segments on an AABB.
@@ -38,27 +38,27 @@ from typing import Final, NamedTuple
 from engine.compiling.jit import kernel, merged
 from engine.predicates.error_free import U2, fma, two_diff, two_prod, workspace
 from engine.segment_clipping.cyrus_beck import coordinate_limit, decide_alone
-from engine.segment_clipping.pieces import BLOCK, KEPT, Triple, is_plain, point_of
+from engine.segment_clipping.pieces import ACCEPTED, BLOCK, Triple, is_plain, point_of
 from engine.types import OPEN, FlagArray, FloatArray, Int32Array, IntArray
 
 T_GAP: Final = 16.0 * 2.0**-53
-"""Parameters t are quotients of two differences, within 3 u (1 + u)^2 of themselves; two of them and this test: 8 u."""
+"""Relative error of t = n / d: 3 u (1 + u)^2; two of them and the comparison: 8 u."""
 T_TINY: Final = 2.0**-1060
-"""Parameters that underflow."""
+"""Bound for parameters that underflow."""
 SHORTEST: Final = 2.0**-400
 LONGEST: Final = 2.0**400
-"""Sizes of d for which that of a meeting holds: the quotients of products that underflow are below `_UNDERFLOW`."""
+"""Range of d in which the bound of a crossing holds: quotients of products that underflow are below `_UNDERFLOW`."""
 _UNDERFLOW: Final = 2.0**-600
 _CLOSE: Final = 48.0 * U2
-"""Two parameters are within 26 u^2 of the larger one, the difference of their low parts loses 6 u^2; that of their high
-parts loses nothing where they are within a factor of two, and elsewhere does not matter."""
+"""Relative error of the difference of two parameters: 26 u^2 for both, 6 u^2 for the difference of their low parts;
+that of the high parts is exact within a factor of two, and elsewhere does not matter."""
 
 
-class Meeting(NamedTuple):
-    """A place where a segment enters or leaves a slab.
+class PlaneCrossing(NamedTuple):
+    """The crossing of a segment with a plane of a slab.
 
-    t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: they lost nothing. plane: 0.0 .. 5.0, or
-    -1.0 for none, with a t outside of [0, 1] that is like no other.
+    t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: both differences are exact. plane: 0.0 ..
+    5.0, or -1.0 for none, with a t outside of [0, 1] that equals no other.
     """
 
     t: float
@@ -70,33 +70,35 @@ class Meeting(NamedTuple):
 
 
 @merged
-def meeting(p: float, q: float, at: float, plane: float) -> Meeting:
-    """Return where p q, its coordinates on one axis, meets the plane at `at`."""
+def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing:
+    """Return the crossing of p q, its coordinates on one axis, with the plane at `at`."""
     n, n_low = two_diff(at, p)
     d, d_low = two_diff(q, p)
     d = d if p != q else 1.0  # not met: any number
     t = n / d
-    return Meeting(t, ((fma(-t, d, n) + n_low) - t * d_low) / d, n, d, (n_low == 0.0) & (d_low == 0.0), plane)
+    return PlaneCrossing(t, ((fma(-t, d, n) + n_low) - t * d_low) / d, n, d, (n_low == 0.0) & (d_low == 0.0), plane)
 
 
 @merged
-def meetings(p: float, q: float, low: float, high: float, axis: float) -> tuple[Meeting, Meeting, bool]:
-    """Return where p q enters the slab low .. high of an axis and where it leaves; False where q - p has no range."""
+def slab_crossings(
+    p: float, q: float, low: float, high: float, axis: float
+) -> tuple[PlaneCrossing, PlaneCrossing, bool]:
+    """Return the crossings where p q enters and leaves the slab low .. high; False if q - p is out of range."""
     is_entered, is_left = (p < low) | (p > high), (q < low) | (q > high)
-    entered = meeting(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
-    left = meeting(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
+    entered = plane_crossing(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
+    left = plane_crossing(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
     length = abs(entered.d)
     has_range = ((length >= SHORTEST) & (length <= LONGEST)) | (not (is_entered | is_left))
-    entered = entered if is_entered else Meeting(-1.0 - axis, 0.0, 0.0, 1.0, False, -1.0)
-    left = left if is_left else Meeting(2.0 + axis, 0.0, 0.0, 1.0, False, -1.0)
+    entered = entered if is_entered else PlaneCrossing(-1.0 - axis, 0.0, 0.0, 1.0, False, -1.0)
+    left = left if is_left else PlaneCrossing(2.0 + axis, 0.0, 0.0, 1.0, False, -1.0)
     return entered, left, has_range
 
 
 @merged
-def gap_between(a: Meeting, b: Meeting) -> tuple[float, bool]:
-    """Return the parameter of a less that of b, and whether its sign is sure: exactly zero where both are equal.
+def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]:
+    """Return the parameter of a minus that of b, and whether its sign is certain; exactly zero if both are equal.
 
-    Of exact differences equality shows as n_a d_b = n_b d_a (lattices: diagonals through corners).
+    Of exact differences equality is n_a d_b = n_b d_a (lattices: diagonals through corners).
     """
     gap = (a.t - b.t) + (a.t_low - b.t_low)
     left, left_tail = two_prod(a.n, b.d)
@@ -107,15 +109,15 @@ def gap_between(a: Meeting, b: Meeting) -> tuple[float, bool]:
 
 @merged
 def slab(p: float, q: float, low: float, high: float, not_entered: float, not_left: float) -> tuple[float, float]:
-    """Return the parameters at which p q, on one axis, enters and leaves low .. high, or those given."""
+    """Return the parameters at which p q, on one axis, enters and leaves low .. high, or those given if it does not."""
     d = q - p if p != q else 1.0  # not met: any number
     enters, leaves = ((low if p < low else high) - p) / d, ((low if q < low else high) - p) / d
     return (enters if (p < low) | (p > high) else not_entered), (leaves if (q < low) | (q > high) else not_left)
 
 
 @merged
-def decide_roughly(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Decide on the segment p q and a box, state OPEN where doubles do not suffice, plane entered, plane left."""
+def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
+    """Decide segment p q against a box: state (OPEN if doubles do not suffice), plane entered, plane left."""
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, low, high
     misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
     misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit
@@ -137,27 +139,27 @@ def decide_roughly(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
 
 
 @merged
-def decide_closely(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Decide as `decide_roughly` does, with double-doubles."""
-    a, d, is_x = meetings(p[0], q[0], low[0], high[0], 0.0)
-    b, e, is_y = meetings(p[1], q[1], low[1], high[1], 1.0)
-    c, f, is_z = meetings(p[2], q[2], low[2], high[2], 2.0)
-    gap, sure_1 = gap_between(a, b)
+def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
+    """Decide as `decide_in_doubles` does, in double-doubles."""
+    a, d, is_x = slab_crossings(p[0], q[0], low[0], high[0], 0.0)
+    b, e, is_y = slab_crossings(p[1], q[1], low[1], high[1], 1.0)
+    c, f, is_z = slab_crossings(p[2], q[2], low[2], high[2], 2.0)
+    gap, sure_1 = compare_parameters(a, b)
     entered = a if gap >= 0.0 else b  # equal: the smaller plane stays
-    gap, sure_2 = gap_between(entered, c)
+    gap, sure_2 = compare_parameters(entered, c)
     entered = entered if gap >= 0.0 else c
-    gap, sure_3 = gap_between(d, e)
+    gap, sure_3 = compare_parameters(d, e)
     left = d if gap <= 0.0 else e
-    gap, sure_4 = gap_between(left, f)
+    gap, sure_4 = compare_parameters(left, f)
     left = left if gap <= 0.0 else f
-    gap, sure_5 = gap_between(entered, left)
+    gap, sure_5 = compare_parameters(entered, left)
     sure = is_plain(p, q) & is_x & is_y & is_z & sure_1 & sure_2 & sure_3 & sure_4 & sure_5
     return (2.0 if not sure else (0.0 if gap > 0.0 else 1.0)), entered.plane, left.plane
 
 
 @merged
 def corners_of(low: FloatArray, high: FloatArray) -> tuple[Triple, Triple]:
-    """Return the corners of a box, in the plane with z from -1 to 1."""
+    """Return the corners of a box, in 2D with z from -1 to 1."""
     is_flat = low.size == 2
     return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
 
@@ -167,11 +169,16 @@ def decide_on_boxes(
     segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, first: int, last: int,
     stop: FlagArray, items: Int32Array, planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) and the box `low`, `high`; columns: of its rows.
+    """Decide which planes bound the pieces of ``segments[first:last]`` ((n, 2, dim) float64) in the box `low`, `high`.
 
-    items: (m,) the segments that are kept, in order, in planes (m, 2) the planes entered and left, -1 for an end of the
-    segment; there is room for all. still: likewise the segments left open. n: how many are kept, open, and went beyond
-    the filter. stop: one uint8, polled.
+    | argument | content |
+    |---|---|
+    | columns | of the box's plane rows, see `as_columns` |
+    | items (m,) int32 | out: the segments that are accepted, in order |
+    | planes (m, 2) int32 | out: the planes entered and left, -1 for an end of the segment |
+    | still (m,) int32 | out: the segments left OPEN |
+    | n (3,) int64 | out: how many are accepted, OPEN, and beyond the filter |
+    | stop (1,) uint8 | polled |
     """
     is_flat = low.size == 2
     lowest, highest = corners_of(low, high)
@@ -180,7 +187,7 @@ def decide_on_boxes(
     )  # fmt: skip
     state, entered, left, unsure = workspace(64), workspace(64), workspace(64), workspace(64)
     numbers, chosen, limit = (workspace(8), workspace(8), workspace(8)), workspace(8), coordinate_limit(columns)
-    kept, n_open, beyond = 0, 0, 0
+    n_accepted, n_open, beyond = 0, 0, 0
     for start in range(first, last, BLOCK):
         if stop[0]:
             return
@@ -191,7 +198,7 @@ def decide_on_boxes(
             qx[j], qy[j], qz[j] = point_of(segments, min(start + j, last - 1), 1, is_flat)
         for j in range(n_lanes):
             p, q = (px[j], py[j], pz[j]), (qx[j], qy[j], qz[j])
-            state[j], entered[j], left[j] = decide_roughly(p, q, lowest, highest)
+            state[j], entered[j], left[j] = decide_in_doubles(p, q, lowest, highest)
         n_unsure = 0
         for j in range(size):
             if state[j] == OPEN:
@@ -202,7 +209,7 @@ def decide_on_boxes(
             qx[k], qy[k], qz[k] = point_of(segments, start + int(unsure[k]), 1, is_flat)
         for k in range((n_unsure + 7) >> 3 << 3):  # whole vectors
             p, q = (px[k], py[k], pz[k]), (qx[k], qy[k], qz[k])
-            px[k], py[k], pz[k] = decide_closely(p, q, lowest, highest)
+            px[k], py[k], pz[k] = decide_in_double_doubles(p, q, lowest, highest)
         for k in range(n_unsure):
             j = int(unsure[k])
             state[j], entered[j], left[j] = px[k], py[k], pz[k]
@@ -212,7 +219,7 @@ def decide_on_boxes(
                 still[n_open] = start + j
                 n_open += 1
         beyond += n_unsure
-        for j in range(size):  # kept <= start + j - first: what is not kept is written over
-            items[kept], planes[kept, 0], planes[kept, 1] = start + j, int(entered[j]), int(left[j])
-            kept += state[j] == KEPT
-    n[0], n[1], n[2] = kept, n_open, beyond
+        for j in range(size):  # n_accepted <= start + j - first: rows of others are overwritten
+            items[n_accepted], planes[n_accepted, 0], planes[n_accepted, 1] = start + j, int(entered[j]), int(left[j])
+            n_accepted += state[j] == ACCEPTED
+    n[0], n[1], n[2] = n_accepted, n_open, beyond

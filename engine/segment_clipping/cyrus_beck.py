@@ -1,14 +1,14 @@
-"""Segments on a convex region given by plane rows, decided exactly: outcodes over signed distances, 2D and 3D.
+"""Cyrus-Beck clipping of segments to a convex region given by plane rows, decided exactly: 2D and 3D.
 
 The region is where every row has a x + b y + c z + d >= 0; it may be empty or unbounded. A plane with both end points
 strictly outside drops the segment (the outcodes share a bit). A plane with one end outside is entered or left at
 t = s_p / (s_p - s_q); the last plane entered and the first one left bound the piece, if in this order. Each plane is
-looked at once, so the loop ends; all signs and all comparisons are exact and about the original end points: a filter,
-then expansions, then "open" (where exponents leave the range in which expansions are exact).
+tested once, so the loop ends; all signs and all comparisons are exact and about the original end points: a filter,
+then expansions, then OPEN (if exponents leave the range in which expansions are exact).
 
-Plane values come from columns, parameters from doubles for a block of segments at once; what these leave open is looked
-at again, by the planes that an end is not surely inside of. In the plane z is 0. As for boxes, one kernel says which
-planes bound each piece, `fill_on_rows` (planes_cut.py) makes their points.
+Plane values and parameters are computed in doubles for a block of segments, column by column; what these leave open is
+decided again by the planes that an end is not certainly inside of. In 2D z is 0. As for boxes, one kernel decides which
+planes bound each piece, `fill_on_rows` (planes_cut.py) computes the ends.
 
 Source: M. Cyrus, J. Beck, Generalized two- and three-dimensional clipping, 1978; the textbook's exercise:
 Cohen-Sutherland generalised to a convex polyhedron. Changed: exact signs of s, exact order of t, cut points from the
@@ -25,26 +25,26 @@ from engine.compiling.jit import allocating_kernel, called, inline, merged
 from engine.predicates.error_free import workspace
 from engine.predicates.expansion import Components, compress, grow, grow_product, is_safe, sign
 from engine.predicates.parameters import compare_products, compare_ratios_filter
-from engine.segment_clipping.pieces import BLOCK, DROPPED, KEPT, is_plain, point_of
+from engine.segment_clipping.pieces import ACCEPTED, BLOCK, REJECTED, is_plain, point_of
 from engine.types import OPEN, UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 VALUE_BOUND: Final = 8.0 * 2.0**-53
-"""Bound of a plane value a x + b y + c z + d in doubles, relative to the sum of absolute terms.
+"""Error bound of a plane value a x + b y + c z + d in doubles, relative to sum |terms|.
 
-Each term carries at most (1 + u)^4, the sum of absolute terms the same; 8 u covers both and its own rounding.
+Each term has a factor of at most (1 + u)^4, so has sum |terms|: 8 u covers both and the rounding of the bound.
 """
 VALUE_TINY: Final = 2.0**-1070
-"""Products that underflow lose at most 2^-1074 each."""
+"""Error bound of products that underflow: 2^-1074 each."""
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
-"""Of a parameter in doubles, beside the bounds of its plane values: two or three roundings of a number up to 1."""
+"""Error of a parameter in doubles besides that of its plane values: two or three roundings of a number up to 1."""
 WIDEST: Final = 2.0**900
-"""Where bounds stay below it, no term of a plane value overflows."""
+"""Bound of plane values below which no term overflows."""
 NARROWEST: Final = 2.0**-960
-"""Where values of two signs are beyond it, the inverse of their difference does not overflow."""
+"""Size beyond which the inverse of the difference of two plane values of different signs does not overflow."""
 
 
 class Latest(NamedTuple):
-    """The last plane of some that a segment crosses: at t, within `slack`; rival: the latest that another may be."""
+    """The last plane that a segment crosses: at t, within `slack`; rival: the largest t that another plane may have."""
 
     t: float
     slack: float
@@ -55,9 +55,9 @@ class Latest(NamedTuple):
 def as_columns(rows: FloatArray) -> FloatArray:
     """Return plane rows (m, dim + 1) as columns (dim + 3, m).
 
-    The last two bound the error of a value in doubles: times the largest coordinate, and by themselves. They are zero
-    where a value is a coordinate and a number, rounded once: its sign is exact, and what compares values has room for
-    a rounding of each.
+    The last two columns bound the error of a value in doubles: relative to the largest coordinate, and absolute. They
+    are zero if a value is a coordinate and a number, rounded once: its sign is exact, and comparisons have room for a
+    rounding of each.
     """
     with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
         slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
@@ -71,7 +71,7 @@ def as_columns(rows: FloatArray) -> FloatArray:
 
 @inline
 def are_safe(row: FloatArray, segment: FloatArray) -> bool:
-    """Tell whether every number of a row and a segment is zero or of a size for which expansions are exact."""
+    """Return whether every number of a row and a segment is zero or in the range in which expansions are exact."""
     safe = True
     for k in range(row.size):
         safe = safe and is_safe(row[k])
@@ -82,7 +82,7 @@ def are_safe(row: FloatArray, segment: FloatArray) -> bool:
 
 @inline
 def expand_value(row: FloatArray, point: FloatArray, e: Components) -> int:
-    """Set e to the exact value of `row` at `point` as an expansion; seven places in 3D. Returns its length."""
+    """Set e to the exact value of `row` at `point` as an expansion (7 places in 3D); return its length."""
     d = row.size - 1
     n = grow(e, 0, row[d])
     for k in range(d):
@@ -110,10 +110,10 @@ def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> in
 def decide_by_rows(
     segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
 ) -> tuple[int, int, int, int]:
-    """Decide on one segment by the n `chosen` planes: state, plane entered, plane left, 1 where filters did not do.
+    """Decide one segment by the n `chosen` planes: state, plane entered, plane left, 1 if beyond the filter.
 
-    s_p, s_q, bounds: of each of them the values at both ends and their bound. An item with an
-    open sign or order outside of the safe range is left open.
+    s_p, s_q, bounds: values of each plane at both ends, and their error bound. An item with an uncertain sign or order
+    outside of the safe range stays OPEN.
     """
     entered = left = -1
     beyond = 0
@@ -133,7 +133,7 @@ def decide_by_rows(
         if sign_p >= 0 and sign_q >= 0:
             continue
         if sign_p < 0 and sign_q < 0:
-            return DROPPED, -1, -1, beyond
+            return REJECTED, -1, -1, beyond
         other = entered if sign_p < 0 else left
         if other >= 0:
             order, by_filter = compare_rows(segment, columns, s_p, s_q, bounds, chosen, i, other)
@@ -150,8 +150,8 @@ def decide_by_rows(
         if order == UNDECIDED:
             return OPEN, -1, -1, 1
         if order > 0:
-            return DROPPED, -1, -1, beyond
-    return KEPT, entered, left, beyond
+            return REJECTED, -1, -1, beyond
+    return ACCEPTED, entered, left, beyond
 
 
 @inline
@@ -169,8 +169,8 @@ def compare_rows(
 
 
 @merged
-def later(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
-    """Return the later of a crossing, if there is one, known within `slack`, and the latest so far."""
+def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
+    """Return the later of the latest crossing so far and another one, within `slack`, if is_crossed."""
     is_later = is_crossed & (t > best.t)
     other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
     return Latest(
@@ -181,9 +181,9 @@ def later(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) 
 
 @merged
 def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> float:
-    """Return the state of a segment from the latest plane entered and, by -t, the first one left; OPEN: unsure.
+    """Return the state of a segment from the latest plane entered and, by -t, the first plane left; OPEN if uncertain.
 
-    t = s_p / (s_p - s_q) moves by at most bound / (|s_p| + |s_q|) when both values move by a bound.
+    t = s_p / (s_p - s_q) has the error bound / (|s_p| + |s_q|) if both values have the error bound.
     """
     start, end = entered.t, -left.t
     is_sure = max(start + entered.slack, entered.rival) < min(end - left.slack, -left.rival)
@@ -195,7 +195,7 @@ def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> floa
 
 @inline
 def coordinate_limit(columns: FloatArray) -> float:
-    """Return what coordinates have to stay below, so that bounds of plane values stay below `WIDEST`."""
+    """Return the bound on coordinates below which bounds of plane values stay below `WIDEST`."""
     limit = np.inf
     for j in range(columns.shape[1]):
         limit = min(limit, (WIDEST - columns[-1, j]) / columns[-2, j])
@@ -206,7 +206,10 @@ def coordinate_limit(columns: FloatArray) -> float:
 def decide_alone(
     segments: FloatArray, item: int, columns: FloatArray, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
-    """Decide on one segment as `decide_by_rows` does; limit: of coordinates. numbers, chosen: (3, m), (m,), scratch."""
+    """Decide one segment as `decide_by_rows` does.
+
+    limit: of coordinates. numbers (3, m), chosen (m,): scratch.
+    """
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
@@ -229,9 +232,9 @@ def decide_on_rows(
     segments: FloatArray, columns: FloatArray, first: int, last: int, stop: FlagArray, items: Int32Array,
     planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide on ``segments[first:last]`` ((n, 2, dim) float64) where all planes (`as_columns`) are >= 0.
+    """Decide which planes bound the pieces of ``segments[first:last]`` ((n, 2, dim) float64) where all planes are >= 0.
 
-    Plane by plane over a block of segments, without branches. Outputs: see `decide_on_boxes`.
+    Plane by plane over a block of segments, without branches. columns: of `as_columns`. Outputs: see `decide_on_boxes`.
     """
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
@@ -245,7 +248,7 @@ def decide_on_rows(
         workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64), workspace(64),
         workspace(64), workspace(64), workspace(64),
     )  # fmt: skip
-    kept, n_open, beyond = 0, 0, 0
+    n_accepted, n_open, beyond = 0, 0, 0
     for begin in range(first, last, BLOCK):
         size = min(BLOCK, last - begin)
         n_lanes = (size + 7) >> 3 << 3  # whole vectors, filled by the last one: what lies there may take long to divide
@@ -271,10 +274,10 @@ def decide_on_rows(
                 is_out[i] = 1.0 if p_out & q_out else is_out[i]
                 inverse = 1.0 / (p - q)
                 t, slack = p * inverse, 1.01 * bound * abs(inverse) + T_ROUNDINGS
-                t0[i], slack0[i], plane0[i], rival0[i] = later(
+                t0[i], slack0[i], plane0[i], rival0[i] = later_crossing(
                     t, slack, float(j), p_out & q_in, Latest(t0[i], slack0[i], plane0[i], rival0[i])
                 )
-                t1[i], slack1[i], plane1[i], rival1[i] = later(
+                t1[i], slack1[i], plane1[i], rival1[i] = later_crossing(
                     -t, slack, float(j), p_in & q_out, Latest(t1[i], slack1[i], plane1[i], rival1[i])
                 )
         for i in range(size):
@@ -290,6 +293,6 @@ def decide_on_rows(
                 if state == OPEN:
                     still[n_open] = begin + i
                     n_open += 1
-            items[kept], planes[kept, 0], planes[kept, 1] = begin + i, plane_in, plane_out
-            kept += state == KEPT
-    n[0], n[1], n[2] = kept, n_open, beyond
+            items[n_accepted], planes[n_accepted, 0], planes[n_accepted, 1] = begin + i, plane_in, plane_out
+            n_accepted += state == ACCEPTED
+    n[0], n[1], n[2] = n_accepted, n_open, beyond

@@ -1,12 +1,11 @@
-"""Runs the kernels of convex regions, on which a segment has one piece at most, chunk by chunk: decide, then fill.
+"""Runs the kernels of convex regions, on which a segment has at most one piece: decide a chunk, then fill its pieces.
 
-1. *decide* goes over the segments of a chunk and lists those that are kept with the planes that bound them. What it
-   leaves open is settled by rational arithmetic at last.
-2. *fill* goes over the pieces that the chunk has and writes each where it stays. A coordinate that it cannot round for
-   sure is settled by rational arithmetic too.
+1. *decide* lists the accepted segments of a chunk with the planes that bound them; OPEN ones go to the exact fallback.
+2. *fill* computes the pieces and writes each to its final row; a piece with a coordinate that is not certainly rounded
+goes to the exact fallback.
 
-Kernels take numbers of sizes for which expansions are exact. Where more than a few items are left open, all is done
-again on numbers times a power of two, if there is one that brings them into that range.
+Kernels need numbers of sizes for which expansions are exact. If more than a few items stay OPEN, the batch is run again
+on numbers scaled by a power of two, if one brings them into that range.
 """
 
 from __future__ import annotations
@@ -22,30 +21,30 @@ from engine.compiling.jit import entry_of
 from engine.predicates.rational import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks
-from engine.segment_clipping.pieces import Pieces, completed, first_of, room_for
-from engine.segment_clipping.profiles import settled
+from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, in_order_of_source
+from engine.segment_clipping.profiles import clip_exactly
 from engine.solids.base import Solid
 from engine.solids.checks import check_finite
 from engine.types import FloatArray, Int32Array, IntArray
 
 Clipped = tuple[Pieces, int, int]
-"""Pieces, how many items needed more than the filter, and how many rational arithmetic."""
+"""Pieces, number of items beyond the filter, and number decided in rationals."""
 
 FEW: Final = 32
-"""Open items that rational arithmetic settles in the time in which a batch is looked through for its exponent; segments
-that are clipped in the time that it takes to plan more."""
+"""Number of OPEN items that cost the exact fallback as much as a search for a scale; and of segments below which chunks
+cost more than they save."""
 
 
 _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
-"""Scratch for so few segments that no call works in now."""
+"""Scratch of the small batch path, for one call at a time."""
 _NO_FLAG: Final = UNLIMITED.flag
-_AT_ONCE: Final = 1 << 12
-"""Segments that are decided on before their pieces are filled."""
+_PER_BLOCK: Final = 1 << 12
+"""Segments that are decided before their pieces are filled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scaled:
-    """A batch and its region times 2^-exponent, as the kernels take them."""
+    """A batch and its region times 2^-exponent, the arguments of the kernels."""
 
     points: FloatArray
     region: tuple[Any, ...]
@@ -53,7 +52,7 @@ class Scaled:
 
 
 def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
-    """Return a batch and the arrays of its region scaled, None where they are well as they are or it is not exact."""
+    """Return a batch and the arrays of its region scaled; None if no scaling is needed or it is not exact."""
     exponent = exponent_of(points, *region)
     arrays = [shifted(array, -exponent) for array in (points, *region)]
     exact = [array for array in arrays if array is not None]
@@ -63,10 +62,10 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 
 
 class Method(NamedTuple):
-    """How segments are clipped on one convex region.
+    """How to clip segments to one convex region.
 
     decide, fill: kernels; see cohen_sutherland.py, planes_cut.py. region: their arguments. scale: returns the batch
-    scaled, None where it is well as it is or cannot be scaled exactly.
+    scaled, None if no scaling is needed or it is not exact.
     """
 
     decide: Any
@@ -76,17 +75,17 @@ class Method(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """How segments are clipped on one solid: made from the cell `clip` of its row, and kept with the solid."""
+    """How to clip segments to one solid: made by the cell `clip` of its row, cached with the solid."""
 
     name: str
     """For `Accuracy.method`."""
     cut: Callable[[FloatArray, Any, Plan, Budget, int | None, Progress | None], Clipped]
-    """(segments, solid, plan, budget, workers, progress); segments: (n, 2, dim) float64, not yet looked at for NaN.
-    Raises NotFiniteError."""
+    """(segments, solid, plan, budget, workers, progress); segments: (n, 2, dim) float64, not yet tested for NaN. Raises
+    NotFiniteError."""
     few: int = FEW
-    """Segments that are clipped in one piece where nothing limits the call: `budget` is UNLIMITED then."""
+    """Largest batch that runs as one chunk if the call has no limits: `budget` is UNLIMITED then."""
     method: Method | None = None
-    """Of a convex region."""
+    """Kernels, for a convex region."""
 
 
 def clip_on_convex(
@@ -102,17 +101,16 @@ def clip_on_convex(
             progress(len(segments))
         return few
     scene = Scaled(segments, method.region, 0)
-    found = _clip(segments, region, method, scene, FEW + len(segments) // 256, budget, workers, progress)
-    if found is None:
+    clipped = _clip(segments, region, method, scene, FEW + len(segments) // 256, budget, workers, progress)
+    if clipped is None:
         scene = method.scale(segments) or scene
-        found = _clip(segments, region, method, scene, len(segments), budget, workers, None)  # progress is told
-    assert found is not None
-    return found
+        clipped = _clip(segments, region, method, scene, len(segments), budget, workers, None)  # already reported
+    assert clipped is not None
+    return clipped
 
 
 def _clip_few(segments: FloatArray, method: Method) -> Clipped | None:
-    """Return the pieces of up to `FEW` segments, (n, 2, dim) float64, not yet looked at for NaN; None where anything is
-    left open."""
+    """Return the pieces of up to `FEW` segments (n, 2, dim) float64, not yet tested for NaN; None if any stays OPEN."""
     n, _, dimension = segments.shape
     decide, fill, region, _ = method
     try:
@@ -122,7 +120,7 @@ def _clip_few(segments: FloatArray, method: Method) -> Clipped | None:
     items, planes, still, counts = scratch
     entry_of(decide)(segments, *region, 0, n, _NO_FLAG, items, planes, still, counts)
     m, n_open, n_beyond = counts.tolist()
-    pieces = room_for(m, dimension)
+    pieces = allocate_pieces(m, dimension)
     if not n_open:
         entry_of(fill)(segments, *region, items, planes, 0, m, _NO_FLAG, pieces, still, counts)
         n_open, n_more, _ = counts.tolist()
@@ -135,7 +133,7 @@ def _clip(
     segments: FloatArray, region: Solid, method: Method, scene: Scaled, most_open: int, budget: Budget,
     workers: int | None, progress: Progress | None,
 ) -> Clipped | None:  # fmt: skip
-    """Return the pieces; None where more than `most_open` items are left to rational arithmetic."""
+    """Return the pieces; None if more than `most_open` items are left to the exact fallback."""
     batch = _Batch(method, scene, budget)
     run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress)
     n_open = sum(map(len, batch.open_items))
@@ -152,16 +150,15 @@ def _clip(
 
 
 class _Batch:
-    """Clips chunks of a batch; each piece is written where it stays, behind those of all chunks before.
+    """Clips chunks of a batch and writes each piece to its final row, behind those of all earlier chunks.
 
-    Rows are given in the order of the chunks: what is decided before its turn waits, and is filled by whoever decides
-    the chunk that it waits for. There are rows for a piece of every segment; memory that none is written to is no more
-    than addresses.
+    Rows are assigned in the order of the chunks: a chunk that is decided early waits, and the thread that decides the
+    chunk before it also fills it. Rows are allocated for a piece of every segment; unused ones cost address space only.
     """
 
     def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
         n, _, dimension = scene.points.shape
-        self.pieces = room_for(n, dimension)
+        self.pieces = allocate_pieces(n, dimension)
         self.open_items: list[IntArray] = []
         self.unsure_rows: list[IntArray] = []
         self.n_rows = self.n_beyond = 0
@@ -170,11 +167,11 @@ class _Batch:
         self._lock, self._next = Lock(), 0
 
     def clip(self, first: int, last: int) -> None:
-        """Clip segments first .. last - 1, a few at a time: they are still in the cache when pieces are filled."""
-        for begin in range(first, last, _AT_ONCE):
-            self._decide(begin, min(begin + _AT_ONCE, last))
-            while (found := self._placed()) is not None:
-                self._fill(*found)
+        """Clip segments first .. last - 1 in blocks, which are still in the cache when their pieces are filled."""
+        for begin in range(first, last, _PER_BLOCK):
+            self._decide(begin, min(begin + _PER_BLOCK, last))
+            while (chunk := self._next_to_fill()) is not None:
+                self._fill(*chunk)
 
     def _decide(self, first: int, last: int) -> None:
         size, scene = last - first, self._scene
@@ -183,32 +180,32 @@ class _Batch:
         entry_of(self._method.decide)(
             scene.points, *scene.region, first, last, self._flag, items, planes, still, counts
         )
-        n_kept, n_open, n_beyond = counts.tolist()
+        n_accepted, n_open, n_beyond = counts.tolist()
         with self._lock:
             self.n_beyond += n_beyond
             if n_open:
                 self.open_items.append(still[:n_open].astype(np.int64))
-            self._waiting[first] = last, items, planes, n_kept
+            self._waiting[first] = last, items, planes, n_accepted
 
-    def _placed(self) -> tuple[int, Int32Array, Int32Array, int] | None:
-        """Return the first row and the items of the chunk whose turn it is, None where it is not decided."""
+    def _next_to_fill(self) -> tuple[int, Int32Array, Int32Array, int] | None:
+        """Return the first row and the items of the next chunk in order, None if it is not yet decided."""
         with self._lock:
             if self._next not in self._waiting:
                 return None
             row = self.n_rows
-            self._next, items, planes, n_kept = self._waiting.pop(self._next)
-            self.n_rows += n_kept
-            return row, items, planes, n_kept
+            self._next, items, planes, n_accepted = self._waiting.pop(self._next)
+            self.n_rows += n_accepted
+            return row, items, planes, n_accepted
 
-    def _fill(self, row: int, items: Int32Array, planes: Int32Array, n_kept: int) -> None:
-        """Fill `n_kept` rows from `row` on."""
-        scene, pieces, counts, still = self._scene, self.pieces, np.zeros(2, np.int64), np.empty(n_kept, np.int32)
+    def _fill(self, row: int, items: Int32Array, planes: Int32Array, n_accepted: int) -> None:
+        """Fill `n_accepted` rows from `row` on."""
+        scene, pieces, counts, still = self._scene, self.pieces, np.zeros(2, np.int64), np.empty(n_accepted, np.int32)
         entry_of(self._method.fill)(
-            scene.points, *scene.region, items, planes, row, n_kept, self._flag, pieces, still, counts
+            scene.points, *scene.region, items, planes, row, n_accepted, self._flag, pieces, still, counts
         )
         n_unsure, n_beyond = counts.tolist()
         unsure = still[:n_unsure].astype(np.int64)
-        rows = slice(row, row + n_kept)
+        rows = slice(row, row + n_accepted)
         if scene.exponent:
             is_cut = pieces.faces[rows] >= 0
             for side in range(2):
@@ -221,9 +218,9 @@ class _Batch:
 
 
 def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, region: Solid, budget: Budget) -> Pieces:
-    """Return the pieces with those rows made anew that are not sure, and with what is left of open items."""
+    """Return the pieces with uncertain rows recomputed by the exact fallback, and with the pieces of OPEN items."""
     rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
-    again = settled(segments, filled.source[rows], region, None, budget)
+    again = clip_exactly(segments, filled.source[rows], region, None, budget)
     filled.t[rows], filled.ends[:, rows], filled.faces[rows] = again.t, again.ends, again.faces
     open_items = np.concatenate([np.zeros(0, np.int64), *batch.open_items])
-    return completed([filled, settled(segments, open_items, region, None, budget)])
+    return in_order_of_source([filled, clip_exactly(segments, open_items, region, None, budget)])

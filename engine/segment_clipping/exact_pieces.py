@@ -1,17 +1,21 @@
-"""Where one segment meets a polygon, a polyhedron or a surface, in exact integer arithmetic.
+"""Exact fallback: clips one segment to a polygon, a polyhedron or a surface in integer arithmetic.
 
-The segment's contacts with the boundary cut [0, 1] into open spans. A span along which the segment lies in an element
-is kept (the boundary counts as in). Any other meets no element, so one location holds for all of it, and for the line
-beside it, moved by (eps, eps^2) (orientation.py): from span to span it turns over as often as that line crosses
-elements, which signs tell, through vertices and along edges too. The location of one span is that of an end that is not
-on the boundary, else it is asked for. Contacts are kept as points. Pieces are what hangs together.
+The contacts of the segment with the boundary split [0, 1] into open spans:
+
+| span | location |
+|---|---|
+| along an element | inside: the boundary is part of the solid |
+| off the boundary | one location, also that of the perturbed line, moved by (eps, eps^2) (orientation.py) |
+
+From span to span the location flips once for each element that the perturbed line crosses: signs decide that, through
+vertices and along edges too (simulation of simplicity). The first location is that of an end off the boundary, else of
+a point that is located. Contacts are points of the result. Pieces are the connected components.
 
 All coordinates of a segment and of the elements it meets are integers over one denominator, parameters are Fractions.
 Cost: n log n for n elements.
 
-Balls are met at roots of quadratics: such a `Parameter` is (u + v sqrt(w)) / z, compared exactly with others. Rounding
-to nearest keeps order, so only numbers that round alike are looked at closer; then signs of a + b sqrt(m) + c sqrt(n)
-decide, by squaring.
+A `Parameter` on a ball is a root (u + v sqrt(w)) / z of a quadratic, compared exactly with others. Rounding to nearest
+is monotone, so only numbers that round alike need the sign of a + b sqrt(m) + c sqrt(n), decided by squaring.
 """
 
 from __future__ import annotations
@@ -31,8 +35,10 @@ _CHECK_EVERY: Final = 64
 
 
 class Contact(NamedTuple):
-    """Where a segment and an element meet: from `first` to `last`, equal for a point; is_along: it lies in a stretch
-    of the element's plane or line; turns: the line beside the segment crosses the element."""
+    """A common stretch of a segment and an element, from `first` to `last`, equal for a point.
+
+    is_along: it is in the element's plane or line. turns: the perturbed line crosses the element.
+    """
 
     first: Fraction
     last: Fraction
@@ -42,12 +48,12 @@ class Contact(NamedTuple):
 
 
 def _cross(u: Integers, v: Integers) -> Integers:
-    """Return u x v in space; in the plane its one component, and 0."""
+    """Return u x v; in 2D its one component, and 0."""
     return cross(u, v) if len(u) == 3 else (u[0] * v[1] - u[1] * v[0], 0)
 
 
-def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
-    """Return where p q meets the edge a b, and whether it runs along it (so it does where a = b)."""
+def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
+    """Return the common stretch of p q and the edge a b, and whether they are collinear (also if a = b)."""
     u, v, w = minus(q, p), minus(b, a), minus(a, p)
     normal = _cross(u, v)
     size = dot(normal, normal)
@@ -64,20 +70,20 @@ def edge_stretch(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
     return (first, last, True) if first <= last else None
 
 
-def triangle_stretch(
+def triangle_overlap(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
-    """Return where the segment p q meets the closed triangle a b c, and whether it runs in its plane (no area: yes).
+    """Return the common stretch of the segment p q and the closed triangle a b c, and whether they are coplanar.
 
-    With corners seen from p and u = q - p, the normal is B x C + C x A + A x B; the line meets the triangle unless
-    signs of the volumes u . (B x C), ... differ, and their sum is n . u.
+    A triangle without area counts as coplanar. With corners relative to p and u = q - p, the normal is B x C + C x A +
+    A x B; the line meets the triangle unless signs of the volumes u . (B x C), ... differ, and their sum is n . u.
     """
     u, *seen = (minus(x, p) for x in (q, a, b, c))
     around = [cross(seen[k - 2], seen[k - 1]) for k in range(3)]
     normal = [sum(each) for each in zip(*around)]
     if not any(normal):  # case: no area; the triangle is its edges
-        found = [edge_stretch(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
-        met = [stretch for stretch in found if stretch is not None]
+        stretches = [edge_overlap(p, q, *edge) for edge in ((a, b), (b, c), (c, a))]
+        met = [stretch for stretch in stretches if stretch is not None]
         if not met:
             return None
         return min(s[0] for s in met), max(s[1] for s in met), True
@@ -104,9 +110,9 @@ def triangle_stretch(
 
 
 def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
-    """Tell whether the line through p and q, moved by infinitesimals, crosses an edge or a triangle.
+    """Return whether the line through p and q, moved by infinitesimals, crosses an edge or a triangle.
 
-    Seen along the line, an element parallel to it has no length or no area: it holds no point that is moved so.
+    Seen along the line, an element parallel to it has no length or no area: it contains no perturbed point.
     """
     u = minus(q, p)
     if len(u) == 2:
@@ -125,13 +131,13 @@ def contacts_of(
     for i, (face, corners) in enumerate(elements):
         if i % _CHECK_EVERY == 0:
             check()
-        stretch = (edge_stretch if len(corners) == 2 else triangle_stretch)(start, end, *corners)
+        stretch = (edge_overlap if len(corners) == 2 else triangle_overlap)(start, end, *corners)
         if stretch is not None:
             yield Contact(*stretch[:2], face, stretch[2], is_crossed(start, end, corners))
 
 
 def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]]:
-    """Return the parameters at which contacts begin or end, 0 and 1 too, in order, and these contacts."""
+    """Return the sorted parameters at which contacts begin or end, with 0 and 1, and these contacts."""
     events: list[tuple[Fraction, Contact | None]] = [(FIRST, None), (LAST, None)]
     events += [(contact.first, contact) for contact in contacts]
     events += [(contact.last, contact) for contact in contacts if contact.first < contact.last]
@@ -144,11 +150,10 @@ def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]
 def nodes_with_locations(
     contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
 ) -> Iterator[tuple[Fraction, list[Contact], bool, bool]]:
-    """Yield the parameters of `nodes_of` with their contacts, and of the span after each whether the segment lies in an
-    element there, and else whether it is inside.
+    """Yield each parameter of `nodes_of` with its contacts and the location of the span after it.
 
-    locations: of the ends of the segment. locate: tells the location at a parameter; asked once at most, where both
-    ends are on the boundary.
+    The location: whether the segment lies in an element there, and else whether it is inside. locations: of the ends of
+    the segment. locate: returns the location at a parameter; called at most once, if both ends are on the boundary.
     """
     nodes = nodes_of(contacts)
     n_along, has_turned = 0, False

@@ -1,8 +1,7 @@
-"""Public: what remains of polylines on a region, with what is connected there left connected.
+"""Public: clip polylines to a region; connected parts stay connected.
 
-Each segment of each line is clipped as `clip_segments` does; a piece that reaches the end of its segment and one that
-begins at the start of the next are one. Whether a piece reaches an end is decided exactly there (its face is -1), so
-nothing here compares rounded numbers.
+Each segment of each line is clipped as `clip_segments` does; a piece that reaches the end of its segment is joined to
+the one that begins at the start of the next. Both are exact (face -1), so no rounded numbers are compared.
 """
 
 from __future__ import annotations
@@ -26,10 +25,9 @@ from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
 
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
-"""Room for the pieces of lines: vertices (2 m, dim) of all, offsets (m + 1,) into them; the line of each (m,), and the
-piece of a segment that it begins with, and ends with."""
-_AT_ONCE: Final = 1 << 20
-"""Pieces whose columns are gathered without a look at the clock."""
+"""Output arrays: vertices (2 m, dim), offsets (m + 1,) into them, line (m,), and first and last piece of a segment."""
+_PER_BLOCK: Final = 1 << 20
+"""Pieces whose columns are gathered between two polls."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -162,12 +160,12 @@ def clip_lines(
 
 
 def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
-    """Return the vertices that segments begin with: all but the last of each line."""
+    """Return the first vertex of each segment: all vertices but the last of each line."""
     return np.delete(np.arange(n_vertices), offsets[1:][np.diff(offsets) > 0] - 1)
 
 
 def _joined(pieces: Pieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray, budget: Budget) -> LinePieces:
-    """Join the pieces of segments; firsts: the vertex that each segment begins with."""
+    """Join the pieces of segments; firsts: first vertex of each segment."""
     m, at = len(pieces.source), firsts[pieces.source]
     starts, ends = map(np.ascontiguousarray, pieces.ends)
     made = Joined(np.empty((2 * m, vertices.shape[1])), np.empty(m + 1, np.int64), *np.empty((3, m), np.int64))
@@ -175,7 +173,7 @@ def _joined(pieces: Pieces, firsts: IntArray, vertices: FloatArray, offsets: Int
     n = entry_of(join_parts)(starts, ends, pieces.faces, at, vertices, offsets, made, budget.flag)
     source, heads, tails = made.source[:n], made.heads[:n], made.tails[:n]
     sides, t, faces = np.empty((n, 2), np.int64), np.empty((n, 2)), np.empty((n, 2), np.int64)
-    for some in (slice(first, first + _AT_ONCE) for first in range(0, n, _AT_ONCE)):
+    for some in (slice(first, first + _PER_BLOCK) for first in range(0, n, _PER_BLOCK)):
         budget.check()
         for side, parts in enumerate((heads[some], tails[some])):
             sides[some, side] = at[parts] - offsets[source[some]]
@@ -189,10 +187,10 @@ def join_parts(
     starts: FloatArray, ends: FloatArray, faces: IntArray, at: IntArray, vertices: FloatArray, offsets: IntArray,
     out: Joined, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Join pieces of segments, from starts (m, dim) to ends, where one begins at the vertex at which the one before
-    reaches the end of its segment; return how many there are then.
+    """Join consecutive pieces of segments, from starts (m, dim) to ends, at common vertices; return the number of
+    pieces.
 
-    at: (m,) the vertex that the segment of each begins with; offsets: of the lines into all vertices. Polls `flag`.
+    at: (m,) first vertex of the segment of each piece; offsets: of the lines into all vertices. Polls `flag`.
     """
     n, n_made, begin, line = 0, 0, 0, 0
     out.offsets[0] = 0
@@ -203,23 +201,23 @@ def join_parts(
         while end < at.size and at[end] < offsets[line + 1]:
             end += 1
         size, moved = end - begin, _n_moved(faces, at, begin, end, vertices, offsets[line], offsets[line + 1] - 1)
-        head, before, is_kept = -1, -1, False
+        head, before, is_written = -1, -1, False
         for place in range(moved, moved + size):
             if flag[0]:
                 break
             part, after = begin + place % size, begin + (place + 1) % size
             if head < 0:
                 head, out.source[n], out.heads[n] = part, line, part
-                n_made = _put(out.vertices, n_made, starts, part)
+                n_made = _append_vertex(out.vertices, n_made, starts, part)
             else:
-                is_kept = before != head or faces[head, 0] < 0 or not are_same(starts, head, starts, part)
-                n_made = _put(out.vertices, n_made, starts, part) if is_kept else n_made
+                is_written = before != head or faces[head, 0] < 0 or not are_same(starts, head, starts, part)
+                n_made = _append_vertex(out.vertices, n_made, starts, part) if is_written else n_made
             before = part
-            if place + 1 < moved + size and (after == begin or _goes_on(faces, at, part, after)):
+            if place + 1 < moved + size and (after == begin or _continues(faces, at, part, after)):
                 continue
-            if part != head and is_kept and faces[part, 1] >= 0 and are_same(starts, part, ends, part):
+            if part != head and is_written and faces[part, 1] >= 0 and are_same(starts, part, ends, part):
                 n_made -= 1
-            n_made, head, out.tails[n] = _put(out.vertices, n_made, ends, part), -1, part
+            n_made, head, out.tails[n] = _append_vertex(out.vertices, n_made, ends, part), -1, part
             n += 1
             out.offsets[n] = n_made
         begin = end
@@ -227,28 +225,30 @@ def join_parts(
 
 
 @inline
-def _goes_on(faces: IntArray, at: IntArray, part: int, after: int) -> bool:
-    """Tell whether a part reaches the end of its segment, and the one after it begins the next there."""
+def _continues(faces: IntArray, at: IntArray, part: int, after: int) -> bool:
+    """Return whether a part reaches the end of its segment, and the next part begins the next segment there."""
     return (faces[part, 1] < 0) & (faces[after, 0] < 0) & (at[after] == at[part] + 1)
 
 
 @inline
 def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: FloatArray, first: int, last: int) -> int:
-    """Return how many parts of a line, from its first vertex on, follow those up to its last: 0 unless both vertices
-    are one, both within, and not all parts are connected."""
+    """Return how many parts at the start of a closed line follow its last part, and so move behind it.
+
+    0 unless first and last vertex are equal, both are inside, and not all parts are connected.
+    """
     if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
         return 0
     if not are_same(vertices, first, vertices, last):
         return 0
     for part in range(begin + 1, end):
-        if not _goes_on(faces, at, part - 1, part):
+        if not _continues(faces, at, part - 1, part):
             return part - begin
     return 0
 
 
 @inline
-def _put(rows: FloatArray, row: int, points: FloatArray, point: int) -> int:
-    """Copy a point; return the row after it."""
+def _append_vertex(rows: FloatArray, row: int, points: FloatArray, point: int) -> int:
+    """Copy a point to the next row; return the row after it."""
     for k in range(points.shape[1]):
         rows[row, k] = points[point, k]
     return row + 1

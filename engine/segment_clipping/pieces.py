@@ -1,4 +1,4 @@
-"""Pieces of segments as kernels write them, and the ends of segments as they read them; in the plane z is 0."""
+"""Arrays of pieces, as kernels write them, and the ends of segments, as they read them; in 2D z is 0."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from engine.types import FloatArray
 
 Triple = tuple[float, float, float]
 End = tuple[float, float, float, int]
-"""Of a piece to be written: parameter, its low part, its relative error, and the face, -1 for the segment's own."""
+"""End of a piece: parameter, its low part, its relative error, and the face, -1 for the segment's own end."""
 OWN_START, OWN_END = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
-"""The ends of a segment."""
-DROPPED: Final = 0
-KEPT: Final = 1
-"""States of a segment, beside OPEN."""
+"""The ends of a segment as ends of a piece."""
+REJECTED: Final = 0
+ACCEPTED: Final = 1
+"""States of a segment, besides OPEN."""
 LARGE: Final = 2.0**1000
-"""Items whose absolute coordinates add up to more, or to nothing (NaN, infinity), are left open."""
+"""Bound on the sum of |coordinates| of an item: a larger sum (or NaN) leaves it OPEN."""
 BLOCK: Final = 64
-"""Segments looked at together: fifteen numbers each stay in the nearest cache."""
+"""Segments of a block: fifteen numbers each fit the L1 cache."""
 
 
 class Piece(NamedTuple):
-    """What remains of one segment: parameters and points correctly rounded, the faces crossed (-1: own end)."""
+    """One piece of one segment: parameters and points correctly rounded, faces crossed (-1: own end)."""
 
     t: tuple[float, float]
     start: list[float]
@@ -37,16 +37,16 @@ class Piece(NamedTuple):
 
 
 Pieces = namedtuple("Pieces", "source ends t faces")
-"""Pieces in order, see `SegmentPieces`: source (m,), ends (2, m, dim), t and faces (m, 2)."""
+"""Columns of `SegmentPieces`: source (m,), ends (2, m, dim), t and faces (m, 2)."""
 
 
-def room_for(m: int, dimension: int) -> Pieces:
-    """Return room for m pieces."""
+def allocate_pieces(m: int, dimension: int) -> Pieces:
+    """Return uninitialised arrays for m pieces."""
     return Pieces(np.empty(m, np.int64), np.empty((2, m, dimension)), np.empty((m, 2)), np.empty((m, 2), np.int64))
 
 
 def joined(parts: Sequence[Pieces]) -> Pieces:
-    """Return the pieces of some parts one after another."""
+    """Return several sets of pieces concatenated."""
     source, ends, t, faces = zip(*parts)
     return Pieces(concatenated(source), concatenated(ends, axis=1), concatenated(t), concatenated(faces))
 
@@ -57,7 +57,7 @@ def first_of(pieces: Pieces, m: int) -> Pieces:
 
 
 def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -> Pieces:
-    """Return pieces that were settled one by one, without negative zeros."""
+    """Return pieces of the exact fallback as columns, without negative zeros."""
     ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, dimension) + 0.0
     return Pieces(
         np.array(sources, np.int64),
@@ -67,16 +67,16 @@ def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -
     )
 
 
-def completed(parts: Sequence[Pieces]) -> Pieces:
-    """Return the pieces of some parts by source; those of one source stand together in one part."""
-    found = joined(parts)
-    order = np.argsort(found.source, kind="stable")
-    return Pieces(found.source[order], found.ends[:, order], found.t[order], found.faces[order])
+def in_order_of_source(parts: Sequence[Pieces]) -> Pieces:
+    """Return several sets of pieces merged by source; the pieces of one source are in one set."""
+    pieces = joined(parts)
+    order = np.argsort(pieces.source, kind="stable")
+    return Pieces(pieces.source[order], pieces.ends[:, order], pieces.t[order], pieces.faces[order])
 
 
 @merged
 def is_plain(p: Triple, q: Triple) -> bool:
-    """Tell whether no coordinate of a segment is too large, or none."""
+    """Return whether the coordinates of a segment are finite and below `LARGE`."""
     return abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(q[0]) + abs(q[1]) + abs(q[2]) < LARGE
 
 
@@ -103,7 +103,7 @@ def put_own_end(pieces: Pieces, row: int, end: int, segments: FloatArray, item: 
 
 @inline
 def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
-    """Return the relative error that s / d has from its parts; infinite where their sizes have no range for it."""
+    """Return the relative error of s / d from the bounds of s and d; infinite if their sizes are out of its range."""
     if not (2.0**-400 <= abs(d) <= 2.0**400 and abs(s) >= 2.0**-500):
         return np.inf
     return 1.01 * (s_bound / abs(s) + d_bound / abs(d))
@@ -111,7 +111,7 @@ def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
 
 @inline
 def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low: float, slack: float) -> bool:
-    """Write the point at t, known within slack of itself; tell whether that and t are surely nearest."""
+    """Write the point at t, known within slack; return whether it and t are certainly the nearest doubles."""
     bound = (T_BOUND + slack) * abs(t)
     sure = (slack < 0.001) & (t + (low - bound) == t + (low + bound))
     for k in range(segments.shape[2]):
@@ -123,7 +123,7 @@ def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low:
 
 @inline
 def put_piece(out: Pieces, row: int, source: int, segments: FloatArray, item: int, first: End, last: End) -> bool:
-    """Write a piece between two ends; tell whether all numbers are surely the nearest."""
+    """Write a piece between two ends; return whether all numbers are certainly the nearest doubles."""
     sure = True
     out.source[row] = source
     for end in range(2):

@@ -1,9 +1,9 @@
-"""The points where planes cut segments, each coordinate the nearest double: what cohen_sutherland.py and cyrus_beck.py
-have chosen is cut, 2D and 3D.
+"""Ends of pieces on planes, each coordinate the nearest double, for the planes chosen by cohen_sutherland.py and
+cyrus_beck.py, 2D and 3D.
 
-t = s_p / (s_p - s_q) and the point are taken in double-double with a bound; where that leaves a number open, the end is
-made again from expansions of both plane values (cut_point.py). On a box these are exact differences, and both ends of a
-block of pieces are made at once, cut or not, without branches. In the plane z is 0.
+t = s_p / (s_p - s_q) and the point are computed in double-double with a bound; an end that is not certainly rounded is
+recomputed from expansions of both plane values (cut_point.py). On a box these are exact differences, and a block of
+pieces is computed without branches, both ends alike. In 2D z is 0.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from engine.predicates.cut_point import T_BOUND, parameter_and_point, point_at
 from engine.predicates.error_free import dd_add, dd_div, workspace
 from engine.predicates.expansion import is_safe, magnitude
 from engine.predicates.side import dd_value
-from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, meeting
+from engine.segment_clipping.cohen_sutherland import LONGEST, SHORTEST, corners_of, plane_crossing
 from engine.segment_clipping.cyrus_beck import are_safe, expand_value
 from engine.segment_clipping.pieces import BLOCK, Pieces, Triple, point_of, put_end, put_own_end
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
@@ -21,9 +21,10 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 @called
 def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: int, at: float) -> tuple[float, bool]:
-    """Set `point` to where `segment` crosses the plane of `row`, by exact signs; return t and whether all is sure.
+    """Set `point` to the crossing of `segment` with the plane of `row` by expansions; return t and whether all is
+    certain.
 
-    axis, at: across an axis, where, and the row has a 1 or -1 there alone; else -1 and anything.
+    axis, at: of an axis-parallel plane, whose row has a single 1 or -1; else -1 and anything.
     """
     wp, wq, e = workspace(8), workspace(8), workspace(96)
     if axis >= 0:  # what is not safe on other axes is multiplied by zero
@@ -39,9 +40,10 @@ def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: 
 
 @merged
 def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
-    """Return where p q crosses a plane that has these values there, t, and whether all is surely nearest.
+    """Return the crossing of p q with a plane from its values at p and q, t, and whether all is certainly the nearest
+    double.
 
-    slack: how far t may be off relative to itself.
+    slack: relative error bound of t.
     """
     sp_h, sp_l, sp_bound = sp
     sq_h, sq_l, sq_bound = sq
@@ -61,7 +63,7 @@ def fill_on_rows(
     segments: FloatArray, columns: FloatArray, items: Int32Array, planes: Int32Array, begin: int, size: int,
     stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Fill the pieces of ``segments`` ((n, 2, dim) float64): see `fill_on_boxes`."""
+    """Write the pieces of ``segments`` ((n, 2, dim) float64) in a convex region: see `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
@@ -99,13 +101,13 @@ def fill_on_rows(
 def cut_end(
     p: Triple, q: Triple, lowest: Triple, highest: Triple, plane: float, end: float
 ) -> tuple[float, float, float, float, bool]:
-    """Return where p q meets a plane, t there, and whether all is sure; for plane -1 the end of p q, 0 or 1."""
+    """Return the crossing of p q with a plane, t, and whether all is certain; for plane -1 the end of p q, 0 or 1."""
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, lowest, highest
     is_x, is_y, is_z = plane < 1.5, (plane > 1.5) & (plane < 3.5), plane > 3.5
     is_high = (plane == 1.0) | (plane == 3.0) | (plane == 5.0)
     low, high = (x0 if is_x else (y0 if is_y else z0)), (x1 if is_x else (y1 if is_y else z1))
     at = high if is_high else low
-    m = meeting(px if is_x else (py if is_y else pz), qx if is_x else (qy if is_y else qz), at, plane)
+    m = plane_crossing(px if is_x else (py if is_y else pz), qx if is_x else (qy if is_y else qz), at, plane)
     length, bound = abs(m.d), T_BOUND * m.t
     x, x_sure = point_at(px, qx, m.t, m.t_low, 0.0)
     y, y_sure = point_at(py, qy, m.t, m.t_low, 0.0)
@@ -125,10 +127,10 @@ def cut_end(
 
 
 @called
-def cut_again(
+def recompute_ends(
     segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, row: int, unsure: int, pieces: Pieces
 ) -> bool:  # fmt: skip
-    """Make those ends of a piece again whose bit of `unsure` is set, by exact signs; return whether all is sure."""
+    """Recompute by expansions the ends of a piece whose bit of `unsure` is set; return whether all is certain."""
     all_sure = True
     for end in range(2):
         if unsure >> end & 1 == 1:
@@ -144,11 +146,16 @@ def fill_on_boxes(
     segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, items: Int32Array, planes: Int32Array,
     begin: int, size: int, stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Fill the pieces, from row `begin` on, of the first `size` items, ``segments`` ((n, 2, dim) float64) on a box.
+    """Write the pieces of the first `size` items, from row `begin` on: ``segments`` ((n, 2, dim) float64) in a box.
 
-    items: (m,) int32, planes: (m, 2) int32, as decided on the box `low`, `high`; columns: of its rows.
-    still: the rows that are not surely rounded. n: how many of them, and how many needed more than the first try.
-    stop: one uint8, polled.
+    | argument | content |
+    |---|---|
+    | items (m,), planes (m, 2) int32 | of `decide_on_boxes` for the box `low`, `high` |
+    | columns | of the box's plane rows |
+    | pieces | out |
+    | still (m,) int32 | out: the rows that are not certainly rounded |
+    | n (2,) int64 | out: how many of them, and how many needed a second stage |
+    | stop (1,) uint8 | polled |
     """
     is_flat = low.size == 2
     lowest, highest = corners_of(low, high)
@@ -182,7 +189,7 @@ def fill_on_boxes(
         for j in range(n_here):
             if unsure[j] != 0.0:
                 beyond += 1
-                if not cut_again(segments, low, high, columns, begin + start + j, int(unsure[j]), pieces):
+                if not recompute_ends(segments, low, high, columns, begin + start + j, int(unsure[j]), pieces):
                     still[n_open] = begin + start + j
                     n_open += 1
     n[0], n[1] = n_open, beyond

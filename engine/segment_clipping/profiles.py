@@ -1,8 +1,12 @@
-"""Where along a segment a placed solid holds it, in exact arithmetic: every type of solid, under any pose.
+"""Exact fallback of segment clipping: which part of a segment is in a posed solid, for every type of solid and any
+pose.
 
-A profile cuts [0, 1] at nodes: the location of each, and of the open span after it. A pose maps the segment back into
-the solid's frame, where parameters are the same; a ball stays in the world, since it keeps its radius. Profiles of a
-CSG tree are combined span by span as locations are: max, min, min(A, -B). Pieces are the spans that are not outside.
+A profile splits [0, 1] at nodes: it has the location of each node, and of the open span after it. The inverse pose maps
+the segment to the solid's frame, where parameters are the same; a ball stays in the world, since it has the same
+radius. Profiles of a CSG tree are combined span by span like locations: max, min, min(A, -B). Pieces are the spans that
+are not outside.
+
+Source: span classification after S. Roth, Ray casting for modeling solids, 1982. Changed: exact arithmetic.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ import numpy as np
 
 from engine.containment.methods.rational_locate import (
     combine,
-    over_tree,
+    fold_csg_tree,
     prism_walls,
     rational_location,
     to_body_frame,
@@ -48,13 +52,15 @@ from engine.types import FloatArray, IntArray
 
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 _BYTES: Final = 1000
-"""Of a piece, as Python holds it."""
+"""Memory of a piece as a Python object."""
 Point = Sequence[Number]
 
 
 class Node(NamedTuple):
-    """A parameter, the location there, the face through which the segment enters or leaves there (-1: none; a face that
-    holds an end of the segment is named where no other is), and the location of the open span up to the next node."""
+    """A parameter, the location there, the face crossed there, and the location of the open span up to the next node.
+
+    The face is -1 for none; a face that contains an end of the segment is named if no other is.
+    """
 
     t: Parameter
     at: int
@@ -63,10 +69,10 @@ class Node(NamedTuple):
     after: int
 
 
-def settled(
+def clip_exactly(
     segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> Pieces:
-    """Return the pieces of some of segments (n, 2, dim) by exact arithmetic; locations: of both ends of each, if known.
+    """Return the pieces of the segments `items` of (n, 2, dim) by exact arithmetic; locations: of both ends, if known.
 
     Raises: UnsupportedSolidError, what `Budget.check` raises.
     """
@@ -76,34 +82,34 @@ def settled(
         budget.check()
         p, q = segments[item].tolist()
         known = None if locations is None else locations[place]
-        found = [piece.rounded(p, q) for piece in exact_pieces(p, q, solid, pose, budget, known)]
-        budget.take(_BYTES * len(found))
-        pieces += found
-        sources += [item] * len(found)
+        of_item = [piece.rounded(p, q) for piece in exact_pieces(p, q, solid, pose, budget, known)]
+        budget.take(_BYTES * len(of_item))
+        pieces += of_item
+        sources += [item] * len(of_item)
     return as_pieces(sources, pieces, segments.shape[2])
 
 
 def exact_pieces(
     p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> list[ExactPiece]:
-    """Return the pieces of the segment p q within a placed solid, in order; locations: of p and q, if known."""
+    """Return the pieces of the segment p q in a posed solid, in order; locations: of p and q, if known."""
     if p == q:
         is_in = (located(p, solid, pose, budget) if locations is None else locations[0]) >= 0
         return [ExactPiece(ZERO, ONE, (-1, -1))] if is_in else []
-    found, first = [], None
+    pieces, first = [], None
     for node in profile_of(p, q, solid, pose, budget, locations):
         if first is None and node.at >= 0:
             first = node
         if first is not None and node.after < 0:
             entered = -1 if first.t.near == 0.0 and compare(first.t, ZERO) == 0 else first.entered
             left = -1 if node.t.near == 1.0 and compare(node.t, ONE) == 0 else node.left
-            found.append(ExactPiece(first.t, node.t, (entered, left)))
+            pieces.append(ExactPiece(first.t, node.t, (entered, left)))
             first = None
-    return found
+    return pieces
 
 
 class Line(NamedTuple):
-    """A segment, as placed solids see it."""
+    """A segment in the frame of a posed solid."""
 
     p: Point
     q: Point
@@ -113,7 +119,7 @@ class Line(NamedTuple):
     pose: Pose | None
     budget: Budget
     locations: Any
-    """Of p and q in the solid, None where they are not known."""
+    """Of p and q in the solid, None if unknown."""
 
 
 class ExactPiece(NamedTuple):
@@ -124,7 +130,7 @@ class ExactPiece(NamedTuple):
     faces: tuple[int, int]
 
     def rounded(self, p: list[float], q: list[float]) -> Piece:
-        """Return the piece of p q with the doubles nearest to its numbers."""
+        """Return the piece of p q with each number rounded to the nearest double."""
         numbers, scale = common_integers([*p, *q])
         moves = [(x, y - x) for x, y in zip(numbers[: len(p)], numbers[len(p) :])]
 
@@ -135,7 +141,7 @@ class ExactPiece(NamedTuple):
 
 
 def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
-    """Return the location of a point in a placed solid; on a surface it is BOUNDARY."""
+    """Return the location of a point in a posed solid; on a surface it is BOUNDARY."""
     if isinstance(solid, Surface):
         own = p if pose is None else to_body_frame(p, pose)
         return BOUNDARY if list(_contacts(own, own, solid, pose, budget)) else OUTSIDE
@@ -145,7 +151,7 @@ def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
 def profile_of(
     p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> list[Node]:
-    """Return the nodes of the segment p q, p and q different, within a placed solid, from t = 0 to t = 1."""
+    """Return the profile of the segment p q, p and q different, in a posed solid, from t = 0 to t = 1."""
     start, end = (p, q) if pose is None else (to_body_frame(p, pose), to_body_frame(q, pose))
     line = Line(p, q, start, end, pose, budget, locations)
 
@@ -170,20 +176,20 @@ def profile_of(
             for node in of_leaf(leaf)
         ]
 
-    found: list[Node] = over_tree(solid, of_operand, _combined)
-    return found
+    located_nodes: list[Node] = fold_csg_tree(solid, of_operand, _combined)
+    return located_nodes
 
 
 def unsupported(solid: Solid) -> UnsupportedSolidError:
-    """Return the error for a solid that no segment is cut on."""
-    found: UnsupportedSolidError = refused(
+    """Return the error for a solid to which no segment is clipped."""
+    error: UnsupportedSolidError = refused(
         solid, "no segment is cut on", lambda row: row.profile, ", or a csg of these"
     )
-    return found
+    return error
 
 
 def check_cut(solids: Sequence[Solid]) -> bool:
-    """Return True; raise UnsupportedSolidError for the first solid that no segment is cut on."""
+    """Return True; raise UnsupportedSolidError for the first solid to which no segment is clipped."""
     for body, solid in enumerate(solids):
         waiting = [solid]
         while waiting:  # bound: a tree has so many leaves at most
@@ -196,7 +202,7 @@ def check_cut(solids: Sequence[Solid]) -> bool:
 
 
 def _face_offsets(solid: Csg) -> dict[int, int]:
-    """Return for each leaf of a tree, by its id, how many faces the leaves before it have."""
+    """Return for each leaf of a tree, by its id, the number of faces of the leaves before it."""
     offsets: dict[int, int] = {}
     total = 0
     waiting: list[Solid] = [solid]
@@ -213,10 +219,10 @@ def _face_offsets(solid: Csg) -> dict[int, int]:
 
 
 def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
-    """Return the profile of a Boolean combination; faces are the smallest of those at a parameter."""
+    """Return the profile of a Boolean combination; the face at a parameter is the smallest of the operands'."""
     nodes = sorted((node.t for profile in profiles for node in profile), key=cmp_to_key(compare))
     parameters = [t for i, t in enumerate(nodes) if i == 0 or compare(nodes[i - 1], t) != 0]
-    found, places = [], [0] * len(profiles)
+    combined, places = [], [0] * len(profiles)
     for t in parameters:
         at, after, faces = [], [], []
         for i, profile in enumerate(profiles):
@@ -229,12 +235,13 @@ def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
                 at.append(profile[places[i] - 1].after)
             after.append(profile[places[i] - 1].after)
         face = min(faces, default=-1)
-        found.append(Node(t, int(combine(operation, at)), face, face, int(combine(operation, after))))
-    return found
+        combined.append(Node(t, int(combine(operation, at)), face, face, int(combine(operation, after))))
+    return combined
 
 
 def _interval(a: Node, b: Node, between: int) -> list[Node]:
-    """Return the profile of a segment that is not outside from one node to another, which may be the same place."""
+    """Return the profile of a single interval [a, b], possibly degenerate, between whose nodes the location is
+    `between`."""
     nodes = [] if compare(a.t, ZERO) == 0 else [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE)]
     if compare(a.t, b.t) == 0:
         nodes.append(Node(a.t, min(a.at, b.at), a.entered, b.left, OUTSIDE))
@@ -247,17 +254,17 @@ _NOWHERE: Final = [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE), Node(ONE, OUTSIDE, -1, 
 
 
 def on_planes(line: Line, solid: HalfSpace | Aabb | Convex) -> list[Node]:
-    """Return the profile within what planes bound."""
+    """Return the profile in a half-space or convex solid."""
     return _on_rows(line, rows_of(solid).tolist())
 
 
 def on_triangle(line: Line, solid: Triangle) -> list[Node]:
-    """Return the profile within a triangle of the plane, or the prism over one of space."""
+    """Return the profile in a planar triangle, or the prism over a triangle of space."""
     return on_boundary(line, solid) if solid.dimension == 2 else _on_rows(line, prism_walls(solid))
 
 
 def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
-    """Return the profile within the points for which every row (a, b, ..., d) has dot(row, (x, 1)) >= 0."""
+    """Return the profile in the set where every row (a, b, ..., d) has dot(row, (x, 1)) >= 0."""
     p, q, n = line.start, line.end, len(line.p)
     numbers, scale = common_integers([*p, *q])
     start, end = numbers[:n], numbers[n:]
@@ -288,7 +295,7 @@ def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
 
 
 def on_sphere(line: Line, solid: Sphere) -> list[Node]:
-    """Return the profile within a ball: where a t^2 + 2 b t + c <= 0; c and c_end are its values at t = 0 and t = 1."""
+    """Return the profile in a ball, where a t^2 + 2 b t + c <= 0; c and c_end are its values at t = 0 and t = 1."""
     center: Point = solid.center.tolist()
     center, n = center if line.pose is None else to_world_frame(center, line.pose), len(center)
     numbers, _ = common_integers([*line.p, *line.q, *center, solid.radius])
@@ -310,7 +317,7 @@ def on_sphere(line: Line, solid: Sphere) -> list[Node]:
 
 
 def on_boundary(line: Line, solid: Any) -> list[Node]:
-    """Return the profile within a polygon, triangle of the plane or polyhedron, or on a surface."""
+    """Return the profile in a polygon, planar triangle or polyhedron, or on a surface."""
     _, _, p, q, pose, budget, locations = line
     contacts = list(_contacts(p, q, solid, pose, budget))
     if isinstance(solid, Surface):
@@ -353,7 +360,7 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
 
 
 def _near(elements: FloatArray, p: Point, q: Point) -> Any:
-    """Return the elements (k, corners, dim) whose boxes p q may meet, ends known to their rounding, and more."""
+    """Return the elements (k, corners, dim) whose boxes the segment p q, rounded outward, may meet."""
     with np.errstate(all="ignore"):  # what is no number keeps an element
         a, b = (np.array([float(x) for x in point]) for point in (p, q))
         low, high = elements.min(axis=1), elements.max(axis=1)

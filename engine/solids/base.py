@@ -1,7 +1,7 @@
-"""What every solid has in common: immutable fields, a place for prepared structures, pickling, memory.
+"""Base of all solids: immutable fields, a cache of prepared structures, pickling, memory.
 
 A solid is checked once, in its constructor, and never changes; it is compared by value and may be shared between
-threads. Structures that speed up queries are built lazily by `prepared` and are left out of pickles.
+threads. Structures that speed up queries are built lazily by `prepared` and are not pickled.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from engine.solids.columns import are_equal, key_of
 T = TypeVar("T")
 
 _WAIT: Final = 0.005
-"""Seconds between two looks at the clock of a caller that waits for another thread's build."""
+"""Seconds between two checks of a caller that waits for another thread's build."""
 _RUNTIME = ("__weakref__", "_lock", "_prepared")  # slots that are no part of a solid's value
 
 
 class Immutable:
-    """Fields are set once, by the constructor; `type` is what a message calls it."""
+    """Base of classes whose fields are set once, by the constructor; `type` is the name in messages."""
 
     __slots__ = ()
 
@@ -37,7 +37,7 @@ class Immutable:
 
 
 class Preparing:
-    """Keeps what is built when it is asked for first; whoever inherits sets `_lock`, an RLock, and `_prepared`, {}."""
+    """A cache of structures built on first use; subclasses set `_lock`, an RLock, and `_prepared`, {}."""
 
     __slots__ = ()
 
@@ -45,15 +45,15 @@ class Preparing:
     _prepared: dict[str, Any]
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
-        """Return the structure kept under `key`; the first caller builds it, others wait for that one build.
+        """Return the structure cached under `key`; the first caller builds it, others wait for that build.
 
-        build: called without arguments, at most once unless it raises (then nothing is kept and the next caller tries
-        again). It may ask for other keys. What it returns must not be changed afterwards.
-        check: called every few milliseconds while another thread builds; what it raises ends the waiting.
+        build: called without arguments, at most once unless it raises (then nothing is cached and the next caller tries
+        again). It may use other keys. Its result must not be changed afterwards. check: called every few milliseconds
+        while another thread builds; what it raises ends the waiting.
         """
         try:
-            found: T = self._prepared[key]
-            return found
+            structure: T = self._prepared[key]
+            return structure
         except KeyError:
             pass
         if check is None:
@@ -68,12 +68,12 @@ class Preparing:
         finally:
             self._lock.release()
 
-    def kept(self, key: str) -> Any:
-        """Return the structure kept under `key`, None if there is none yet."""
+    def cached(self, key: str) -> Any:
+        """Return the structure cached under `key`, None if it is not built."""
         return self._prepared.get(key)
 
     def drop(self, *keys: str) -> None:
-        """Forget the structures kept under these keys, where there are any."""
+        """Drop the structures cached under these keys, if any."""
         with self._lock:
             for key in keys:
                 self._prepared.pop(key, None)
@@ -94,10 +94,10 @@ class Solid(Preparing, Immutable):
 
     dimension: int
     _pickled: ClassVar[tuple[str, ...]] = ()
-    """The fields that a pickle holds: those that the constructor takes, unless `restored` says otherwise."""
+    """The fields that are pickled: the constructor's arguments, unless `restored` takes others."""
 
     def _set(self, **values: object) -> None:
-        """Fill the fields, once; called at the end of each constructor, when every check has passed."""
+        """Set the fields, once; called at the end of each constructor, when every check has passed."""
         if hasattr(self, "_prepared"):
             raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
         for name, value in values.items():
@@ -107,10 +107,10 @@ class Solid(Preparing, Immutable):
 
     @property
     def memory(self) -> int:
-        """Bytes of the arrays held: fields and prepared structures, shared arrays counted once."""
-        found: dict[int, int] = {}
-        _collect_arrays(self, found, set())
-        return sum(found.values())
+        """Bytes of the solid's arrays: fields and prepared structures, shared arrays counted once."""
+        sizes: dict[int, int] = {}
+        _collect_arrays(self, sizes, set())
+        return sum(sizes.values())
 
     @classmethod
     def _fields(cls) -> list[str]:
@@ -123,7 +123,7 @@ class Solid(Preparing, Immutable):
 
     @classmethod
     def restored(cls, *values: Any) -> Solid:
-        """Return the solid of a pickle, checked as any other: kernels read what offsets and indices say."""
+        """Return the solid of a pickle, checked as any other: kernels trust offsets and indices."""
         return cls(*values)
 
     def __eq__(self, other: object) -> bool:
@@ -144,8 +144,8 @@ class Solid(Preparing, Immutable):
         return self
 
 
-def _collect_arrays(start: object, found: dict[int, int], seen: set[int]) -> None:
-    """Add the bytes of every array that `start` holds to `found`, by the identity of its memory. No recursion."""
+def _collect_arrays(start: object, sizes: dict[int, int], seen: set[int]) -> None:
+    """Add the bytes of every array reachable from `start` to `sizes`, by the identity of its memory. No recursion."""
     waiting = [start]
     while waiting:  # bound: each object enters once, by its id
         value = waiting.pop()
@@ -156,7 +156,7 @@ def _collect_arrays(start: object, found: dict[int, int], seen: set[int]) -> Non
             owner = value
             while isinstance(owner.base, np.ndarray):
                 owner = owner.base
-            found[id(owner)] = owner.nbytes
+            sizes[id(owner)] = owner.nbytes
         elif isinstance(value, Solid):
             waiting += [getattr(value, name) for name in value._fields()]
             waiting += list(value._prepared.values())
@@ -167,4 +167,4 @@ def _collect_arrays(start: object, found: dict[int, int], seen: set[int]) -> Non
         elif is_dataclass(value) and not isinstance(value, type):
             waiting += [getattr(value, field.name) for field in fields(value)]
         elif isinstance(own := getattr(value, "memory", None), int):
-            found[id(value)] = own
+            sizes[id(value)] = own

@@ -152,7 +152,7 @@ def _around(points: FloatArray, budget: Budget, box: Aabb | None = None) -> Repo
 
 
 def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
-    """Return the vertices, of a mesh those that faces name, of equal ones the first."""
+    """Return the distinct vertices, of a mesh those that a face names."""
     if not isinstance(mesh, Mesh):
         return mesh.vertices
     is_used = np.zeros(len(mesh.vertices), np.bool_)
@@ -161,7 +161,7 @@ def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
 
 
 def bounds_of_convex(solid: Convex, budget: Budget) -> Reported:
-    """Return the bounds of what planes bound, by its exact corners."""
+    """Return the bounds of a solid bounded by planes, from its exact corners."""
     corners = corners_of_half_spaces(solid.planes.tolist(), budget)
     if corners.is_empty:
         raise EmptyGeometryError("no point satisfies all rows of this convex, so it has no bounds", ("solid", "planes"))
@@ -192,17 +192,20 @@ def _accuracy(method: str, n_items: int, ball: MinimalSphere | None = None) -> A
 
 
 def vertices_box(solid: Mesh | Polygon | Triangle, check: Check) -> Box:
-    """Return the box of vertices, for `Row.box`."""
+    """Return the box of a solid with vertices, for `Row.box`."""
     return solid.prepared("own_box", lambda: _box_of_vertices(solid), check)
 
 
 def triangle_box(solid: Triangle, check: Check) -> Box:
-    """Return the box of a triangle of the plane; the prism over one of space has none."""
+    """Return the box of a planar triangle; the prism over a triangle of space is unbounded."""
     return vertices_box(solid, check) if solid.dimension == 2 else unbounded(solid)
 
 
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:
-    """The square loses distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings."""
+    """Return the box of vertices and a bound on their distance from its centre.
+
+    The square underflows for distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings.
+    """
     points = vertices_in_use(body)
     low, high = box_of_points(points)
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""One function per invariant; each says which element broke it, with all digits, and what to do.
+"""One function per invariant; its error names the element that breaks it, with all digits, and the remedy.
 
 `as_*` functions turn what a caller may pass (arrays of floats or integers, nested lists) into C-contiguous float64
 arrays and refuse what is no number: bool, str, object, complex, NaN, infinity, ragged lists, and integers that no
@@ -27,17 +27,17 @@ DIMENSIONS: Final = (2, 3)
 _FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
 DOUBLE: Final = np.dtype(np.float64)
 _LISTED: Final = 1 << 10
-"""Items of a list that are looked at at once: half a millisecond, in which no other thread runs."""
-_AT_ONCE: Final = 1 << 15
-"""Numbers looked at together: what is noted of them stays in the first-level cache."""
+"""Items of a list that are checked per step: half a millisecond, in which no other thread runs."""
+_BLOCK: Final = 1 << 15
+"""Numbers checked per step: the flags of a block stay in the L1 cache."""
 
 
 _FEW: Final = 24
-"""Numbers that are added sooner than looked at by numpy."""
+"""Largest number of items that Python sums faster than numpy."""
 
 
 def spell(where: Where) -> str:
-    """Return the path as it is written in Python: ``points[3][1]``, ``operands[0].faces``."""
+    """Return a path in Python's notation: ``points[3][1]``, ``operands[0].faces``."""
     text = ""
     for part in where:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -61,7 +61,7 @@ _SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 80
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """Return a short text of what a caller passed, whatever it is: also a list of millions or one nested too deep."""
+    """Return a short text of a caller's value, whatever it is: also a list of millions or one nested too deep."""
     try:
         text = _SHORT.repr(value)
     except Exception:  # an integer beyond Python's own limit of digits, a broken __repr__
@@ -104,7 +104,7 @@ def as_floats(values: object, depth: int, where: Where, must_be_finite: bool = T
 
 
 def is_ready(values: object, *shape: int) -> bool:
-    """Tell whether values, as they are, are an array of doubles for kernels, (n, *shape), not looked at for NaN."""
+    """Return whether values are already an array of doubles for kernels, (n, *shape), not yet tested for NaN."""
     return (
         type(values) is np.ndarray
         and values.dtype is DOUBLE
@@ -144,7 +144,7 @@ def _as_floats(values: object, depth: int, where: Where, must_be_finite: bool) -
 
 
 def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) -> None:
-    """Raise unless every item of `result` equals the integer or wider float in `array` that it came from."""
+    """Raise unless every item of `result` equals the integer or wider float in `array` from which it was converted."""
     if array.dtype.kind == "f":
         suspects = np.flatnonzero((result != array) & ~np.isnan(array))
     else:
@@ -155,7 +155,7 @@ def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) 
 
 
 def plain_floats(values: Any, depth: int) -> FloatArray | None:
-    """Return a list (depth 1) or lists (2) of finite floats and small integers as an array; None for all else."""
+    """Return a list (depth 1) or lists (2) of finite floats and small integers as an array; None for anything else."""
     try:
         items = values if depth == 1 else list(chain.from_iterable(values))
         is_plain = depth == 1 or (depth == 2 and set(map(type, values)) <= {list, tuple})
@@ -170,7 +170,7 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
 
 
 def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray | None:
-    """Do as `plain_floats` does, part by part."""
+    """Do the work of `plain_floats` part by part."""
     if len(values) <= _LISTED:
         return plain_floats(values, depth)
     parts: list[FloatArray] = []
@@ -217,12 +217,12 @@ def _path(index: int, shape: list[int], where: Where) -> Where:
 
 
 def check_finite(array: FloatArray, where: Where) -> None:
-    """Raise on the first NaN or infinity."""
+    """Raise for the first NaN or infinity."""
     flat = array.reshape(-1)
     if len(flat) <= _FEW and math.isfinite(sum(flat.tolist())):
         return
-    for start in range(0, len(flat), _AT_ONCE):
-        finite: BoolArray = np.isfinite(flat[start : start + _AT_ONCE])
+    for start in range(0, len(flat), _BLOCK):
+        finite: BoolArray = np.isfinite(flat[start : start + _BLOCK])
         if not finite.all():
             index = start + int(finite.argmin())
             path = _path(index, list(array.shape), where)
@@ -230,7 +230,7 @@ def check_finite(array: FloatArray, where: Where) -> None:
 
 
 def check_dimension(n_columns: int, dimension: int | None, where: Where, what: str = "positions of") -> None:
-    """Raise unless a position of `n_columns` numbers has the `dimension` asked for (None: 2 or 3)."""
+    """Raise unless positions of `n_columns` numbers have the given `dimension` (None: 2 or 3)."""
     allowed = DIMENSIONS if dimension is None else (dimension,)
     if n_columns not in allowed:
         wanted = " or ".join(map(str, allowed))
@@ -238,13 +238,13 @@ def check_dimension(n_columns: int, dimension: int | None, where: Where, what: s
 
 
 def check_given_dimension(dimension: object) -> None:
-    """Raise unless `dimension`, named by the caller, is the whole number 2 or 3."""
+    """Raise unless the caller's `dimension` is the whole number 2 or 3."""
     if isinstance(dimension, bool) or not isinstance(dimension, (int, np.integer)) or dimension not in DIMENSIONS:
         raise WrongDimensionError(f"dimension must be 2 or 3, got {shown(dimension)}", ("dimension",))
 
 
 def check_not_empty(count: int, what: str, where: Where) -> None:
-    """Raise if there is nothing."""
+    """Raise if the count is 0."""
     if count == 0:
         raise EmptyGeometryError(f"{spell(where)} is empty; at least one {what} is needed", where)
 
@@ -252,11 +252,11 @@ def check_not_empty(count: int, what: str, where: Where) -> None:
 def as_points(
     points: object, dimension: int | None, where: Where = ("points",), must_be_finite: bool = True
 ) -> FloatArray:
-    """Return `points` as a finite C-contiguous float64 array ``(n, dimension)``; no points at all are welcome.
+    """Return `points` as a finite C-contiguous float64 array ``(n, dimension)``; may be empty.
 
-    points: array of floats or integers, or nested lists; borrowed where it is float64 and contiguous already.
-    dimension: 2 or 3, or None to take either (no points: 2). must_be_finite: as in `as_floats`.
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError.
+    points: array of floats or integers, or nested lists; borrowed if it is float64 and contiguous already. dimension: 2
+    or 3, or None for either (no points: 2). must_be_finite: as in `as_floats`. Raises: InvalidArrayError,
+    WrongDimensionError, NotFiniteError.
     """
     if not isinstance(points, np.ndarray) and (held := positions_in(points)) is not None:
         points = held
@@ -270,7 +270,7 @@ def as_points(
 def as_point_groups(
     groups: object, size: int | None, dimension: int | None, where: Where, must_be_finite: bool = True
 ) -> FloatArray:
-    """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; none are welcome.
+    """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; may be empty.
 
     must_be_finite: as in `as_floats`.
     """
@@ -291,20 +291,20 @@ def as_vector(vector: object, dimension: int | None, where: Where) -> FloatArray
 
 
 def frozen(array: FloatArray) -> FloatArray:
-    """Return a read-only C-contiguous copy in which -0.0 is 0.0; every other value stays."""
-    if len(array) <= _AT_ONCE:
+    """Return a read-only C-contiguous copy with -0.0 replaced by 0.0."""
+    if len(array) <= _BLOCK:
         copy = np.add(array, 0.0, dtype=np.float64, order="C")  # -0.0 + 0.0 = +0.0
     else:
         copy = np.empty(array.shape)
-        for first in range(0, len(array), _AT_ONCE):
+        for first in range(0, len(array), _BLOCK):
             poll()
-            np.add(array[first : first + _AT_ONCE], 0.0, out=copy[first : first + _AT_ONCE])
+            np.add(array[first : first + _BLOCK], 0.0, out=copy[first : first + _BLOCK])
     copy.setflags(write=False)
     return copy
 
 
 def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
-    """Return `offsets`, whole numbers that never fall, from 0 or later up to `n_items` or earlier, as int64."""
+    """Return `offsets` as int64: whole numbers in ascending order, within 0 .. `n_items`."""
     try:
         array = np.asarray(offsets)
     except ValueError:  # ragged
@@ -314,20 +314,20 @@ def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
         raise InvalidArrayError(
             f"{spell(where)} must be whole numbers in one row, one more than items; got {what}", where
         )
-    found = array.astype(np.int64, copy=False)
-    falls = np.flatnonzero(np.diff(found) < 0)
+    result = array.astype(np.int64, copy=False)
+    falls = np.flatnonzero(np.diff(result) < 0)
     if len(falls):
         place = (*where, int(falls[0]) + 1)
-        raise InvalidArrayError(f"{spell(place)} is {found[falls[0] + 1]}, less than the one before it", place)
-    if found[0] < 0 or found[-1] > n_items:
+        raise InvalidArrayError(f"{spell(place)} is {result[falls[0] + 1]}, less than the one before it", place)
+    if result[0] < 0 or result[-1] > n_items:
         raise InvalidArrayError(
-            f"{spell(where)} go from {found[0]} to {found[-1]}, but there are {n_items} items", where
+            f"{spell(where)} go from {result[0]} to {result[-1]}, but there are {n_items} items", where
         )
-    return found
+    return result
 
 
 def as_nested_offsets(n_items: int, **levels: object) -> list[IntArray]:
-    """Return offsets, read-only: those of the first level divide all of `n_items`, those of each other the parts of the
+    """Return read-only offsets of nested levels: the first level divides all of `n_items`, each other the parts of the
     level before it."""
     checked = []
     for name, offsets in levels.items():

@@ -1,4 +1,4 @@
-"""The certificate that a polyhedron is convex: one orientation a face and one an edge, all exact.
+"""Certifies that a polyhedron is convex, by one exact orientation sign a face and one an edge.
 
 Let o be a point strictly on one and the same side of the planes of all triangles. The triangles of a closed mesh are
 then seen from o, all turned the same way, as a chain of spherical triangles without a border, so every half-line from o
@@ -30,7 +30,7 @@ _TRIES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Convexity:
-    """What is known of a polyhedron certified convex.
+    """Certificate of a convex polyhedron.
 
     center: a point strictly inside. is_outward: whether its faces are counter-clockwise seen from outside.
     """
@@ -40,10 +40,10 @@ class Convexity:
 
 
 def convexity(solid: Polyhedron) -> Convexity | None:
-    """Return the certificate, None where the solid is not convex or was not certified (a face without area, a centre
-    of the vertices that rounds out of the solid, exponents beyond those of the predicates).
+    """Return the certificate of a polyhedron; None if it is not convex or cannot be certified.
 
-    Cost: the faces up to the first that fails; all of them, and a table of their edges, where none does.
+    It cannot be certified with a face without area, a centre that rounds out of the solid, or exponents beyond those of
+    the predicates. Cost: the faces up to the first that fails; if none does, all of them and a table of their edges.
     """
     return solid.prepared("convexity", lambda: _certified(solid))
 
@@ -69,39 +69,38 @@ def _certified(solid: Polyhedron) -> Convexity | None:
 
 @kernel
 def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
-    """Return the side, 1 or -1, of every face on which the centre lies; 0 where there is none."""
+    """Return the side, 1 or -1, of all faces on which the centre is; 0 if it differs."""
     o, side = Point3(center[0], center[1], center[2]), 0
     for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)
-        found = orient3d(a, b, c, o)
-        if (found != 1 and found != -1) or (side != 0 and found != side):
+        sign = orient3d(a, b, c, o)
+        if (sign != 1 and sign != -1) or (side != 0 and sign != side):
             return 0
-        side = found
+        side = sign
     return side
 
 
 @kernel
 def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, center: FloatArray, side: int) -> bool:
-    """Tell whether across each edge the next triangle's far corner is on the centre's side of the plane, or on it, and
-    some half-line from the centre crosses one triangle.
+    """Return whether the mesh is locally convex at every edge and some half-line from the centre crosses one triangle.
 
-    others: of the edge that starts at corner k of triangle i, 3 i + k, the edge that runs the other way.
+    others: of the edge that starts at corner k of triangle i, 3 i + k, the opposite edge.
     """
     for corner in range(others.shape[0]):
         other = others[corner]
         a, b, c = corners_of(vertices, triangles, corner // 3)
-        found = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > corner else 0
-        if found != 0 and found != side:
+        sign = orient3d(a, b, c, as_point3(vertices, triangles[other // 3, (other + 2) % 3])) if other > corner else 0
+        if sign != 0 and sign != side:
             return False
     return bool(_is_crossed_once(vertices, triangles, Point3(center[0], center[1], center[2]), side))
 
 
 @inline
 def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side: int) -> bool:
-    """Tell whether some half-line from o through no edge crosses one triangle only.
+    """Return whether some half-line from o through no edge crosses exactly one triangle.
 
-    Through q: it crosses the triangle a, b, c where the planes o a b, o b c and o c a have q on the inner side, which
-    is the opposite of `side`.
+    It goes through q: it crosses the triangle a, b, c if the planes o a b, o b c and o c a have q on the inner side,
+    which is the opposite of `side`.
     """
     for attempt in range(min(_TRIES, triangles.shape[0])):
         a, b, c = corners_of(vertices, triangles, attempt)
@@ -118,7 +117,7 @@ def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side:
 
 @inline
 def _crossings(vertices: FloatArray, triangles: IntArray, o: Point3, q: Point3, side: int) -> int:
-    """Return how many triangles the half-line from o through q crosses, -1 where it may meet an edge."""
+    """Return how many triangles the half-line from o through q crosses, -1 if it may meet an edge."""
     n_crossed = 0
     for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)

@@ -17,9 +17,9 @@ from engine.solids.checks import check_not_empty, shown
 
 OPERATIONS: Final = ("union", "intersection", "difference")
 MAX_DEPTH: Final = 100
-"""Most `Csg` levels on a path from the root to a leaf."""
+"""Largest number of `Csg` levels on a path from the root to a leaf."""
 MAX_LEAVES: Final = 1_000_000
-"""Most leaves counted along all paths: shared operands could otherwise double them at every level."""
+"""Largest number of leaves along all paths: shared operands could otherwise double them at every level."""
 
 
 class Csg(Solid):
@@ -48,7 +48,7 @@ class Csg(Solid):
 
     Examples
     --------
-    >>> from engine.solids.sphere import Sphere
+    >>> from engine.solids.primitives import Sphere
     >>> Csg("difference", [Sphere([0, 0], 2), Sphere([0, 0], 1)])
     Csg('difference', 2 operands, 2D)
     """
@@ -101,7 +101,7 @@ class Csg(Solid):
 
 
 def _check_operand(i_operand: int, operand: object, first: Solid) -> None:
-    """Raise unless `operand` is a solid with an inside, of the dimension of the first one."""
+    """Raise unless `operand` is a solid with an interior, of the dimension of the first one."""
     where = ("operands", i_operand)
     if not isinstance(operand, Solid):
         raise InvalidArrayError(f"operands[{i_operand}] must be a solid, got {type(operand).__name__}", where)

@@ -1,9 +1,9 @@
-"""Cuts polygonal faces into triangles by one fixed rule, so that a face that is not plane still bounds one solid.
+"""Triangulates polygonal faces by ear cutting with one fixed rule, so that a face that is not plane bounds one solid.
 
 **The rule.** Project the face along the axis on which its vector area is largest (on a tie the first of x, y, z). Scan
 the ring from its first vertex for the first ear: a strictly convex corner whose closed triangle holds no other vertex
-of the ring. Cut it, scan again from the first vertex that is left, until three are left. Every sign is exact; vertices
-in the middle of a straight side are kept. A strictly convex face becomes a fan about its last vertex. A projection that
+of the ring. Cut it, scan again from the first remaining vertex, until three remain. Every sign is exact; vertices in
+the middle of a straight side remain. A strictly convex face becomes a fan about its last vertex. A projection that
 is not simple (crossing or touching sides, repeated positions, no area) is refused; every other has an ear.
 
 **Convex faces**, nearly all of real meshes, are certified by floating-point signs with a proven bound. Where rounding
@@ -18,8 +18,8 @@ sum of sizes; doubled.
 pairs are compared, most by their boxes. A corner is blunt (no left turn: it may become one, never the other way round),
 or blocked (a blunt corner lies in its closed triangle: of the corners in a triangle the one nearest the tip is blunt),
 or the tip of an ear. While a triangle stays the same, what does not block it never will, so the search for a blocker
-goes on where it stopped; a cut changes two triangles. Signs that the compiled predicate leaves open (coordinates of one
-axis more than 2^985 apart) are asked for: the corners are left in `Ring.wanted`, the caller settles them, begins again.
+goes on where it stopped; a cut changes two triangles. A sign that the compiled predicate leaves UNDECIDED (coordinates
+of one axis more than 2^985 apart) is put into `Ring.wanted`; the caller computes it in rationals and begins again.
 
 Source: G. H. Meisters, Polygons have ears, 1975. Changed: exact signs, closed triangles, the fixed scan.
 """
@@ -47,7 +47,7 @@ _POLL: Final = 0x3FF
 
 
 class Ring(NamedTuple):
-    """Corners x, y (n,); turns settled before, rows of three corners and a sign (k, 4); a turn that is wanted (4,)."""
+    """Corners x, y (n,); turns settled so far, rows of three corners and a sign (k, 4); the wanted turn (4,)."""
 
     x: Any
     y: Any
@@ -56,8 +56,10 @@ class Ring(NamedTuple):
 
 
 class Corners(NamedTuple):
-    """Rows (n,) that `cut_ears` works in: the corners before and after one that is not cut, whether it is blunt, which
-    blunt corner blocks it, -1 for none, and how many of `blunt`, those that were blunt at first, it was compared with.
+    """Scratch of `cut_ears`, rows (n,).
+
+    The remaining corners before and after each, whether it is blunt, the blunt corner that blocks it (-1: none), and
+    how many of `blunt`, the corners blunt at first, it was compared with.
     """
 
     before: Any
@@ -71,10 +73,10 @@ class Corners(NamedTuple):
 def cut_faces(
     vertices: FloatArray, offsets: IntArray, indices: IntArray, merged: IntArray, budget: Budget
 ) -> tuple[IntArray, IntArray]:
-    """Return the triangles of all faces (their indices from `merged`, flat) and the face each was cut from.
+    """Return the triangles of all faces (their indices from `merged`, flat) and the face of each.
 
-    offsets, indices: the faces as given; merged: the same corners with equal positions made one index.
-    Raises: FaceNotSimpleError, DeadlineExceededError, CancelledError.
+    offsets, indices: the faces as given; merged: the same corners with equal positions made one index. Raises:
+    FaceNotSimpleError, DeadlineExceededError, CancelledError.
     """
     counts = np.diff(offsets)
     starts = np.append(np.int64(0), np.cumsum(counts - 2))
@@ -103,11 +105,11 @@ def cut_ring(points: FloatArray, projection: int, face: int, names: IntArray, bu
         raise _not_simple(points, face, names, "has no area in any projection")
     n, flat = len(points), points[:, axes]
     x, y = np.ascontiguousarray(flat[:, 0]), np.ascontiguousarray(flat[:, 1])
-    found, ears = np.zeros(2, np.int64), np.empty((n - 2, 3), np.int64)
+    sides, ears = np.zeros(2, np.int64), np.empty((n - 2, 3), np.int64)
     settled = np.empty((0, 4), np.int64)
-    while True:  # bound: each turn settles a sign that is asked for once
+    while True:  # bound: each turn settles one sign
         ring = Ring(x, y, settled, np.zeros(4, np.int64))
-        result = find_meeting(ring, found, budget.flag)
+        result = find_self_contact(ring, sides, budget.flag)
         if result == SIMPLE and cut_ears(ring, Corners(*np.empty((6, n), np.int64)), ears, budget.flag) == n - 2:
             return ears
         budget.check()
@@ -117,7 +119,7 @@ def cut_ring(points: FloatArray, projection: int, face: int, names: IntArray, bu
         sign = orient2d_rational(*flat[[i, j, k]].tolist())
         settled = np.concatenate([settled, [[i, j, k, sign]]])
     assert result not in (SIMPLE, ENDED_EARLY), "a simple ring without an ear"
-    first, second = found.tolist()
+    first, second = sides.tolist()
     if result == TURNS_BACK:
         raise _not_simple(points, face, names, f"stands still or turns back on itself at vertex {names[first]}")
     problem = (
@@ -136,8 +138,8 @@ def _not_simple(points: FloatArray, face: int, names: IntArray, problem: str) ->
 
 
 def _projection_of_largest_area(points: FloatArray) -> int:
-    """Return the number from 1 of the axis along which the area is largest, of equal ones the first, negative where
-    that is negative; 0 if the ring has no area."""
+    """Return the axis (from 1) of the largest projected area, the first of equal ones, with the area's sign; 0 if all
+    are 0."""
     whole = np.array(scaled_integers(points.ravel().tolist()), object).reshape(-1, 3)
     spokes, area = whole[1:] - whole[0], []
     for axis in range(3):
@@ -157,8 +159,7 @@ def _at(vertices: FloatArray, merged: IntArray, corner: int, axis: int, scale: f
 def _area(
     vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float
 ) -> tuple[float, float]:
-    """Return twice the area along an axis of the face of the corners from the first up to the last, and a bound on its
-    error."""
+    """Return twice the projected area of a face along an axis, and its error bound; corners: first and last."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
     u0, v0 = _at(vertices, merged, first, a, scale), _at(vertices, merged, first, b, scale)
@@ -176,7 +177,7 @@ def _area(
 def _turns_once(
     vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float, is_left: bool
 ) -> bool:
-    """Tell whether a face certainly turns strictly one way at every corner, and around once."""
+    """Return whether a face certainly turns strictly one way at every corner, and around once."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
     u, v = _at(vertices, merged, last - 1, a, scale), _at(vertices, merged, last - 1, b, scale)
@@ -201,9 +202,9 @@ def _turns_once(
 
 @inline
 def _projection(vertices: FloatArray, merged: IntArray, corners: tuple[int, int]) -> int:
-    """Return CONVEX, or the number from 1 of the axis along which the area is largest, negative where that is negative;
-    UNSURE where rounding leaves that open."""
-    largest, least, found, is_convex = 0.0, -1.0, 0, True
+    """Return CONVEX, or the axis (from 1) of the largest projected area with its sign; UNSURE if rounding leaves it
+    open."""
+    largest, least, projection, is_convex = 0.0, -1.0, 0, True
     for corner in range(corners[0], corners[1]):
         for axis in range(3):
             largest = max(largest, abs(vertices[merged[corner], axis]))
@@ -215,8 +216,8 @@ def _projection(vertices: FloatArray, merged: IntArray, corners: tuple[int, int]
         area, bound = _area(vertices, merged, corners, axis, scale)
         if abs(area) + bound >= least:
             is_convex = is_convex and _turns_once(vertices, merged, corners, axis, scale, area > 0.0)
-            found = UNSURE if found != 0 or abs(area) <= bound else axis + 1 if area > 0.0 else -axis - 1
-    return CONVEX if is_convex else found
+            projection = UNSURE if projection != 0 or abs(area) <= bound else axis + 1 if area > 0.0 else -axis - 1
+    return CONVEX if is_convex else projection
 
 
 @kernel
@@ -224,8 +225,11 @@ def cut_convex_faces(
     vertices: FloatArray, offsets: IntArray, merged: IntArray, starts: IntArray, corners: IntArray,
     projections: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill corners (starts[-1], 3) with positions in `merged`: the triangles of face i from starts[i] on, fans about
-    the last corner; faces that are not certainly convex are left out. projections (m,) int8: see `_projection`."""
+    """Fill corners (starts[-1], 3) with the fans of certainly convex faces; others stay unset.
+
+    Positions in `merged`; the triangles of face i begin at starts[i], about its last corner. projections (m,) int8: see
+    `_projection`.
+    """
     for face in range(offsets.shape[0] - 1):
         if face & _POLL == 0 and flag[0] != 0:
             return
@@ -242,7 +246,7 @@ def cut_convex_faces(
 
 @inline
 def turn(ring: Ring, i: int, j: int, k: int) -> int:
-    """Return the sign of the turn at corner j on the way i, j, k; 0, and the turn in `wanted`, if it is not known."""
+    """Return the sign of the turn at corner j on the path i, j, k; 0, and the turn in `wanted`, if it is UNDECIDED."""
     x, y = ring.x, ring.y
     side = orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k]))
     if side != UNDECIDED:
@@ -256,27 +260,34 @@ def turn(ring: Ring, i: int, j: int, k: int) -> int:
 
 @inline
 def _is_before(ring: Ring, i: int, j: int) -> bool:
-    """Tell whether corner i is before corner j by x, then y, then number."""
+    """Return whether corner i is before corner j by x, then y, then number."""
     x, y = ring.x, ring.y
     return x[i] < x[j] or (x[i] == x[j] and (y[i] < y[j] or (y[i] == y[j] and i < j)))
 
 
 @inline
 def _are_apart(a: float, b: float, c: float, d: float) -> bool:
-    """Tell whether the intervals between a and b, and between c and d, have nothing in common."""
+    """Return whether the intervals [a, b] and [c, d], in any order, are disjoint."""
     return max(a, b) < min(c, d) or max(c, d) < min(a, b)
 
 
 @kernel
-def find_meeting(ring: Ring, found: IntArray, flag: FlagArray) -> int:
-    """Return whether the ring is SIMPLE, or what was found: TURNS_BACK at corner found[0], or side found[0] MEETS side
-    found[1]; ENDED_EARLY where the flag is set or a turn is wanted. Side i goes from corner i to the next one."""
+def find_self_contact(ring: Ring, where: IntArray, flag: FlagArray) -> int:
+    """Return whether the ring is SIMPLE, or its first self-contact.
+
+    | result | meaning |
+    |---|---|
+    | SIMPLE | no self-contact |
+    | TURNS_BACK | at corner where[0] |
+    | MEETS | side where[0] meets side where[1]; side i goes from corner i to the next one |
+    | ENDED_EARLY | the flag is set or a turn is wanted |
+    """
     x, y, n = ring.x, ring.y, ring.x.shape[0]
     for i in range(n):
         before, after = (i - 1) % n, (i + 1) % n
         is_back = _is_before(ring, i, after) == _is_before(ring, i, before) and turn(ring, before, i, after) == 0
         if is_back or (x[i] == x[after] and y[i] == y[after]):
-            found[0] = i
+            where[0] = i
             return ENDED_EARLY if ring.wanted[0] != 0 else TURNS_BACK
     for i in range(n - 2):
         if flag[0] != 0:
@@ -287,15 +298,17 @@ def find_meeting(ring: Ring, found: IntArray, flag: FlagArray) -> int:
                 continue
             # of sides on one line all turns are 0: they meet, as their boxes do
             if turn(ring, i, j, k) * turn(ring, i, j, m) <= 0 and turn(ring, k, m, i) * turn(ring, k, m, j) <= 0:
-                found[0], found[1] = i, k
+                where[0], where[1] = i, k
                 return ENDED_EARLY if ring.wanted[0] != 0 else MEETS
     return SIMPLE
 
 
 @kernel
 def cut_ears(ring: Ring, corners: Corners, ears: IntArray, flag: FlagArray) -> int:
-    """Fill ears (n - 2, 3): corner before, tip, corner after; return how many were cut, fewer than n - 2 where the flag
-    is set or a turn is wanted. ring: simple, counter-clockwise."""
+    """Fill ears (n - 2, 3) with corner before, tip, corner after; return how many were cut.
+
+    Fewer than n - 2 if the flag is set or a turn is wanted. ring: simple, counter-clockwise.
+    """
     before, after, is_blunt, n, n_blunt = corners.before, corners.after, corners.is_blunt, ring.x.shape[0], 0
     for i in range(n):
         before[i], after[i] = (i - 1) % n, (i + 1) % n
@@ -323,9 +336,9 @@ def cut_ears(ring: Ring, corners: Corners, ears: IntArray, flag: FlagArray) -> i
 
 @inline
 def _is_blocked(ring: Ring, corners: Corners, tip: int, n_blunt: int) -> bool:
-    """Tell whether a blunt corner lies in the closed triangle of a left turn: go on where the last search ended.
+    """Return whether a blunt corner lies in the closed triangle of a left turn; resumes the last search.
 
-    No blunt corner is ever cut, so that none of them is gone.
+    No blunt corner is ever cut, so all of them remain.
     """
     left, right, x, y = corners.before[tip], corners.after[tip], ring.x, ring.y
     if corners.blocker[tip] >= 0 and corners.is_blunt[corners.blocker[tip]] != 0:

@@ -51,7 +51,7 @@ class Implicit(Solid):
     type: ClassVar[str] = "implicit"
     _pickled: ClassVar[tuple[str, ...]] = ("powers", "coefficients", "function")
     powers: IntArray
-    """``(n, dimension)``; no rows where `function` decides."""
+    """``(n, dimension)``; no rows if `function` decides."""
     coefficients: FloatArray
     """``(n,)``."""
     function: PointFunction | None
@@ -163,7 +163,7 @@ def _as_powers(powers: object, where: tuple[str | int, ...], *, one: bool = Fals
 
 
 def _holds_bool(powers: object) -> bool:
-    """Tell whether a nested list holds True or False, which numpy would take for 1 and 0."""
+    """Return whether a nested list contains True or False, which numpy would convert to 1 and 0."""
     if isinstance(powers, (list, tuple)):
         return any(_holds_bool(item) for item in powers)
     return isinstance(powers, (bool, np.bool_))

@@ -1,8 +1,8 @@
-"""Vertices and faces by index: what polyhedra and surfaces share.
+"""Indexed meshes: the common base of polyhedra and surfaces.
 
-Faces are kept as the caller gave them; beside them stand triangles whose indices point to the first vertex at each
-position, so that two faces meet along an edge exactly when they name the same two indices there. A mesh of triangles
-without repeated positions, the common case, keeps one array for both.
+A mesh stores the faces as given, and triangles whose indices point to the first vertex at each position, so that two
+faces share an edge if and only if they have the same two indices there. A mesh of triangles without repeated positions,
+the common case, has one array for both.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from engine.running.budget import Budget, Cancel, poll
 from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets, as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces
-from engine.solids.mesh_checks import look_over
+from engine.solids.mesh_checks import check_topology
 from engine.types import FloatArray, IntArray, read_only
 
-_AT_ONCE: Final = 1 << 15
-"""Faces of a list looked at between two looks at the clock."""
+_BLOCK: Final = 1 << 15
+"""Faces of a list checked between two polls."""
 _N_NAMED: Final = 3  # edges that a message names
 
 
@@ -67,7 +67,7 @@ class Mesh(Solid):
         offsets = np.arange(0, len(indices) + 1, 3) if given is None else given
         merged = np.empty(len(indices), np.int64)
         named = np.full((_N_NAMED, 5), -1)
-        i_face, n_different, n_odd, n_turned = entry_of(look_over)(
+        i_face, n_different, n_odd, n_turned = entry_of(check_topology)(
             points.view(np.uint64), offsets, indices, self._must_close, merged, named, budget.flag
         )
         budget.check()
@@ -171,18 +171,18 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
 
 
 def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
-    """Return the number of corners of each face and all indices; every index must be a whole number."""
+    """Return the number of corners of each face and all indices, each checked to be a whole number."""
     parts = []
-    for first in range(0, len(faces) or 1, _AT_ONCE):
+    for first in range(0, len(faces) or 1, _BLOCK):
         poll()
-        parts.append(_flatten_some(faces[first : first + _AT_ONCE], first))
+        parts.append(_flatten_some(faces[first : first + _BLOCK], first))
     if len(parts) == 1:
         return parts[0]
     return np.concatenate([counts for counts, _ in parts]), np.concatenate([indices for _, indices in parts])
 
 
 def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArray[Any]]:
-    """Do as `_flatten` does with the faces from number `first` on."""
+    """Do the work of `_flatten` for the faces from number `first` on."""
     rows = faces
     if not set(map(type, faces)) <= {list, tuple}:
         rows = [face.tolist() if isinstance(face, np.ndarray) else face for face in faces]
@@ -209,7 +209,7 @@ def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArr
 
 
 def _place(offsets: IntArray | None, position: int) -> tuple[int, int]:
-    """Return the face and the corner in it that stand at `position` in the list of all indices."""
+    """Return the face and the corner in it at `position` in the flat list of indices."""
     if offsets is None:
         return position // 3, position % 3
     i_face = int(np.searchsorted(offsets, position, side="right")) - 1
@@ -222,12 +222,12 @@ def first_equal(points: FloatArray) -> IntArray | None:
     every, first = np.arange(n), np.empty(n, np.int64)
     one_face, no_flag = np.array([0, n]), np.zeros(1, np.uint8)
     none = np.empty((0, 5), np.int64)
-    n_different = entry_of(look_over)(points.view(np.uint64), one_face, every, False, first, none, no_flag)[1]
+    n_different = entry_of(check_topology)(points.view(np.uint64), one_face, every, False, first, none, no_flag)[1]
     return None if n_different == n else first
 
 
 def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
-    """Return the error that says which vertex a face names twice."""
+    """Return the error for a face that names a vertex twice."""
     values, counts = np.unique(face, return_counts=True)
     return RepeatedIndexError(
         f"faces[{i_face}] = {shown(face.tolist(), 200)} names vertex {int(values[counts > 1][0])} more than once; "
@@ -239,7 +239,7 @@ def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
 def _unbalanced_edges(
     vertices: FloatArray, indices: IntArray, named: IntArray, n_odd: int, n_turned: int
 ) -> NotClosedError | InconsistentOrientationError:
-    """Return the error that names some of the edges that are not used equally often in both directions."""
+    """Return the error that names some edges that are not used equally often in both directions."""
     kind: type[NotClosedError | InconsistentOrientationError]
     if n_odd > 0:
         kind, n, claim = NotClosedError, n_odd, "are open"

@@ -1,7 +1,7 @@
-"""What is looked for in every mesh, each in time linear in its size: equal vertices, repeated indices, open edges.
+"""Mesh validation in linear time: equal vertices, repeated indices, open edges.
 
-The kernels poll `flag` and return early when it is raised: the caller checks its budget before it believes them. What
-they are handed: ``indices[offsets[i] : offsets[i + 1]]`` are the vertices of face i, all in range.
+The kernels poll `flag` and return early when it is set: the caller checks its budget before it uses their results.
+``indices[offsets[i] : offsets[i + 1]]`` are the vertices of face i, all in range.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from engine.compiling.jit import allocating, allocating_kernel, called, inline
 from engine.types import FlagArray, Int8Array, IntArray
 
 _POLL: Final = 0x3FFF
-"""Items between two looks at the flag, one less than a power of two: a fraction of a millisecond."""
+"""Items between two polls of the flag, one less than a power of two: a fraction of a millisecond."""
 _FREE: Final = -1
 _ODD: Final = np.uint64(0x9E3779B97F4A7C15)
 _ODD_TOO: Final = np.uint64(0xBF58476D1CE4E5B9)
@@ -26,7 +26,7 @@ _TURNED: Final = 2
 
 @inline
 def _mixed(bits: Any, row: int) -> Any:
-    """Return one number for the three of a row, seldom the same for two different rows."""
+    """Return a hash of the three numbers of a row."""
     mixed = bits[row, 0] * _ODD
     for column in range(1, 3):
         mixed = (mixed ^ (mixed >> _HALF)) + bits[row, column]
@@ -36,10 +36,10 @@ def _mixed(bits: Any, row: int) -> Any:
 
 @allocating
 def _find_equal_rows(bits: Any, first: IntArray, flag: FlagArray) -> int:
-    """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of different
-    ones.
+    """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of distinct
+    rows.
 
-    A table of at least twice as many slots, tried from the slot of the mixed row onwards.
+    Open addressing in a table of at least twice as many slots.
     """
     n, n_different, n_bits = bits.shape[0], 0, 1
     while (1 << n_bits) < 2 * n:  # bound: the bits of a number
@@ -92,10 +92,10 @@ def _following(offsets: IntArray, face: int, corner: int) -> int:
 
 @called
 def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: IntArray, flag: FlagArray) -> None:
-    """Put the edges of all faces into `ends`, those with the lower vertex v at ``starts[v]`` to ``starts[v + 1]``.
+    """Group the edges of all faces by their lower vertex v: ends[starts[v] : starts[v + 1]].
 
-    ends: the higher vertex h of an edge that runs up to it, ~h of one that runs down. starts: zeros, (n_vertices + 2,).
-    An edge between a vertex and itself is left out. Two looks at every edge, the first to count.
+    ends: the higher vertex h of an edge directed to it, ~h of one directed from it. starts: zeros, (n_vertices + 2,).
+    An edge between a vertex and itself is skipped. Two passes, the first to count.
     """
     for is_second in range(2):
         for face in range(offsets.shape[0] - 1):
@@ -119,7 +119,7 @@ def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: I
 def _count_unbalanced(starts: IntArray, ends: IntArray, marks: Int8Array, flag: FlagArray) -> tuple[int, int]:
     """Return how many edges are used an odd number of times, and how many others more often in one direction.
 
-    starts, ends: from `_group_edges`. marks: int8, set to _ODD_USES or _TURNED at every use of such edges, else 0.
+    starts, ends: from `_group_edges`. marks: int8, out: _ODD_USES or _TURNED at every use of such edges, else 0.
     """
     uses, n_odd, n_turned = np.zeros(starts.shape[0], np.int64), 0, 0
     for low in range(starts.shape[0] - 2):
@@ -149,8 +149,8 @@ def _name_unbalanced(
     offsets: IntArray, corners: IntArray, starts: IntArray, ends: IntArray, marks: Int8Array, wanted: int,
     named: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Set `named` (k, 5) to the first edges that are marked so: the face and the corner where the edge is used first,
-    the next corner, how often it is used in this direction and in the other."""
+    """Set `named` (k, 5) to the first marked edges: face and corner of the first use, next corner, uses in this
+    direction and in the other."""
     places = np.empty_like(starts)
     for vertex in range(len(starts)):
         places[vertex] = starts[vertex]
@@ -180,15 +180,15 @@ def _name_unbalanced(
 
 
 @allocating_kernel
-def look_over(
+def check_topology(
     bits: Any, offsets: IntArray, indices: IntArray, must_close: bool, merged: IntArray, named: IntArray,
     flag: FlagArray,
 ) -> tuple[int, int, int, int]:  # fmt: skip
-    """Return the first face that names a vertex twice (-1: none), the number of different vertices, and what
-    `_count_unbalanced` does (0, 0 unless each edge must be used equally often in both directions).
+    """Return the first face that names a vertex twice (-1: none), the number of distinct vertices, and
+    `_count_unbalanced`.
 
-    bits: the vertices (n, 3) uint64. merged: set to the first of all equal vertices at each corner, if two are equal.
-    named: set by `_name_unbalanced`, of the first kind that there is.
+    The last are 0, 0 unless must_close. bits: the vertices (n, 3) uint64. merged: out, the first of all equal vertices
+    at each corner, if two are equal. named: out, by `_name_unbalanced`, of the first kind that occurs.
     """
     n = bits.shape[0]
     repeated = _find_repeat(offsets, indices, n, flag)

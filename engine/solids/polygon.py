@@ -15,7 +15,7 @@ from engine.types import FloatArray, IntArray
 
 _NO_VERTICES = np.zeros((0, 2))
 _LEAST: Final = 3
-"""Vertices of a ring, as it is stored: no kernel is handed one of fewer."""
+"""Least number of stored vertices of a ring, for kernels."""
 
 
 class Polygon(Solid):
@@ -79,7 +79,7 @@ class Polygon(Solid):
 
     @classmethod
     def of_arrays(cls, vertices: FloatArray, ring_offsets: IntArray) -> Polygon:
-        """Return a polygon that holds these arrays as they are: read-only, checked, without -0.0 or repeated ends."""
+        """Return a polygon that shares these arrays: read-only, checked, without -0.0 or repeated ends."""
         polygon = object.__new__(cls)
         polygon._set(dimension=2, vertices=vertices, ring_offsets=ring_offsets)
         return polygon
@@ -99,7 +99,7 @@ class Polygon(Solid):
         return len(self.ring_offsets) - 1
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
-        """As of any solid; an empty polygon has no structures: only overlays take it."""
+        """As of any solid; an empty polygon has no structures: only overlays accept it."""
         self.check_not_empty()
         return super().prepared(key, build, check)
 
@@ -109,7 +109,7 @@ class Polygon(Solid):
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
-        """The polygon as GeoJSON: its pieces with their holes, valid (rings that cross are arranged anew)."""
+        """The polygon as GeoJSON: its pieces with their holes, valid (crossing rings are rebuilt)."""
         return Polygon.geojson[1](self)
 
     def __repr__(self) -> str:

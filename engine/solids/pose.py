@@ -25,10 +25,10 @@ from engine.solids.checks import (
 from engine.types import BoolArray, FloatArray, read_only
 
 TOLERANCE: Final = Fraction(1, 10**12)
-"""Largest entry of ``R^T R - I`` that is still taken for a rotation; part of the contract, compared exactly."""
+"""Largest |entry| of ``R^T R - I`` of a rotation; part of the contract, compared exactly."""
 
 _TOLERANCE: Final = float(TOLERANCE)
-"""What is tested for, and handed on, without a Fraction: most poses are made with it."""
+"""The same as a float, for the filter and as a default: a Fraction would be slow."""
 MOST_TOLERANCE: Final = 0.1
 
 _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
@@ -70,7 +70,7 @@ class Pose(Immutable):
     rotation: FloatArray
     translation: FloatArray
     numbers: bytes
-    """The float64 of both, the rotation's first: many poses are joined, and two compared, by these."""
+    """The bytes of both, the rotation's first, for joining and comparing many poses."""
 
     def __init__(self, rotation: object, translation: object, *, tolerance: float = 1e-12) -> None:
         matrix = as_floats(rotation, 2, ("rotation",))
@@ -188,7 +188,7 @@ class Pose(Immutable):
 
     @classmethod
     def of_checked(cls, rotation: FloatArray, translation: FloatArray) -> Pose:
-        """Return the pose of arrays that `check_rotations` and the like have passed, copied."""
+        """Return the pose of arrays that passed `check_rotations` and the like, copied."""
         pose = object.__new__(cls)
         pose._set(read_only(rotation + 0.0), read_only(translation + 0.0))  # of -0.0: 0.0
         return pose
@@ -224,7 +224,7 @@ Motion = tuple[FloatArray, FloatArray]
 
 
 def motion_of(pose: Pose | None, dimension: int) -> Motion:
-    """Return rotation and translation of a pose, those that leave everything where it is for a body without one."""
+    """Return rotation and translation of a pose, the identity for None."""
     return _STILL[dimension] if pose is None else (pose.rotation, pose.translation)
 
 
@@ -245,13 +245,13 @@ def check_rotations(
     one: bool = False,
     limit: Fraction = TOLERANCE,
 ) -> None:
-    """Raise on the first matrix of ``(n, d, d)`` finite float64 that is no rotation.
+    """Raise for the first matrix of ``(n, d, d)`` finite float64 that is no rotation.
 
     Decided exactly: entries of ``R^T R - I`` are computed in float64 for all matrices, and in rationals for those
-    within rounding of the limit. Once they pass with the usual limit, det is within 1e-11 of 1 or
-    -1, so that its float64 sign is right; with the widest it is beyond 0.5 in size.
+    within rounding of the limit. A matrix within the usual limit has |det| within 1e-11 of 1, so that its float64 sign
+    is right; within the widest, |det| > 0.5.
 
-    one: `rotations` holds a single matrix and `where` is its own path. limit: at most 0.1.
+    one: `rotations` has a single matrix and `where` is its own path. limit: at most 0.1.
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
@@ -277,8 +277,9 @@ def check_rotations(
             )
 
 
-def is_surely_rotation(matrix: FloatArray) -> bool:
-    """Tell whether a read-only ``(1, d, d)`` float64 is surely a finite rotation; `check_rotations` tells others."""
+def is_certified_rotation(matrix: FloatArray) -> bool:
+    """Return whether the filter proves a read-only ``(1, d, d)`` float64 to be a rotation; `check_rotations` decides
+    others."""
     return not entry_of(find_suspects)(matrix, _TOLERANCE - _UNSURE, _UNREAD)
 
 
@@ -287,8 +288,8 @@ _UNREAD: Final = np.empty(1, np.bool_)
 
 @kernel
 def find_suspects(matrices: FloatArray, limit: float, is_suspect: BoolArray) -> int:
-    """Fill is_suspect (n,) for matrices (n, d, d): whether max|R^T R - I| > limit as computed, or det is not positive;
-    return how many there are.
+    """Fill is_suspect (n,) for matrices (n, d, d): max|R^T R - I| > limit as computed, or det <= 0; return their
+    number.
 
     An entry of the product is a sum of d products, det a sum of d! of d; numbers that overflow, far from orthogonal,
     are suspect.
@@ -327,7 +328,7 @@ def _exact_defect(matrix: FloatArray) -> Fraction:
 def _nearest_rotation(matrix: FloatArray) -> FloatArray:
     """Return the orthogonal factor of the polar form of a matrix with det > 0, each entry the nearest double.
 
-    It is found to some units of 2^-300. Where that leaves a double open, a zero above all, it is found to some of
+    It is computed to some units of 2^-300. If that leaves a double open, above all a zero, it is computed to some of
     2^-1200; no entry of a rotation lies in the middle of two doubles, for a power of 4 is the sum of three squares only
     where two of them are 0.
     """

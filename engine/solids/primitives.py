@@ -1,4 +1,4 @@
-"""The solids that a few numbers say: half-space, ball, box, the intersection of half-spaces, triangle."""
+"""Solids given by a few numbers: half-space, ball, box, intersection of half-spaces, triangle."""
 
 from __future__ import annotations
 
@@ -208,12 +208,12 @@ class Convex(Solid):
 
 
 def rows_of(solid: HalfSpace | Aabb | Convex) -> FloatArray:
-    """Return the rows ``(m, dimension + 1)`` of the planes that bound a solid; of a box xmin, xmax, ymin, ymax, ..."""
+    """Return the plane rows ``(m, dimension + 1)`` of a solid; of a box xmin, xmax, ymin, ymax, ..."""
     return solid.row[None] if isinstance(solid, HalfSpace) else solid.rows if isinstance(solid, Aabb) else solid.planes
 
 
 def rows_in_space(rows: FloatArray) -> FloatArray:
-    """Return rows as ``(m, 4)``: those of the plane with 0 in the third place."""
+    """Return rows as ``(m, 4)``, planar ones with 0 in the third place."""
     return rows if rows.shape[1] == 4 else np.insert(rows, 2, 0.0, axis=1)
 
 

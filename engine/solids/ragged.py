@@ -1,4 +1,4 @@
-"""Ragged arrays: items of several lengths one after another, and where each begins, as Arrow and shapely hold them."""
+"""Ragged arrays: items of several lengths concatenated, and offsets of each, as in Arrow and shapely."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
 class Ragged(Columns):
-    """Base of results that are ragged arrays: a pickle of one is checked as it is read, since kernels, and whoever
-    goes by offsets, trust these."""
+    """Base of results that are ragged arrays; a pickle is checked when it is read, since kernels trust offsets."""
 
     __slots__ = ()
 
     _levels: ClassVar[tuple[str, ...]]
-    """The field of the items, then those of offsets, each into the one before."""
+    """The field of the items, then the fields of offsets, each into the one before."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self)._restored, tuple(getattr(self, each.name) for each in fields(cast(Any, self)))
@@ -59,7 +58,7 @@ def as_lines(lines: object, dimension: int) -> tuple[FloatArray, IntArray]:
 
 
 def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) -> tuple[FloatArray, IntArray]:
-    """Return the positions of some lines one line after another, checked together, and their offsets."""
+    """Return the concatenated positions of lines, checked together, and their offsets."""
     try:
         offsets = np.cumsum([0, *map(len, lines)])
         if all(isinstance(line, np.ndarray) for line in lines):
@@ -73,19 +72,19 @@ def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) ->
 
 
 def summed(sizes: Sequence[int] | IntArray | BoolArray) -> IntArray:
-    """Return where each of some parts put one after another begins, and the end of the last; read-only."""
+    """Return the offsets of parts of these sizes, read-only: (n + 1,), from 0."""
     offsets = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=offsets[1:])
     return read_only(offsets)
 
 
 def within(offsets: IntArray, items: IntArray) -> IntArray:
-    """Return in which group each of some items stands: group g holds those from offsets[g] on; empty ones none."""
+    """Return the group of each item: group g has the items from offsets[g] on; empty groups none."""
     return np.searchsorted(offsets, items, "right") - 1
 
 
 def next_in_rings(ring_offsets: IntArray) -> IntArray:
-    """Return by vertex the next one of its ring, (n,) int64, for rings that begin and end at ring_offsets."""
+    """Return for each vertex the next vertex of its ring, (n,) int64."""
     following = np.arange(1, ring_offsets[-1] + 1, dtype=np.int64)
     following[ring_offsets[1:] - 1] = ring_offsets[:-1]
     return following
@@ -135,27 +134,27 @@ def polygons(coordinates: object, ring_offsets: object, polygon_offsets: object)
     has_short = np.logical_or.reduceat(np.append(ends - starts < 3, False), groups)[:-1].tolist()
     first_vertices, last_vertices = starts.tolist(), ends.tolist()
     sizes: dict[int, IntArray] = {}
-    found = []
+    result = []
     for k, (first, last) in enumerate(pairwise(groups.tolist())):
         if last - first == 1 and not has_short[k]:
             start, end = first_vertices[first], last_vertices[first]
             offsets = sizes.get(end - start)
             if offsets is None:
                 offsets = sizes[end - start] = read_only(np.array([0, end - start]))
-            found.append(Polygon.of_arrays(vertices[start:end], offsets))
+            result.append(Polygon.of_arrays(vertices[start:end], offsets))
         elif not has_short[k] and last_vertices[first : last - 1] == first_vertices[first + 1 : last] != []:
             start, end = first_vertices[first], last_vertices[last - 1]
-            found.append(Polygon.of_arrays(vertices[start:end], read_only(np.append(starts[first:last], end) - start)))
+            result.append(Polygon.of_arrays(vertices[start:end], read_only(np.append(starts[first:last], end) - start)))
         else:
-            found.append(_of_rings(vertices, first_vertices[first:last], last_vertices[first:last], ring=first))
-    return found
+            result.append(_of_rings(vertices, first_vertices[first:last], last_vertices[first:last], ring=first))
+    return result
 
 
 def parted(
     coordinates: object, ring_offsets: object, polygon_offsets: object
 ) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Return the arguments of `polygons` checked: vertices, where rings begin, where they end without a repeated
-    position, and the offsets of polygons into the rings."""
+    """Return the checked arguments of `polygons`: vertices, starts of rings, their ends without a repeated position,
+    and offsets of polygons into the rings."""
     vertices = as_points(coordinates, 2, ("coordinates",))
     zeros = vertices == 0.0
     if np.signbit(vertices[zeros]).any():
@@ -169,7 +168,7 @@ def parted(
 
 
 def _of_rings(vertices: FloatArray, starts: list[int], ends: list[int], ring: int) -> Polygon:
-    """Return the polygon of some rings, the first of which is the caller's number `ring`."""
+    """Return the polygon of these rings; ring: the caller's number of the first one."""
     try:
         return Polygon([vertices[start:end] for start, end in zip(starts, ends)])
     except EngineError as error:
@@ -180,7 +179,7 @@ def _of_rings(vertices: FloatArray, starts: list[int], ends: list[int], ring: in
 
 
 def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return rings whose first position is repeated at their end, as GeoJSON and Arrow have them, and their offsets."""
+    """Return rings closed by a repeated first position, as GeoJSON and Arrow have them, and their offsets."""
     firsts = ring_offsets[:-1]
     return np.insert(vertices, ring_offsets[1:], vertices[firsts], axis=0), ring_offsets + np.arange(len(firsts) + 1)
 

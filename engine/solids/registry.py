@@ -1,7 +1,7 @@
-"""The one table of solids: a row a type. `engine/registry.py` fills it; every other table is made from it.
+"""The one table of solids: a row for each type. `engine/registry.py` fills it; every other table is derived from it.
 
-Only floors above know how points are located in a solid or segments cut on it, so a row names functions of theirs, and
-what is generic looks up the cell that it needs. An empty cell is a refusal that names the type (`refused`).
+A row names the functions of floors above that implement an operation for the type; generic code looks up the cell that
+it needs. An empty cell is an error that names the type (`refused`).
 """
 
 from __future__ import annotations
@@ -21,37 +21,38 @@ from engine.types import FloatArray
 
 Where = tuple[str | int, ...]
 Box = tuple[FloatArray, FloatArray, float]
-"""Low and high (d,), of a ball those of its centre, and how far a point is at most from the middle as computed."""
+"""Low and high (d,), of a ball those of its centre, and the largest distance of a point from the computed middle."""
 
 
 class BodyKind(IntEnum):
-    """In which table of a scene kernels find a body."""
+    """The table of a scene in which kernels look up a body."""
 
     UNREADY = -1
     """Not prepared yet."""
     OTHER = 0
-    """In none: what is exact, or its own locator, decides."""
+    """No table: the exact fallback, or its own locator, decides."""
     BALL = 1
     ROWS = 2
     MESH = 3
     BOX = 4
-    """Its planes are rows too, where segments are cut."""
+    """Its planes are also rows, for segment clipping."""
     RINGS = 5
-    """In the plane."""
+    """In 2D."""
 
 
 class Field(NamedTuple):
     """A field of a solid, as its constructor, JSON and files name it."""
 
     kind: str
-    """What stands there: number, position, rows, vertices, three, faces, rings, terms."""
+    """Type of the value: number, position, rows, vertices, three, faces, rings, terms."""
     about: str
-    """What it means, in a sentence of the API's description."""
+    """Meaning, as a sentence of the API's description."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """What is known of one type of solid. The cells from `exact` on are functions, None where the type is refused."""
+    """What is known of one type of solid. Cells from `exact` on are functions, None if the operation refuses the
+    type."""
 
     solid: type[Solid]
     about: str
@@ -66,21 +67,21 @@ class Row:
     exact_posed: Callable[[Any, Any, Any, Any], int] | None = None
     """(point, solid, pose, check) -> Location, where a pose does not map the set: a ball keeps its radius."""
     locator: Callable[[Any], Any] | None = None
-    """(solid) -> Locator; without it `exact` is asked about each point."""
+    """(solid) -> Locator; without it `exact` decides each point."""
     posed: Callable[[Any, Any], Any] | None = None
-    """(solid, pose) -> Locator; without it `exact` is asked about each point."""
+    """(solid, pose) -> Locator; without it `exact` decides each point."""
     box: Callable[[Any, Any], Box] | None = None
-    """(solid, check) -> the box that poses move; without it the solid is taken to reach to infinity."""
+    """(solid, check) -> the box that poses move; without it the solid counts as unbounded."""
     bounds: Callable[[Any, Any], Any] | None = None
     """(solid, budget) -> (Bounds, Accuracy)."""
     profile: Callable[[Any, Any], Any] | None = None
-    """(line, solid) -> where a segment is in the solid, exactly: `segment_clipping/profiles.py`."""
+    """(line, solid) -> profile of a segment in the solid, exactly: `segment_clipping/profiles.py`."""
     n_faces: Callable[[Any], int] = lambda _: 1
-    """(solid) -> how many faces pieces of segments may name."""
+    """(solid) -> number of faces that pieces of segments may name."""
     clip: Callable[[Any], Any] | None = None
-    """(solid) -> the Plan by which segments are cut on it; without it `clip_segments` refuses the type."""
+    """(solid) -> the clipping `Plan`; without it `clip_segments` refuses the type."""
     planes: Callable[[Any, Any], Any] | None = None
-    """(solid, check) -> the integer rows that polygons are clipped by."""
+    """(solid, check) -> the integer plane rows to which polygons are clipped."""
     kind: BodyKind = BodyKind.OTHER
     """The table of scenes that it is in."""
     meets: Mapping[int, str] = field(default_factory=dict)
@@ -89,18 +90,18 @@ class Row:
 
     @property
     def name(self) -> str:
-        """What JSON and messages call the type."""
+        """Name of the type in JSON and messages."""
         return self.solid.type
 
     @property
     def is_convex(self) -> bool:
-        """Whether it leaves at most one piece of a segment for certain."""
+        """Whether a segment has at most one piece for certain."""
         return self.kind in (BodyKind.BALL, BodyKind.ROWS, BodyKind.BOX)
 
 
 _ROWS: Final[dict[str, Row]] = {}
 solid_types: Final[Mapping[str, Row]] = MappingProxyType(_ROWS)
-"""The rows by the name of their type, in the order in which messages name them."""
+"""The rows by the name of their type, in the order of messages."""
 _BY_CLASS: Final[dict[type, Row]] = {}
 
 
@@ -114,40 +115,39 @@ def register(row: Row) -> None:
 
 
 def row_of(solid: object) -> Row:
-    """Return the row of a solid, that of the class it inherits from where its own has none; else an empty one."""
+    """Return the row of a solid's class or of the class it inherits from; an empty row for others."""
     rows = (_BY_CLASS[kind] for kind in type(solid).__mro__ if kind in _BY_CLASS)
     return _BY_CLASS.get(type(solid)) or next(rows, _NO_ROW)
 
 
 def names(takes: Callable[[Row], object]) -> str:
-    """Return the names of the types whose row has something, as a sentence lists them."""
+    """Return the names of the types whose row has a cell, as a sentence lists them."""
     taken = [row.name for row in _ROWS.values() if takes(row)]
     return f"{', '.join(taken[:-1])} or {taken[-1]}" if len(taken) > 1 else "".join(taken)
 
 
 def kind_of(solid: object) -> str:
-    """Return what a message calls a solid, or what is given in place of one."""
+    """Return the name of a solid's type, or of a value given in its place, for messages."""
     return solid.type if isinstance(solid, Solid) else f"{type(solid).__name__}, which is no solid"
 
 
 def refused(
     solid: object, what: str, takes: Callable[[Row], object], more: str = "", where: Where = ()
 ) -> UnsupportedSolidError:
-    """Return the error for a solid that an operation does not take; what: the sentence up to the solid."""
+    """Return the error for a solid that an operation refuses; what: the sentence up to the solid."""
     kind = kind_of(solid)
     article = "an" if kind[0] in "aeiou" else "a"
     return UnsupportedSolidError(f"{what} {article} {kind}; give a {names(takes)}{more}", where)
 
 
 def own_box(solid: Solid, check: Callable[[], object] | None = None) -> Box:
-    """Return the box of a solid where it stands, infinite where it may have no bounds; check: as for
-    `Solid.prepared`."""
+    """Return the box of a solid without a pose, infinite if it may be unbounded; check: as for `Solid.prepared`."""
     box = row_of(solid).box
     return unbounded(solid) if box is None else box(solid, check)
 
 
 def unbounded(solid: Solid) -> Box:
-    """Return the box of what may reach to infinity."""
+    """Return an infinite box."""
     return np.full(solid.dimension, -np.inf), np.full(solid.dimension, np.inf), np.inf
 
 

@@ -39,7 +39,7 @@ from service.wire import Series, series_of
 from service.work import Call
 
 SHORT: Final = 12
-"""Vertices of a ring up to which lists are written faster than an array, and rings that are made at once."""
+"""Vertices of a ring up to which lists are written faster than an array, and rings per part."""
 _BOUNDARY: Final = int(engine.Location.BOUNDARY)  # numpy compares with an enum's member more slowly
 
 
@@ -56,7 +56,7 @@ def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
 
 
 def from_stored(name: str, solid: Solid, collapsed: int | None = None) -> StoredSolidSummary:
-    """Return what the store says of a solid; collapsed: triangles that were left out of its file."""
+    """Return the store's answer about a solid; collapsed: triangles that were left out of its file."""
     counts = {field: len(getattr(solid, field)) for field in ("planes", "powers", "operands") if hasattr(solid, field)}
     if isinstance(solid, engine.Polygon):
         counts["rings"] = len(solid.ring_offsets) - 1
@@ -82,18 +82,18 @@ def from_locations(locations: Any, accuracy: engine.Accuracy) -> ContainsRespons
     )
 
 
-def from_scene_locations(found: engine.SceneLocations, accuracy: engine.Accuracy) -> ContainsSceneResponse:
+def from_scene_locations(located: engine.SceneLocations, accuracy: engine.Accuracy) -> ContainsSceneResponse:
     """Return the answer of `contains/scene`: ragged arrays as lists of lists."""
-    offsets, n_points = found.offsets, len(found.offsets) - 1
+    offsets, n_points = located.offsets, len(located.offsets) - 1
 
     def bodies(start: int, stop: int) -> list[Any]:
-        return _split(found.indices[offsets[start] : offsets[stop]], offsets[start : stop + 1])
+        return _split(located.indices[offsets[start] : offsets[stop]], offsets[start : stop + 1])
 
     def boundary(start: int, stop: int) -> list[Any]:
-        held = slice(offsets[start], offsets[stop])
-        before = np.concatenate([[0], np.cumsum(found.on_boundary[held])])
-        kept = found.indices[held][found.on_boundary[held]]
-        return _split(kept, before[offsets[start : stop + 1] - offsets[start]])
+        span = slice(offsets[start], offsets[stop])
+        before = np.concatenate([[0], np.cumsum(located.on_boundary[span])])
+        bodies_on_boundary = located.indices[span][located.on_boundary[span]]
+        return _split(bodies_on_boundary, before[offsets[start : stop + 1] - offsets[start]])
 
     return ContainsSceneResponse.made(
         bodies=Series(n_points, bodies, offsets=offsets),
@@ -107,20 +107,20 @@ def _split(items: Any, offsets: Any) -> list[list[int]]:
     return [flat[start:stop] for start, stop in pairwise(ends)]
 
 
-def from_bounds(found: engine.Bounds, accuracy: engine.Accuracy) -> BoundsResponse:
+def from_bounds(volumes: engine.Bounds, accuracy: engine.Accuracy) -> BoundsResponse:
     """Return the answer of `bounds`."""
     return BoundsResponse.made(
-        aabb=AabbBounds.made(min=found.aabb.min, max=found.aabb.max),
-        sphere=SphereBounds.made(center=found.sphere.center, radius=found.sphere.radius),
+        aabb=AabbBounds.made(min=volumes.aabb.min, max=volumes.aabb.max),
+        sphere=SphereBounds.made(center=volumes.sphere.center, radius=volumes.sphere.radius),
         accuracy=from_accuracy(accuracy),
     )
 
 
-def from_comparison(found: engine.Comparison, accuracy: engine.Accuracy) -> CompareResponse:
+def from_comparison(comparison: engine.Comparison, accuracy: engine.Accuracy) -> CompareResponse:
     """Return the answer of `compare`."""
     names = ("method", "differing", "inexact", "seconds_exact", "seconds_plain")
-    same = {name: getattr(found, name) for name in names}
-    return CompareResponse.made(methods=list(found.methods), accuracy=from_accuracy(accuracy), **same)
+    same = {name: getattr(comparison, name) for name in names}
+    return CompareResponse.made(methods=list(comparison.methods), accuracy=from_accuracy(accuracy), **same)
 
 
 def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> ClipSegmentsResponse:
@@ -133,7 +133,7 @@ def from_pieces(pieces: engine.SegmentPieces, accuracy: engine.Accuracy) -> Clip
 
 
 def _rows(names: tuple[str, ...], columns: Iterable[Any]) -> Callable[[int, int], list[Any]]:
-    """Return what makes some rows of arrays, each an object."""
+    """Return a function that makes rows start .. stop of columns, each an object."""
 
     def some(start: int, stop: int) -> list[Any]:
         return [dict(zip(names, row)) for row in zip(*(column[start:stop].tolist() for column in columns))]
@@ -158,9 +158,9 @@ def from_line_pieces(pieces: engine.LinePieces, accuracy: engine.Accuracy) -> Cl
 
 
 def rings_of(vertices: Any, offsets: Any, is_closed: bool = False) -> list[Any]:
-    """Return consecutive rings, or lines, as they are written; closed: as GeoJSON has them, the first position again.
+    """Return consecutive rings, or lines, for the answer; is_closed: repeat the first position, as in GeoJSON.
 
-    offsets: where they begin among ``vertices``, and where the last ends.
+    offsets: of the rings in ``vertices``.
     """
     vertices, ends = vertices[offsets[0] : offsets[-1]], (offsets - offsets[0]).tolist()
     if len(vertices) < SHORT * len(ends):  # order: an array for each would take longer than its few numbers
@@ -179,9 +179,9 @@ def from_collision(collision: engine.Collision, accuracy: engine.Accuracy) -> Co
     )
 
 
-def from_pose_collisions(found: Any, accuracy: engine.Accuracy, witness: bool) -> CollideResponse:
-    """Return the answer of `collide` for many poses: relations, witnesses if asked for, details if asked for."""
-    relations, *rest = found if isinstance(found, tuple) else (found,)
+def from_pose_collisions(results: Any, accuracy: engine.Accuracy, witness: bool) -> CollideResponse:
+    """Return the answer of `collide` for many poses: relations, and witnesses and details if requested."""
+    relations, *rest = results if isinstance(results, tuple) else (results,)
     witnesses = rest.pop(0) if witness else [None] * len(relations)
     details = rest[0] if rest else None
 
@@ -197,7 +197,7 @@ def from_pose_collisions(found: Any, accuracy: engine.Accuracy, witness: bool) -
 
 
 def _details(codes: Any, start: int, stop: int) -> list[engine.Rcc8 | None]:
-    """Return the relations of RCC-8 of some pairs: None where none was asked for (codes None), or none is."""
+    """Return the RCC-8 relations of some pairs: None if not requested (codes None), or undefined."""
     if codes is None:
         return [None] * (stop - start)
     return [None if code < 0 else engine.Rcc8(code) for code in codes[start:stop].tolist()]
@@ -226,29 +226,29 @@ def _witness(witness: engine.Witness) -> dict[str, Any]:
     return answer
 
 
-def from_clearances(found: Any, accuracy: engine.Accuracy, are_bools: bool) -> ClearanceResponse:
+def from_clearances(measured: Any, accuracy: engine.Accuracy, are_bools: bool) -> ClearanceResponse:
     """Return the answer of `clearance`: of one pair, or distances or bools of many poses."""
     if are_bools:
         return ClearanceResponse.made(
-            clearances=None, clear=np.asarray(found, np.bool_), accuracy=from_accuracy(accuracy)
+            clearances=None, clear=np.asarray(measured, np.bool_), accuracy=from_accuracy(accuracy)
         )
 
     def some(start: int, stop: int) -> list[Any]:
         return [
             _clearance(item if isinstance(item, engine.Clearance) else engine.Clearance(float(item)))
-            for item in found[start:stop]
+            for item in measured[start:stop]
         ]
 
     return ClearanceResponse.made(
-        clearances=Series(len(found), some, weight=4), clear=None, accuracy=from_accuracy(accuracy)
+        clearances=Series(len(measured), some, weight=4), clear=None, accuracy=from_accuracy(accuracy)
     )
 
 
-def _clearance(found: engine.Clearance) -> ClearanceAnswer:
-    features = found.features and [
-        ClearanceFeature.made(kind=feature.kind, indices=list(feature.indices)) for feature in found.features
+def _clearance(clearance: engine.Clearance) -> ClearanceAnswer:
+    features = clearance.features and [
+        ClearanceFeature.made(kind=feature.kind, indices=list(feature.indices)) for feature in clearance.features
     ]
-    return ClearanceAnswer.made(distance=found.distance, points=found.points, features=features)
+    return ClearanceAnswer.made(distance=clearance.distance, points=clearance.points, features=features)
 
 
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> CollideSceneResponse:
@@ -257,35 +257,37 @@ def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> Col
     columns = (pairs.first, pairs.second, pairs.relation)
 
     def some(start: int, stop: int) -> list[Any]:
-        found = [
+        rows = [
             {"first": first, "second": second, "relation": labels[code]}
             for first, second, code in zip(*(column[start:stop].tolist() for column in columns))
         ]
-        for pair, detail in zip(found, _details(pairs.detail, start, stop)):
+        for pair, detail in zip(rows, _details(pairs.detail, start, stop)):
             if detail is not None:
                 pair["detail"] = detail.label
         if pairs.distance is not None:
-            for pair, distance in zip(found, pairs.distance[start:stop].tolist()):
+            for pair, distance in zip(rows, pairs.distance[start:stop].tolist()):
                 pair["distance"] = distance
-        return found
+        return rows
 
     return CollideSceneResponse.made(pairs=Series(len(pairs.first), some, weight=4), accuracy=from_accuracy(accuracy))
 
 
 def from_stored_scene(name: str, scene: Scene) -> StoredSceneSummary:
-    """Return what the store says of a scene."""
+    """Return the store's answer about a scene."""
     return StoredSceneSummary.made(id=name, dimension=scene.solids[0].dimension, bodies=len(scene), memory=scene.memory)
 
 
 def clipped_in_scene(scene: Scene, segments: Any, keep: Keep | None, call: Call) -> ClipSegmentsSceneResponse:
-    """Return what of segments lies within which body."""
+    """Return the answer of `clip/segments/scene`."""
     if len(scene):
         segments = questions.to_items(segments, scene.solids[0].dimension)
-    found, accuracy = call.compute(scene.clip_segments, segments, keep=keep or "all", retold=questions.tell_of_scene)
-    if isinstance(found, np.ndarray):
-        return ClipSegmentsSceneResponse.made(pieces=None, met=found, accuracy=from_accuracy(accuracy))
+    clipped, accuracy = call.compute(
+        scene.clip_segments, segments, keep=keep or "all", rewrite_error=questions.rewrite_error_paths_for_scene
+    )
+    if isinstance(clipped, np.ndarray):
+        return ClipSegmentsSceneResponse.made(pieces=None, met=clipped, accuracy=from_accuracy(accuracy))
     names = ("source", "body", "start", "end", "t", "faces", "ranks")
-    some = _rows(("segment", *names[1:]), [getattr(found, name) for name in names])
+    some = _rows(("segment", *names[1:]), [getattr(clipped, name) for name in names])
     return ClipSegmentsSceneResponse.made(
-        pieces=Series(len(found), some, weight=12), met=None, accuracy=from_accuracy(accuracy)
+        pieces=Series(len(clipped), some, weight=12), met=None, accuracy=from_accuracy(accuracy)
     )

@@ -28,32 +28,32 @@ _NUMBER_BYTES: Final = 10
 """Bytes of text that are made and written about as fast as a number."""
 
 
-def from_features(found: Any, accuracy: engine.Accuracy, call: Call) -> LayersResponse:
-    """Return an answer about layers, as GeoJSON."""
+def from_features(layer: Any, accuracy: engine.Accuracy, call: Call) -> LayersResponse:
+    """Return the answer of the layer operations, as GeoJSON."""
     call.media_type = "application/geo+json"
     call.instead = "send fewer features at once, or fewer or shorter properties"
 
     def features(start: int, stop: int) -> list[Any]:
         return [
-            wire.Raw(b'{"type":"Feature",%b,"geometry":%b}' % (found.members(row), _geometry(found, row, call)))
+            wire.Raw(b'{"type":"Feature",%b,"geometry":%b}' % (layer.members(row), _geometry(layer, row, call)))
             for row in range(start, stop)
         ]
 
-    n_bytes = found.n_bytes
+    n_bytes = layer.n_bytes
     return LayersResponse.made(
         type="FeatureCollection",
-        crs=None if found.crs_text is None else wire.Raw(found.crs_text),
-        features=Series(len(found), features, weight=10, offsets=n_bytes // _NUMBER_BYTES, least=int(n_bytes[-1])),
-        collapsed=found.collapsed,
+        crs=None if layer.crs_text is None else wire.Raw(layer.crs_text),
+        features=Series(len(layer), features, weight=10, offsets=n_bytes // _NUMBER_BYTES, least=int(n_bytes[-1])),
+        collapsed=layer.collapsed,
         accuracy=from_accuracy(accuracy),
     )
 
 
-def _geometry(found: Any, row: int, call: Call) -> bytes:
-    """Return the geometry of a feature, however many parts and rings it has."""
-    if found.areas is None:
-        return bytes(found.geometry(row))
-    positions, (rings, pieces, ends) = found.areas
+def _geometry(layer: Any, row: int, call: Call) -> bytes:
+    """Return the geometry of a feature, of any number of parts and rings."""
+    if layer.areas is None:
+        return bytes(layer.geometry(row))
+    positions, (rings, pieces, ends) = layer.areas
     first, last = ends[row : row + 2].tolist()
 
     def somerings_of(start: int, stop: int) -> list[Any]:
@@ -75,7 +75,7 @@ def _geometry(found: Any, row: int, call: Call) -> bytes:
 
 
 def from_overlay(result: engine.Overlay, accuracy: engine.Accuracy, area: bool | None) -> OverlayResponse:
-    """Return the answer of `overlay`; area: whether it was asked for, None for where it costs next to nothing."""
+    """Return the answer of `overlay`; area: whether it is requested, None for only if it costs next to nothing."""
     wants_area = len(result.vertices) <= _FREE_AREA if area is None else area
     rings = result.ring_offsets
 
@@ -130,7 +130,7 @@ def from_overlays(batch: engine.OverlayBatch, accuracy: engine.Accuracy) -> Over
 
 
 def _overlay_pieces(result: engine.Overlay | engine.OverlayBatch, start: int, stop: int) -> list[Any]:
-    """Return some pieces of an overlay, or of many, as they are written; many holes of one are made in parts."""
+    """Return some pieces of one overlay or of many, for the answer; many holes of one piece are made in parts."""
     ends = result.piece_offsets[start : stop + 1].tolist()
     if ends[-1] - ends[0] <= PART:
         rings = rings_of(result.vertices, result.ring_offsets[ends[0] : ends[-1] + 1], is_closed=True)

@@ -31,14 +31,14 @@ def to_rows(octets: Any, shape: tuple[int, ...]) -> Any:
 
 
 def answer(call: Call, array: Any, accuracy: engine.Accuracy) -> Any:
-    """Return `array`, with its accuracy in the header: a dictionary of structured fields (RFC 8941)."""
+    """Return `array`, with its accuracy in a header: a dictionary of structured fields (RFC 8941)."""
     members = {name: value for name, value in vars(from_accuracy(accuracy)).items() if value is not None}
     call.headers["Geometry-Accuracy"] = ", ".join(f"{name}={value}" for name, value in members.items())
     return array
 
 
 def check_is_convex(region: engine.Solid) -> engine.Solid:
-    """Return `region` if it leaves at most one piece of a segment for certain."""
+    """Return `region` if a segment has at most one piece in it for certain."""
     rows = sorted(engine.solid_types.values(), key=lambda row: row.planes is None)  # those of planes first
     taken = [row.name for row in rows if row.is_convex]
     if region.type not in taken:
@@ -50,7 +50,7 @@ def check_is_convex(region: engine.Solid) -> engine.Solid:
 
 
 def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int, call: Call) -> Any:
-    """Return both ends of what remains of each segment, NaN where nothing does."""
+    """Return both ends of the piece of each segment, NaN if it has none."""
     call.take(16 * n_segments * dimension)
     ends = np.full((n_segments, 2, dimension), np.nan)
     ends[pieces.source, 0] = pieces.start
@@ -69,16 +69,16 @@ def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Cal
         return mesh.solid(engine.Polyhedron if solid_type == "polyhedron" else engine.Surface), mesh.n_collapsed
 
 
-def from_scene_pieces(found: Any, call: Call) -> Any:
+def from_scene_pieces(pieces: Any, call: Call) -> Any:
     """Return pieces as rows of float64, or whether each segment meets a body as int8."""
-    if isinstance(found, np.ndarray):
-        return found.astype(np.int8)
-    call.take(8 * len(found) * (4 + 2 * found.start.shape[1]))
-    return np.column_stack([found.source, found.body, found.t, found.start, found.end])
+    if isinstance(pieces, np.ndarray):
+        return pieces.astype(np.int8)
+    call.take(8 * len(pieces) * (4 + 2 * pieces.start.shape[1]))
+    return np.column_stack([pieces.source, pieces.body, pieces.t, pieces.start, pieces.end])
 
 
-def from_locations(found: engine.SceneLocations, call: Call) -> Any:
+def from_locations(located: engine.SceneLocations, call: Call) -> Any:
     """Return rows of point, body and location."""
-    call.take(24 * len(found.indices))
-    points = np.repeat(np.arange(len(found.offsets) - 1), np.diff(found.offsets))
-    return np.column_stack([points, found.indices, 1 - found.on_boundary.astype(np.int64)])
+    call.take(24 * len(located.indices))
+    points = np.repeat(np.arange(len(located.offsets) - 1), np.diff(located.offsets))
+    return np.column_stack([points, located.indices, 1 - located.on_boundary.astype(np.int64)])

@@ -30,7 +30,7 @@ def to_solid(model: solids.Solid, call: Call, where: Where) -> Solid:
 
 
 class _Builder:
-    """Builds one solid; counts the members of CSG trees on the way."""
+    """Builds one solid and counts the members of its CSG tree."""
 
     def __init__(self, call: Call) -> None:
         self._call = call
@@ -57,7 +57,7 @@ class _Builder:
         return _checked(where, lambda: _made(member))
 
     def _count(self, n_nodes: int, depth: int, where: Where) -> None:
-        """Count so many solids more of the whole tree, what stands in stored ones included."""
+        """Count n_nodes more solids of the whole tree, members of stored ones included."""
         settings = self._call.settings
         self._call.remaining()
         self._n_nodes += n_nodes
@@ -83,14 +83,14 @@ def _checked(where: Where, build: Callable[[], T]) -> T:
 
 
 def _made(member: Any) -> Solid:
-    """Return the solid of a model whose fields are its constructor's."""
+    """Return the solid of a model whose fields are its constructor's arguments."""
     row = engine.solid_types[member.type]
     fields = {name: getattr(member, name) for name in row.fields}
     return row.solid(**{name: _plain(value) for name, value in fields.items()})
 
 
 def _plain(value: Any) -> Any:
-    """Return models within a list as the mappings that constructors take."""
+    """Return models within a list as mappings, which constructors accept."""
     if isinstance(value, list) and value and isinstance(value[0], BaseModel):
         return [{name: getattr(item, name) for name in type(item).model_fields} for item in value]
     return value
@@ -98,16 +98,16 @@ def _plain(value: Any) -> Any:
 
 def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[engine.Pose] | None]:
     """Return the solids of a scene and their poses (None where no body has one)."""
-    found = [to_solid(body.solid, call, ("bodies", i_body, "solid")) for i_body, body in enumerate(models)]
+    made = [to_solid(body.solid, call, ("bodies", i_body, "solid")) for i_body, body in enumerate(models)]
     if all(body.pose is None for body in models):
-        return found, None
+        return made, None
     poses = [
         to_pose(body.pose, ("bodies", i_body, "pose"))
         if body.pose is not None
         else engine.Pose.identity(solid.dimension)
-        for i_body, (body, solid) in enumerate(zip(models, found))
+        for i_body, (body, solid) in enumerate(zip(models, made))
     ]
-    return found, poses
+    return made, poses
 
 
 def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
@@ -135,22 +135,22 @@ def to_poses(models: list[solids.RigidPose], dimension: int) -> tuple[Any, Any]:
 
 
 def to_items(array: Any, dimension: int) -> Any:
-    """Return `array`; an empty list has no dimension of its own in JSON, so it takes the solid's."""
+    """Return `array`; an empty JSON list has no dimension of its own, so it gets the solid's."""
     return array if array.size else np.empty((0, *array.shape[1:-1], dimension))
 
 
-def tell_of_scene(error: EngineError) -> None:
-    """Make an error speak of `bodies`, where solids and poses stand together."""
-    _tell(error, "bodies", {"solids": "solid", "poses": "pose"})
+def rewrite_error_paths_for_scene(error: EngineError) -> None:
+    """Rewrite engine argument paths (`solids`, `poses`) to request paths (`bodies`)."""
+    _rewrite_error_paths(error, "bodies", {"solids": "solid", "poses": "pose"})
 
 
-def tell_of_poses(error: EngineError) -> None:
-    """Make an error speak of `poses`, each of a rotation and a translation."""
-    _tell(error, "poses", {"rotations": "rotation", "translations": "translation"})
+def rewrite_error_paths_for_poses(error: EngineError) -> None:
+    """Rewrite engine argument paths (`rotations`, `translations`) to request paths (`poses`)."""
+    _rewrite_error_paths(error, "poses", {"rotations": "rotation", "translations": "translation"})
 
 
-def _tell(error: EngineError, name: str, parts: dict[str, str]) -> None:
-    """Turn an argument's name, in the path and in the sentence, into that of a list whose items have such parts."""
+def _rewrite_error_paths(error: EngineError, name: str, parts: dict[str, str]) -> None:
+    """Rewrite an argument's name, in path and message, to the list `name` whose items have these parts."""
     where = error.where
     if where and where[0] in parts:
         error.where = (name, where[1], parts[str(where[0])], *where[2:]) if len(where) > 1 else (name,)
@@ -159,7 +159,7 @@ def _tell(error: EngineError, name: str, parts: dict[str, str]) -> None:
 
 
 def existing(question: Any, where: Where) -> Where:
-    """Return `where` as far as the request has it: an engine's error may lead into a solid that is only named there."""
+    """Return `where` as far as the request has it: an engine's error may lead into a stored solid."""
     value, path = question, []
     for part in where:
         value = value.root if isinstance(value, RootModel) else value
@@ -172,7 +172,7 @@ def existing(question: Any, where: Where) -> Where:
 
 
 def is_light(question: Any) -> bool:
-    """Tell whether a small `question` is sure to be answered in less time than a change of threads takes."""
+    """Return whether a small `question` certainly takes less time than a change of threads."""
     if isinstance(question, (ContainsRequest, BoundsRequest)):
         return question.solid.root.type in _LIGHT_SOLIDS
     if isinstance(question, ClipSegmentsRequest):
@@ -191,12 +191,12 @@ def to_scene(bodies: list[Body], call: Call) -> Scene:
         try:
             return Scene(solids, poses)
         except EngineError as error:
-            tell_of_scene(error)
+            rewrite_error_paths_for_scene(error)
             raise
 
 
 def to_moved(scene: Scene, moved: list[MovedBody] | None, call: Call) -> Scene:
-    """Return a scene with some of its bodies elsewhere."""
+    """Return a scene with some of its bodies moved."""
     if not moved:
         return scene
     poses: dict[int, engine.Pose | None] = {}
@@ -219,7 +219,7 @@ def to_moved(scene: Scene, moved: list[MovedBody] | None, call: Call) -> Scene:
 
 
 def read_moved(text: str, call: Call) -> list[MovedBody]:
-    """Return what moved, from the query of the binary lane."""
+    """Return the moved bodies, from the query of the binary lane."""
     try:
         return _MOVED.validate_json(text, context=call)
     except ValidationError as error:

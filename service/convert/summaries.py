@@ -1,4 +1,4 @@
-"""Answers in short, for a language model: of each list how long it is and some of its items."""
+"""Short answers for language models: of each list its length and some of its items."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from service.errors import ServiceError
 from service.wire import Poll, Raw, Series, encode, no_poll
 
 MOST: Final = 2**20
-"""Bytes of what is shown of an answer."""
+"""Largest short answer in bytes."""
 _LONG: Final = 1000
 """Letters of a text that are shown."""
 
@@ -24,18 +24,18 @@ def summary(answer: Any, show: int, start: int, poll: Poll = no_poll) -> dict[st
     >>> summary({"contained": [True, False, True], "accuracy": {"items": 3}}, 1, 0)
     {'contained': {'count': 3, 'true': 2, 'items': [True]}, 'accuracy': {'items': 3}}
     """
-    found: dict[str, Any] = {}
+    short: dict[str, Any] = {}
     size, most = 0, max(show, 3)
     for name, value in (answer if isinstance(answer, dict) else vars(answer)).items():
         if value is None:
             continue
         if not isinstance(value, (list, np.ndarray, Series)):
-            found[name] = _cut(value, most)
+            short[name] = _cut(value, most)
             continue
         series = value if isinstance(value, Series) else Series(len(value), partial(_slice, value))
-        told: dict[str, Any] = {"count": series.n}
+        about: dict[str, Any] = {"count": series.n}
         if series is not value and series.n and _are_bools(value):
-            told["true"] = int(np.count_nonzero(np.asarray(value)))
+            about["true"] = int(np.count_nonzero(np.asarray(value)))
         items: list[Any] = []
         for first, last in series.cuts(start, start + show):
             poll()
@@ -43,8 +43,8 @@ def summary(answer: Any, show: int, start: int, poll: Poll = no_poll) -> dict[st
             size += len(encode(items[first - start :]))
             if size > MOST:
                 raise ServiceError("answer_too_large", f"the items take more than {MOST} bytes; show fewer")
-        found[name] = {**told, "items": items}
-    return found
+        short[name] = {**about, "items": items}
+    return short
 
 
 def _slice(items: Any, start: int, stop: int) -> Any:
@@ -58,7 +58,7 @@ def _are_bools(items: Any) -> bool:
 
 
 def _cut(value: Any, show: int) -> Any:
-    """Return a value of an answer with its own lists cut short, and its long texts."""
+    """Return a value of an answer with its own lists and long texts shortened."""
     if isinstance(value, Raw):
         value = json.loads(value.text)
     if isinstance(value, BaseModel):

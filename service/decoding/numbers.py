@@ -1,4 +1,4 @@
-"""One long array of numbers out of its text, in pieces of 64 kilobytes.
+"""Decodes one long array of numbers from its text, in pieces of 64 kilobytes.
 
 simdjson holds the interpreter's lock while it parses, and a piece keeps it for less than a millisecond. If ``[A]`` and
 ``[B]`` are JSON, so is ``[A,B]``, with their items one after another; hence a cut is right wherever both sides parse.
@@ -6,7 +6,7 @@ simdjson holds the interpreter's lock while it parses, and a piece keeps it for 
 simdjson's buffer of a nested array is flat and says nothing of the rows. The brackets and commas of the text do: they
 are compared with those that the shape of the first rows asks for. Integers that float64 cannot hold would be rounded
 there, so pieces with numbers from 2**53 on are looked at one number at a time. Rings of several lengths become an array
-each: how long each is, the brackets and commas tell alone.
+each: the brackets and commas alone give their lengths.
 
 A point of two numbers is ``[,]`` there. With a dot for each, rings read ``[[.,.,.],[.,.,.,.]]``, and polygons are lists
 of such. Nothing is looked at point by point: two rings of one length have one text.
@@ -26,11 +26,11 @@ import numpy as np
 import simdjson
 
 COST: Final = 300
-"""Bytes that the arrays of a ring take beside its numbers."""
+"""Bytes of a ring's array besides its numbers."""
 
 
 class Unfit(Exception):
-    """The text, or an array in it, is none that is taken here."""
+    """The text, or an array in it, is not one that this decoder handles."""
 
 
 def lengths_of(tokens: bytes, depth: int) -> tuple[int, list[list[int]]]:
@@ -60,22 +60,22 @@ def lengths_of(tokens: bytes, depth: int) -> tuple[int, list[list[int]]]:
 
 def cut(rows: Any, groups: list[list[int]], depth: int) -> list[Any]:
     """Return the rings, views of `rows`; at depth 4 a list of them for each polygon."""
-    found, start = [], 0
+    polygons, start = [], 0
     for lengths in groups:
         rings = []
         for length in lengths:
             rings.append(rows[start : start + length])
             start += length
-        found.append(rings)
-    return found if depth == 4 else [ring for rings in found for ring in rings]
+        polygons.append(rings)
+    return polygons if depth == 4 else [ring for rings in polygons for ring in rings]
 
 
 PIECE: Final = 2**16
-"""Bytes parsed at once: 0.2 ms, and text and result stay in the processor's cache."""
+"""Bytes per piece: 0.2 ms, and text and result stay in the processor's cache."""
 LONGEST: Final = 2**22
 """Bytes of the longest piece: 10 ms."""
 _SEARCHED: Final = 2**19
-"""Bytes searched at once: two milliseconds."""
+"""Bytes searched per step: two milliseconds."""
 EXACT_INTEGERS: Final = 2**53
 
 _DEEPEST: Final = 4
@@ -85,7 +85,7 @@ _NO_TOKENS: Final = bytes(set(range(256)) - set(b"[],"))
 
 
 class Decoder:
-    """Turns the text of one array into an ndarray, or lists of them."""
+    """Decodes the text of one array into an ndarray, or lists of them."""
 
     def __init__(self, take: Callable[[int], object], poll: Callable[[], object]) -> None:
         self._take, self._poll = take, poll
@@ -95,12 +95,12 @@ class Decoder:
         self._ends: list[tuple[int, int]] = []  # of each piece: where its text ends, and how many numbers there were
 
     def array(self, text: memoryview) -> Any:
-        """Return the array that `text` stands for; rings of several lengths as a list of arrays, or a list of such."""
-        found = _OPENING.match(text)
+        """Return the array of `text`; rings of several lengths as a list of arrays, or a list of such."""
+        brackets = _OPENING.match(text)
         inner = bytes(text[-64:]).rstrip()
-        if found is None or not inner.endswith(b"]"):
+        if brackets is None or not inner.endswith(b"]"):
             raise Unfit
-        depth = found[0].count(b"[")
+        depth = brackets[0].count(b"[")
         if depth > _DEEPEST:
             raise Unfit
         stop = len(text) - len(bytes(text[-64:])) + len(inner) - 1
@@ -154,16 +154,17 @@ class Decoder:
         return cut(rows, groups, depth)
 
     def _checked(self, text: memoryview, depth: int) -> Any:
-        """Return the numbers found, unless one is not what the text says."""
+        """Return the decoded numbers, unless an integer differs from its text."""
         numbers = self._numbers[: self._n_numbers]
         if numbers.dtype.kind == "f" and not _is_exact(numbers):
             self._check_integers(text, numbers, depth)
         return numbers
 
     def _piece(self, text: bytes, depth: int, n_pieces: float) -> list[int]:
-        """Put the numbers of a piece after those found, and return their shape; n_pieces: how many are left, roughly.
+        """Append the numbers of a piece, and return their shape; n_pieces: estimated number of remaining pieces.
 
-        Nothing here lets other threads run, or calls for it: to get the interpreter back takes as long as a piece.
+        No other thread runs meanwhile, and nothing here requests it: getting the interpreter back takes as long as a
+        piece.
         """
         try:
             array: Any = self._parser.parse(text)
@@ -181,7 +182,7 @@ class Decoder:
         return shape
 
     def _append(self, array: Any, n_pieces: float) -> None:
-        """Put the numbers of `array` after those found: pieces of memory kept to the end would hold up all threads."""
+        """Append the numbers of `array`; pieces stored separately to the end would block all threads when freed."""
         kind = self._numbers.dtype.kind
         try:
             piece = memoryview(array.as_buffer(of_type="d" if kind == "f" else "i")).cast("B")
@@ -201,7 +202,7 @@ class Decoder:
         self._n_numbers = end
 
     def _check_integers(self, text: memoryview, numbers: Any, depth: int) -> None:
-        """Raise unless integers in `text` are the `numbers` that stand for them, in the pieces that have large ones."""
+        """Raise unless the integers in `text` equal the decoded `numbers`, for pieces with large ones."""
         start, n_before = 1, 0
         for end, n_numbers in self._ends:
             here = numbers[n_before:n_numbers]
@@ -209,13 +210,13 @@ class Decoder:
                 level = jiter.from_json(b"".join((b"[", text[start:end], b"]")))
                 for _ in range(depth - 1):
                     level = list(chain.from_iterable(level))
-                if any(type(value) is int and int(held) != value for value, held in zip(level, here.tolist())):
+                if any(type(value) is int and int(number) != value for value, number in zip(level, here.tolist())):
                     raise Unfit
             start, n_before = end + 1, n_numbers
 
 
 def _pieces(text: memoryview, depth: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Yield where pieces of the text of an array begin and end, each some whole items of the outermost list."""
+    """Yield start and stop of the pieces of an array's text, each some whole items of the outermost list."""
     start = 1
     while start < stop:  # bound: each turn takes an item at least
         end = _cut(text, depth, start + PIECE, stop)
@@ -226,12 +227,14 @@ def _pieces(text: memoryview, depth: int, stop: int) -> Iterator[tuple[int, int]
 
 
 def _cut(text: memoryview, depth: int, start: int, stop: int) -> int:
-    """Return where an item of the outermost list ends next, `stop` if nowhere; in steps, so that no other thread waits
-    long. One that ends in so many blanks that a step ends within may be missed."""
+    """Return the end of the next item of the outermost list, `stop` if there is none; in steps.
+
+    An item followed by so many blanks that a step ends within them may be missed.
+    """
     for at in range(start, stop, _SEARCHED):
-        found = _CUTS[depth].search(text, at, min(at + _SEARCHED + PIECE, stop))
-        if found is not None:
-            return found.end() - 1
+        comma = _CUTS[depth].search(text, at, min(at + _SEARCHED + PIECE, stop))
+        if comma is not None:
+            return comma.end() - 1
     return stop
 
 
@@ -248,5 +251,5 @@ def _tokens(shape: list[int]) -> bytes:
 
 
 def _is_exact(numbers: Any) -> bool:
-    """Tell whether all are small enough to be exact as int64 and as float64."""
+    """Return whether all are small enough to be exact as int64 and as float64."""
     return not numbers.size or bool(max(numbers.max(), -numbers.min()) < EXACT_INTEGERS)

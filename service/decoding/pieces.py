@@ -1,4 +1,4 @@
-"""JSON text into Python values piece by piece, so that no other thread waits long and a deadline is seen.
+"""Decodes JSON text into Python values piece by piece, so that no other thread waits long and deadlines hold.
 
 jiter, pydantic's own parser, holds the interpreter's lock while it parses: half a second for 30 MB. A long text is cut
 before commas that stand outside strings. A piece is made whole by the brackets that are open before it and after it,
@@ -23,38 +23,37 @@ import numpy as np
 Body = bytes | bytearray | mmap.mmap
 
 PIECE: Final = 2**16
-"""Bytes parsed at once: a millisecond."""
+"""Bytes per piece: a millisecond."""
 LONGEST: Final = 2**20
-"""Bytes that may follow each other without a comma outside strings."""
+"""Largest number of bytes without a comma outside strings."""
 
 NAMES: Final = 4096
-"""Names in one object: more than a table has columns (PostgreSQL takes 1,600, SQLite 2,000), and so few that whatever
-looks at all of them at once is done in a millisecond."""
+"""Largest number of names in one object: more than a table has columns (PostgreSQL 1,600, SQLite 2,000), few enough for
+one millisecond."""
 LONGEST_NAME: Final = 1024
-"""Characters of a name: databases take 64 to 128, and each feature of an answer repeats the names of its properties."""
+"""Largest number of characters of a name: databases take 64 to 128, and each feature of an answer repeats its names."""
 _COSTS: Final = {b"{": 800, b"[": 100, b":": 64, b",": 32, b'"': 16}
-"""Bytes that Python holds for an object and the model of it, a list, a name's place, a number; for a text, of two
-quotes, beside its letters."""
+"""Bytes of an object with its model, a list, an entry of an object, a number; and of a text, per two quotes, besides
+its letters."""
 _STEP: Final = 2**20
-"""Bytes searched at once: some milliseconds."""
+"""Bytes searched per step: some milliseconds."""
 _FREED: Final = 2**12
-"""Items freed at once: some tenths of a millisecond."""
+"""Items freed per step: some tenths of a millisecond."""
 _FLAT: Final = frozenset({str, int, float, bool, type(None)})
 _PLACE: Final = re.compile(r"(.*) at line (\d+) column (\d+)", re.DOTALL)
 _MARK: Final = secrets.token_hex(16)
-"""The name, within a piece, of what an earlier piece began: none that a body could have by intent."""
+"""Name, within a piece, of a value that an earlier piece began: no body has it by intent."""
 _NO_BRACKETS: Final = bytes(set(range(256)) - set(b"[]{}"))
 
 
 class NotJson(ValueError):
-    """The text is no JSON that is taken here; says what and where."""
+    """The text is not accepted as JSON; says what and where."""
 
 
 def decode(text: Body, poll: Callable[[], object] = lambda: None) -> Any:
-    """Return the value that `text` stands for; a name that stands twice in an object is refused.
+    """Return the value of `text`; a name that occurs twice in an object is an error.
 
-    poll: called between pieces; what it raises ends the work.
-    Raises: NotJson.
+    poll: called between pieces; what it raises ends the work. Raises: NotJson.
     """
     pieces = _Pieces()
     start = 0
@@ -69,8 +68,10 @@ def decode(text: Body, poll: Callable[[], object] = lambda: None) -> Any:
 
 
 def cost_of(text: Body) -> int:
-    """Return how many bytes decoding holds at most beyond what is counted for each byte: short lists and objects take
-    far more than their text."""
+    """Return an upper bound on the bytes that decoding needs beyond those counted for each byte.
+
+    Short lists and objects need far more than their text.
+    """
     counts = dict.fromkeys(_COSTS, 0)
     for start in range(0, len(text), _STEP):
         part = text[start : start + _STEP]
@@ -79,8 +80,8 @@ def cost_of(text: Body) -> int:
     return max(0, sum(cost * counts[mark] for mark, cost in _COSTS.items()) - 2 * len(text))
 
 
-def let_go(value: Any) -> None:
-    """Empty a decoded value in steps: to free millions of lists or texts at once holds up all other threads."""
+def free_in_steps(value: Any) -> None:
+    """Empty a decoded value in steps: freeing millions of lists or texts at once blocks all other threads."""
     waiting = [value]
     while waiting:  # bound: each container is emptied once
         container = waiting.pop()
@@ -93,14 +94,14 @@ def let_go(value: Any) -> None:
 
 
 def _is_deep(value: Any) -> bool:
-    """Tell whether there may be too much in a value to free it at once."""
+    """Return whether a value may be too large to be freed in one step."""
     if type(value) is list:
         return len(value) > _FREED or not _FLAT.issuperset(map(type, value))
     return type(value) is dict and not _FLAT.issuperset(map(type, value.values()))
 
 
 def _cut(text: Body, start: int) -> tuple[int, bytes]:
-    """Return where a piece may end, before a comma or with the text, and the brackets in it outside strings."""
+    """Return a possible end of a piece, before a comma or with the text, and the brackets in it outside strings."""
     size = PIECE
     while start + size < len(text):  # bound: it doubles, up to `LONGEST`
         piece = _without_strings(bytes(memoryview(text)[start : start + size]))
@@ -114,7 +115,7 @@ def _cut(text: Body, start: int) -> tuple[int, bytes]:
 
 
 def _still_open(brackets: bytes) -> bytes:
-    """Return those that no later one closes; the parser finds out where they are of two kinds."""
+    """Return the unclosed brackets; the parser checks that kinds match."""
     codes = np.frombuffer(brackets, np.uint8)
     opens = codes & 2 > 0
     depths = np.cumsum(2 * opens.astype(np.int64) - 1)
@@ -123,7 +124,7 @@ def _still_open(brackets: bytes) -> bytes:
 
 
 def _without_strings(piece: bytes) -> bytes:
-    """Return a piece that begins outside of strings, with blanks for what is inside of them."""
+    """Return a piece that begins outside of strings, with blanks for the content of strings."""
     if b'"' not in piece:
         return piece
     codes = np.frombuffer(piece.replace(rb"\\", b"__").replace(rb"\"", b"__"), np.uint8)
@@ -132,9 +133,9 @@ def _without_strings(piece: bytes) -> bytes:
 
 
 def _may_have_long_name(piece: bytes) -> bool:
-    """Tell whether more than `LONGEST_NAME` bytes follow each other without a quote; false only if no name is longer.
+    """Return whether more than `LONGEST_NAME` bytes follow each other without a quote; False only if no name is longer.
 
-    An escaped quote is none; nor is one after an escaped backslash, which makes this true more often.
+    An escaped quote is none; nor is one after an escaped backslash, which makes this True more often.
     """
     if len(piece) <= LONGEST_NAME or b'"' not in piece:
         return False
@@ -150,7 +151,7 @@ def _may_have_long_name(piece: bytes) -> bool:
 
 
 class _Pieces:
-    """What the pieces so far stand for, and what is open at their end."""
+    """The value of the pieces so far, and the lists and objects open at their end."""
 
     def __init__(self) -> None:
         self._open: list[Any] = []  # lists and objects, from the outermost in
@@ -195,15 +196,15 @@ class _Pieces:
                 raise self._wrong(f"an object has more than {NAMES} names at line 1 column 1", piece, 0)
             for name in value:
                 if len(name) > LONGEST_NAME:
-                    found = f"the name {name:.20}... has more than {LONGEST_NAME} letters at line 1 column 1"
-                    raise self._wrong(found, piece, 0)
+                    message = f"the name {name:.20}... has more than {LONGEST_NAME} letters at line 1 column 1"
+                    raise self._wrong(message, piece, 0)
             value = value.values()
         for item in value:
             if isinstance(item, (dict, list)):
                 self._check_names(item, piece)
 
     def _joined(self, value: Any, piece: bytes) -> Any:
-        """Put what a piece adds into what is open, and return the outermost; value: what the piece stands for."""
+        """Merge the value of a piece into the open lists and objects, and return the outermost."""
         if not self._open:
             return value
         part = value
@@ -215,19 +216,19 @@ class _Pieces:
             else:
                 inner = part.pop(_MARK)
                 if twice := container.keys() & part.keys():
-                    found = f"Detected duplicate key {min(twice)!r:.100} at line 1 column 1"
-                    raise self._wrong(found, piece, 0)
+                    message = f"Detected duplicate key {min(twice)!r:.100} at line 1 column 1"
+                    raise self._wrong(message, piece, 0)
                 container |= part
                 if len(container) > NAMES:
                     raise self._wrong(f"an object has more than {NAMES} names at line 1 column 1", piece, 0)
             part = inner
         return self._open[0]
 
-    def _wrong(self, found: str, piece: bytes, n_before: int) -> NotJson:
-        """Return the error for what the parser `found` in a piece, before which `n_before` bytes were put."""
-        place = _PLACE.fullmatch(found)
+    def _wrong(self, message: str, piece: bytes, n_before: int) -> NotJson:
+        """Return the error for the parser's `message` about a piece, before which `n_before` bytes were put."""
+        place = _PLACE.fullmatch(message)
         if place is None:
-            return NotJson(found)
+            return NotJson(message)
         what, line, column = place[1], int(place[2]), int(place[3])
         if line == 1:
             column = max(0, min(column - n_before, len(piece) + 1)) + self._column

@@ -62,8 +62,10 @@ def contains_scene(question: ContainsSceneRequest, call: CallOf) -> ContainsScen
     """List for each point the bodies that hold it, boundary included."""
     solids, poses = questions.to_bodies(question.bodies, call)
     points = questions.to_items(question.points, solids[0].dimension)
-    found = call.compute(engine.locate_scene, points, solids, poses, retold=questions.tell_of_scene)
-    return answers.from_scene_locations(*found)
+    result = call.compute(
+        engine.locate_scene, points, solids, poses, rewrite_error=questions.rewrite_error_paths_for_scene
+    )
+    return answers.from_scene_locations(*result)
 
 
 @router.post("/v1/collide", operation_id="collide", tags=["collision"])
@@ -76,7 +78,7 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
     if question.poses is None:
         return answers.from_collision(*call.compute(engine.collide, first, second, witness=witness, **options))
     rotations, translations = questions.to_poses(question.poses, second.dimension)
-    found = call.compute(
+    result = call.compute(
         engine.collide_poses,
         first,
         second,
@@ -84,9 +86,9 @@ def collide(question: CollideRequest, call: CallOf) -> CollideResponse:
         translations,
         witnesses=witness,
         **options,
-        retold=questions.tell_of_poses,
+        rewrite_error=questions.rewrite_error_paths_for_poses,
     )
-    return answers.from_pose_collisions(*found, witness)
+    return answers.from_pose_collisions(*result, witness)
 
 
 @router.post("/v1/collide/scene", operation_id="collide_scene", tags=["collision"])
@@ -95,8 +97,10 @@ def collide_scene(question: CollideSceneRequest, call: CallOf) -> CollideSceneRe
     solids, poses = questions.to_bodies(question.bodies, call)
     options = {"detail": bool(question.detail), "boolean": bool(question.boolean)}
     named = {"skip": question.skip, "only": question.only, "gap": question.gap}
-    found = call.compute(engine.collide_scene, solids, poses, **named, **options, retold=questions.tell_of_scene)
-    return answers.from_scene_pairs(*found)
+    result = call.compute(
+        engine.collide_scene, solids, poses, **named, **options, rewrite_error=questions.rewrite_error_paths_for_scene
+    )
+    return answers.from_scene_pairs(*result)
 
 
 @router.post("/v1/clearance", operation_id="clearance", tags=["clearance"])
@@ -104,26 +108,26 @@ def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
     """Tell how far apart two bodies are, exactly, for each pose of the second; or whether at least so far."""
     first = questions.to_solid(question.first, call, ("first",))
     second = questions.to_solid(question.second, call, ("second",))
-    found: Any
+    result: Any
     if question.poses is None:
-        found, accuracy = call.compute(engine.clearance, first, second, at_least=question.at_least)
-        found = [found]
+        result, accuracy = call.compute(engine.clearance, first, second, at_least=question.at_least)
+        result = [result]
     else:
         rotations, translations = questions.to_poses(question.poses, second.dimension)
-        found, accuracy = call.compute(
+        result, accuracy = call.compute(
             engine.clearance_poses,
             first,
             second,
             rotations,
             translations,
             at_least=question.at_least,
-            retold=questions.tell_of_poses,
+            rewrite_error=questions.rewrite_error_paths_for_poses,
         )
-        if len(translations) == 1 and question.at_least is None:  # of one pose the points are told, too
+        if len(translations) == 1 and question.at_least is None:  # one pose: with its points
             pose = engine.Pose(rotations[0], translations[0])
-            found, accuracy = call.compute(engine.clearance, first, second, second_pose=pose)
-            found = [found]
-    return answers.from_clearances(found, accuracy, question.at_least is not None)
+            result, accuracy = call.compute(engine.clearance, first, second, second_pose=pose)
+            result = [result]
+    return answers.from_clearances(result, accuracy, question.at_least is not None)
 
 
 @router.post("/v1/clip/segments", operation_id="clip_segments", tags=["clipping"])
@@ -154,8 +158,8 @@ def overlay(question: OverlayRequest, call: CallOf) -> OverlayResponse:
     """Combine two polygons into separate pieces with holes, concave on concave."""
     subject = questions.to_solid(question.subject, call, ("subject",))
     clip = questions.to_solid(question.clip, call, ("clip",))
-    found = call.compute(engine.overlay, subject, clip, question.operation, grid=question.grid)
-    return areas.from_overlay(*found, question.area)
+    result = call.compute(engine.overlay, subject, clip, question.operation, grid=question.grid)
+    return areas.from_overlay(*result, question.area)
 
 
 @router.post("/v1/overlay/batch", operation_id="overlay_batch", tags=["clipping"])
@@ -165,8 +169,8 @@ def overlay_batch(question: OverlayBatchRequest, call: CallOf) -> OverlayBatchRe
         [questions.to_solid(model, call, (name, k)) for k, model in enumerate(models)]
         for name, models in (("subjects", question.subjects), ("clips", question.clips))
     )
-    found = call.compute(engine.overlay_batch, subjects, clips, question.operation)
-    return areas.from_overlays(*found)
+    result = call.compute(engine.overlay_batch, subjects, clips, question.operation)
+    return areas.from_overlays(*result)
 
 
 class GeoJson(JSONResponse):
@@ -181,8 +185,8 @@ _AS: Final[dict[str, Any]] = {"response_class": GeoJson, "response_model": Layer
 @router.post("/v1/layers/overlay", operation_id="overlay_layers", tags=["layers"], **_AS)
 def overlay_layers(question: LayersOverlayRequest, call: CallOf) -> LayersResponse:
     """Overlay two layers, every feature with every one that it meets; attributes of both are kept."""
-    found = call.compute(engine.layers.overlay_features, question.left, question.right, question.operation)
-    return areas.from_features(*found, call)
+    result = call.compute(engine.layers.overlay_features, question.left, question.right, question.operation)
+    return areas.from_features(*result, call)
 
 
 @router.post("/v1/layers/union", operation_id="unite_layer", tags=["layers"], **_AS)
@@ -195,8 +199,8 @@ def unite_layer(question: LayersUnionRequest, call: CallOf) -> LayersResponse:
 def locate_in_layer(question: LayersContainsRequest, call: CallOf) -> LayersResponse:
     """Join points to the features that hold them, boundary included: a row for each such pair."""
     outside = bool(question.outside)
-    found = call.compute(engine.layers.locate_features, question.points, question.polygons, outside=outside)
-    return areas.from_features(*found, call)
+    result = call.compute(engine.layers.locate_features, question.points, question.polygons, outside=outside)
+    return areas.from_features(*result, call)
 
 
 @router.post("/v1/bounds", operation_id="bounds", tags=["bounds"])
@@ -216,10 +220,10 @@ def compare(question: CompareRequest, call: CallOf) -> CompareResponse:
         items: Any = questions.to_solid(values[0], call, names[:1])
     else:
         items = questions.to_items(values[0], solid.dimension)
-    found, accuracy = call.compute(_compared, question.operation, items, solid, method=question.method)
-    return answers.from_comparison(found, accuracy)
+    result, accuracy = call.compute(_compared, question.operation, items, solid, method=question.method)
+    return answers.from_comparison(result, accuracy)
 
 
 def _compared(*arguments: Any, report: bool, **options: Any) -> tuple[engine.Comparison, engine.Accuracy]:
-    found = engine.compare(*arguments, **options)
-    return found, found.accuracy
+    result = engine.compare(*arguments, **options)
+    return result, result.accuracy

@@ -26,7 +26,7 @@ from service.schemas.bodies import (
 )
 from service.schemas.points import ContainsSceneResponse
 from service.schemas.solids import Solid, StoredSolidSummary
-from service.store import Kept
+from service.store import Stored
 from service.work import Call, CallOf
 
 router = router_of()
@@ -52,7 +52,7 @@ def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     return answers.from_stored(put(solid, call), solid)
 
 
-def put(value: Kept, call: Call) -> str:
+def put(value: Stored, call: Call) -> str:
     """Put a solid or a scene into the store, say so, and return its name."""
     name, is_new = call.store.put(value)
     call.status = 201 if is_new else 200
@@ -218,8 +218,8 @@ def contains_stored_scene_binary(scene_id: SceneId, question: Octets, call: Call
     """Locate points, N x dimension little-endian float64, in the bodies of a stored scene."""
     scene = questions.to_moved(call.store.get_scene(scene_id), questions.read_moved(moved, call), call)
     points = octets.to_rows(question, (scene.solids[0].dimension,))
-    found, accuracy = call.compute(scene.locate, points)
-    return octets.answer(call, octets.from_locations(found, call), accuracy)
+    result, accuracy = call.compute(scene.locate, points)
+    return octets.answer(call, octets.from_locations(result, call), accuracy)
 
 
 @scene_binary.post(
@@ -234,5 +234,5 @@ def clip_segments_stored_scene_binary(
     """Clip segments, N x 2 x dimension little-endian float64, on the bodies of a stored scene."""
     scene = questions.to_moved(call.store.get_scene(scene_id), questions.read_moved(moved, call), call)
     segments = octets.to_rows(question, (2, scene.solids[0].dimension))
-    found, accuracy = call.compute(scene.clip_segments, segments, keep=keep)
-    return octets.answer(call, octets.from_scene_pieces(found, call), accuracy)
+    result, accuracy = call.compute(scene.clip_segments, segments, keep=keep)
+    return octets.answer(call, octets.from_scene_pieces(result, call), accuracy)

@@ -145,14 +145,14 @@ class Numbers:
                 return None
             shape.append(lengths.pop() if len(lengths) == 1 else (-1 if lengths else low))
             level = list(chain.from_iterable(level))
-        found = set(map(type, level))
-        if not found <= types:
+        types_here = set(map(type, level))
+        if not types_here <= types:
             return None
         try:
             flat = np.array(level, dtype)
         except OverflowError:
             return None
-        if not self._holds_all(flat, level, found):
+        if not self._holds_all(flat, level, types_here):
             return None
         if -1 in shape:  # rows of several lengths: the engine takes lists of lists
             return value
@@ -182,16 +182,16 @@ class Numbers:
             return array if self.minimum is None or array.min() >= self.minimum else None
         return None
 
-    def _holds_all(self, flat: Array, level: list[Any], found: set[type]) -> bool:
+    def _holds_all(self, flat: Array, level: list[Any], types_here: set[type]) -> bool:
         """Tell whether every number of `level` is finite, large integers unchanged, none below the minimum."""
         if self.kind != "number":
             return self.minimum is None or not level or min(level) >= self.minimum
-        if int in found:
+        if int in types_here:
             large = np.flatnonzero(np.abs(flat) >= EXACT_INTEGERS)
             if not all(int(flat[i]) == level[i] for i in large if type(level[i]) is int):
                 return False
         # a finite sum has finite terms; most lists are short, and numpy takes longer to begin than to add
-        is_short = len(level) <= SHORT and int not in found
+        is_short = len(level) <= SHORT and int not in types_here
         return (is_short and isfinite(sum(level))) or bool(np.isfinite(flat).all())
 
     def _faults(self, value: Any, path: Path, seen: dict[int, int], call: Any) -> Iterator[Fault]:

@@ -59,21 +59,21 @@ class AtMost:
         raise PydanticCustomError("numbers", "{detail}", {"detail": fault.detail, "faults": [fault]})
 
     def _checked(self, items: list[Any], handler: core_schema.ValidatorFunctionWrapHandler) -> list[Any]:
-        found: list[Any] = []
+        result: list[Any] = []
         for start in range(0, max(1, len(items)), _STEP):
             try:
-                found += handler(items[start : start + _STEP])
+                result += handler(items[start : start + _STEP])
             except ValidationError:
                 handler(items[: start + _STEP])  # raises too, with their places in the whole list
                 raise
-        return found
+        return result
 
 
 def _without_default(schema: dict[str, Any]) -> None:
     schema.pop("default", None)
 
 
-def left_out(description: str | None = None, examples: list[Any] | None = None) -> Any:
+def optional(description: str | None = None, examples: list[Any] | None = None) -> Any:
     """Return a field that may be left out and is then None; JSON ``null`` is refused, and the schema has no default."""
     return Field(default=None, description=description, examples=examples, json_schema_extra=_without_default)
 
@@ -158,7 +158,7 @@ class Accuracy(Schema):
     )
 
     decisions: Literal["exact", "float64"] = Field(description="How every decision was made.")
-    coordinates_ulp: Annotated[float, Numbers()] = left_out(
+    coordinates_ulp: Annotated[float, Numbers()] = optional(
         "Bound on each constructed coordinate in units in the last place; left out where none is constructed."
     )
     items: Count = Field(description="Items asked for.")

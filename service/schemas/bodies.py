@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.schemas.arrays import PAIR, Array, Axis, Numbers
-from service.schemas.base import Accuracy, AtMost, Count, Schema, left_out, with_example
+from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
 from service.schemas.solids import Body, Booleans, Number, Points, Position, RigidPose, Segments, Solid
 
 CollisionRelation = Literal["disjoint", "first_inside_second", "second_inside_first", "overlapping", "touching"]
@@ -19,7 +19,7 @@ _BALL = {"type": "sphere", "center": [2, 0.5, 0.5], "radius": 1}
 _CHIP = {"type": "aabb", "min": [0, 0, 0], "max": [0.25, 0.25, 0.25]}
 DETAIL = "Say which of the eight relations of RCC-8 holds too: tangentially inside (TPP), equal (EQ), ..."
 _BOOLEAN = "Ask for disjoint or not alone: any other relation may then be answered as touching, sooner."
-_FOUND = "Which relation of RCC-8, where asked for; left out if a body has no interior."
+_DETAIL = "Which relation of RCC-8, where asked for; left out if a body has no interior."
 
 
 class CollideRequest(Schema):
@@ -42,13 +42,13 @@ class CollideRequest(Schema):
 
     first: Solid = Field(description="3D: polyhedron, surface, aabb, sphere, half_space. 2D: polygon, triangle, ...")
     second: Solid = Field(description="The other body, of the same dimension.")
-    poses: Annotated[list[RigidPose], AtMost("max_poses")] = left_out(
+    poses: Annotated[list[RigidPose], AtMost("max_poses")] = optional(
         "Poses of `second`, one answer each; without them one answer for where it stands. Time is discrete: two poses "
         "may be free while a motion between them collides."
     )
-    detail: bool = left_out(DETAIL)
-    boolean: bool = left_out(_BOOLEAN)
-    witness: bool = left_out(
+    detail: bool = optional(DETAIL)
+    boolean: bool = optional(_BOOLEAN)
+    witness: bool = optional(
         "Name a reason for each contact: if left out, unless `boolean` is true; a single pair then has none."
     )
 
@@ -61,9 +61,9 @@ class CollisionWitness(Schema):
     ] = Field(
         description="How two faces meet; containment: one body lies in the other; surface: of a body without any."
     )
-    first_face: Count = left_out("Face of the first body, if it has faces.")
-    second_face: Count = left_out("Face of the second body, if it has faces.")
-    containing: Literal["first", "second"] = left_out("For containment the body that contains.")
+    first_face: Count = optional("Face of the first body, if it has faces.")
+    second_face: Count = optional("Face of the second body, if it has faces.")
+    containing: Literal["first", "second"] = optional("For containment the body that contains.")
     piercing: bool = Field(description="Touching only: a point of one body lies in the open interior of the other.")
 
 
@@ -72,8 +72,8 @@ class CollisionAnswer(Schema):
     interiors meet, overlapping; else touching."""
 
     relation: CollisionRelation = Field(description="How the first body lies to the second.")
-    witness: CollisionWitness = left_out("Left out when disjoint, and where none was asked for.")
-    detail: Detail = left_out(_FOUND)
+    witness: CollisionWitness = optional("Left out when disjoint, and where none was asked for.")
+    detail: Detail = optional(_DETAIL)
 
 
 class CollideResponse(Schema):
@@ -112,13 +112,13 @@ class CollideSceneRequest(Schema):
     )
 
     bodies: Annotated[list[Body], AtMost("max_bodies")] = Field(description="Solids of one dimension in their places.")
-    skip: Pairs = left_out("Pairs of bodies to leave out.")
-    only: Pairs = left_out("The only pairs to look at.")
-    gap: Annotated[float, Numbers(minimum=0)] = left_out(
+    skip: Pairs = optional("Pairs of bodies to leave out.")
+    only: Pairs = optional("The only pairs to look at.")
+    gap: Annotated[float, Numbers(minimum=0)] = optional(
         "A distance: pairs that do not meet but are nearer than that, decided exactly, are listed too, as disjoint."
     )
-    detail: bool = left_out(DETAIL)
-    boolean: bool = left_out(_BOOLEAN)
+    detail: bool = optional(DETAIL)
+    boolean: bool = optional(_BOOLEAN)
 
 
 class CollidingPair(Schema):
@@ -127,8 +127,8 @@ class CollidingPair(Schema):
     first: Count = Field(description="Index of a body.")
     second: Count = Field(description="Index of a later body.")
     relation: CollisionRelation = Field(description="How the first body lies to the second.")
-    detail: Detail = left_out(_FOUND)
-    distance: Number = left_out("With `gap` and without `boolean`: how far apart, 0 where they meet.")
+    detail: Detail = optional(_DETAIL)
+    distance: Number = optional("With `gap` and without `boolean`: how far apart, 0 where they meet.")
 
 
 class CollideSceneResponse(Schema):
@@ -159,10 +159,10 @@ class ClearanceRequest(Schema):
 
     first: Solid = Field(description="3D: polyhedron, surface, aabb, sphere, half_space. 2D: polygon, triangle, ...")
     second: Solid = Field(description="The other body, of the same dimension.")
-    poses: Annotated[list[RigidPose], AtMost("max_poses")] = left_out(
+    poses: Annotated[list[RigidPose], AtMost("max_poses")] = optional(
         "Poses of `second`, one answer each; without them one answer for where it stands."
     )
-    at_least: Annotated[float, Numbers(minimum=0)] = left_out(
+    at_least: Annotated[float, Numbers(minimum=0)] = optional(
         "A distance: the answer is then whether the bodies are so far apart or more, decided exactly."
     )
 
@@ -178,15 +178,15 @@ class ClearanceAnswer(Schema):
     """How far two bodies are apart."""
 
     distance: Number = Field(description="The nearest double; 0 exactly where they have a common point.")
-    points: list[Position] = left_out("A point of each at that distance; not where they meet, nor of several poses.")
-    features: list[ClearanceFeature] = left_out("What these points lie on.")
+    points: list[Position] = optional("A point of each at that distance; not where they meet, nor of several poses.")
+    features: list[ClearanceFeature] = optional("What these points lie on.")
 
 
 class ClearanceResponse(Schema):
     """One answer for each pose, or a single one."""
 
-    clearances: list[ClearanceAnswer] = left_out("Without `at_least`.")
-    clear: list[bool] = left_out("With `at_least`: whether they are so far apart, or more.")
+    clearances: list[ClearanceAnswer] = optional("Without `at_least`.")
+    clear: list[bool] = optional("With `at_least`: whether they are so far apart, or more.")
     accuracy: Accuracy
 
 
@@ -242,7 +242,7 @@ class SceneContainsRequest(Schema):
     model_config = with_example({"points": [[0.5, 0.5], [3.5, 1]], "moved": [{"body": 1, "pose": _STEP}]})
 
     points: Points = Field(description="Of the dimension of the scene.")
-    moved: Moved = left_out(_MOVED)
+    moved: Moved = optional(_MOVED)
 
 
 class SceneCollideRequest(Schema):
@@ -253,15 +253,15 @@ class SceneCollideRequest(Schema):
         {"gap": 2.5, "only": [[0, 1]], "skip": [], "boolean": False},
     )
 
-    moved: Moved = left_out(_MOVED)
-    new: bool = left_out("Only pairs with a body of `moved`: with those known before, without these bodies, all pairs.")
-    skip: Pairs = left_out("Pairs of bodies to leave out.")
-    only: Pairs = left_out("The only pairs to look at.")
-    gap: Annotated[float, Numbers(minimum=0)] = left_out(
+    moved: Moved = optional(_MOVED)
+    new: bool = optional("Only pairs with a body of `moved`: with those known before, without these bodies, all pairs.")
+    skip: Pairs = optional("Pairs of bodies to leave out.")
+    only: Pairs = optional("The only pairs to look at.")
+    gap: Annotated[float, Numbers(minimum=0)] = optional(
         "List the pairs that do not meet but are nearer than this too, as disjoint, each with its distance."
     )
-    detail: bool = left_out(DETAIL)
-    boolean: bool = left_out("Ask for disjoint or not alone, which takes less time.")
+    detail: bool = optional(DETAIL)
+    boolean: bool = optional("Ask for disjoint or not alone, which takes less time.")
 
 
 class SceneSegmentsRequest(Schema):
@@ -272,8 +272,8 @@ class SceneSegmentsRequest(Schema):
     )
 
     segments: Segments = Field(description="Two end points each.")
-    keep: Keep = left_out(_KEEP)
-    moved: Moved = left_out(_MOVED)
+    keep: Keep = optional(_KEEP)
+    moved: Moved = optional(_MOVED)
 
 
 class ClipSegmentsSceneRequest(Schema):
@@ -288,7 +288,7 @@ class ClipSegmentsSceneRequest(Schema):
         description="half_space, aabb, convex, sphere, triangle, polygon, polyhedron, surface and csg of these."
     )
     segments: Segments = Field(description="Two end points each.")
-    keep: Keep = left_out(_KEEP)
+    keep: Keep = optional(_KEEP)
 
 
 class ScenePiece(Schema):
@@ -310,6 +310,6 @@ class ScenePiece(Schema):
 class ClipSegmentsSceneResponse(Schema):
     """The pieces, by segment, then by where they start, then by body; or whether each segment meets a body."""
 
-    pieces: list[ScenePiece] = left_out("Left out where `keep` is any.")
-    met: Booleans = left_out("For each segment whether it meets a body, where `keep` is any.")
+    pieces: list[ScenePiece] = optional("Left out where `keep` is any.")
+    met: Booleans = optional("For each segment whether it meets a body, where `keep` is any.")
     accuracy: Accuracy

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, WithJsonSchema
 
 from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
-from service.schemas.base import Accuracy, AtMost, Count, Schema, left_out, with_example
+from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
 from service.schemas.solids import Indices, Number, Position, Segments, Solid
 
 
@@ -145,8 +145,8 @@ class OverlayRequest(Schema):
     subject: Solid = Field(description="A polygon.")
     clip: Solid = Field(description="A polygon.")
     operation: Operation = Field(description="How the two are combined; difference is the subject without the clip.")
-    area: bool = left_out("Compute the area; if left out, where it costs next to nothing: up to 100 vertices.")
-    grid: Number = left_out(
+    area: bool = optional("Compute the area; if left out, where it costs next to nothing: up to 100 vertices.")
+    grid: Number = optional(
         "Snap the result to multiples of this power of two or ten, so that borders that nearly coincide do; no edge "
         "moves by more than 0.71 of it. `area` is then that of the output."
     )
@@ -184,7 +184,7 @@ class OverlayCollapse(Schema):
     """A part of the exact result that rounding lost."""
 
     kind: Literal["piece", "hole"] = Field(description="What it was.")
-    area: Number = left_out("Its area, correctly rounded; left out where it is beyond float64.")
+    area: Number = optional("Its area, correctly rounded; left out where it is beyond float64.")
     near: Position = Field(description="Its first vertex, rounded.")
 
 
@@ -210,7 +210,7 @@ class OverlayResponse(Schema):
     """The pieces: their coordinates together are those of a GeoJSON MultiPolygon."""
 
     pieces: list[OverlayPiece] = Field(description="Connected parts; none where the result is empty.")
-    area: Number = left_out(
+    area: Number = optional(
         "Area of the exact result, correctly rounded; left out where it is beyond float64, or was not asked for."
     )
     collapsed: list[OverlayCollapse] = Field(description="Parts that rounding lost; none where it lost nothing.")
@@ -276,7 +276,7 @@ class LayersUnionRequest(Schema):
     model_config = with_example({"layer": _PARCELS, "by": ["owner"]})
 
     layer: FeatureCollection = Field(description=_AREAS)
-    by: Annotated[list[str], AtMost("max_operands")] = left_out(
+    by: Annotated[list[str], AtMost("max_operands")] = optional(
         "Names of properties: features are united that have the same values of these; all, if left out."
     )
 
@@ -288,14 +288,14 @@ class LayersContainsRequest(Schema):
 
     points: FeatureCollection = Field(description="A FeatureCollection of Point; null geometries are welcome.")
     polygons: FeatureCollection = Field(description=_AREAS)
-    outside: bool = left_out("Also a feature for each point that nothing holds.")
+    outside: bool = optional("Also a feature for each point that nothing holds.")
 
 
 class LayersResponse(Schema):
     """A GeoJSON FeatureCollection: rings are closed, shells counter-clockwise, holes clockwise."""
 
     type: Literal["FeatureCollection"]
-    crs: FeatureCollection = left_out("The `crs` of the question, untouched.", examples=[{"type": "name"}])
+    crs: FeatureCollection = optional("The `crs` of the question, untouched.", examples=[{"type": "name"}])
     features: list[Feature] = Field(
         description="`properties` are those of the features that a row comes from, names that both layers have with _1 "
         "and _2; members named after the layers say which these were, by index and id. Geometry null: it was."

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
-from service.schemas.base import Accuracy, AtMost, Schema, left_out, with_example
+from service.schemas.base import Accuracy, AtMost, Schema, optional, with_example
 from service.schemas.solids import Body, Booleans, IndexLists, Indices, Number, Points, Position, Segments, Solid
 
 
@@ -137,16 +137,16 @@ class CompareRequest(Schema):
     operation: Literal["contains", "collide", "clip_segments", "clip_polygons"] = Field(
         description="What is asked of both; it says which other fields are needed."
     )
-    method: str = left_out("One of the textbook's methods; left out, the first. A wrong one is answered with a list.")
-    solid: Solid = left_out(
+    method: str = optional("One of the textbook's methods; left out, the first. A wrong one is answered with a list.")
+    solid: Solid = optional(
         "contains: half_space, aabb, convex, polyhedron, triangle, polygon, implicit, or a csg of these."
     )
-    points: Points = left_out("contains.")
-    first: Solid = left_out("collide: a polyhedron.")
-    second: Solid = left_out("collide: a polyhedron.")
-    region: Solid = left_out("clip_segments: half_space, aabb, convex, sphere; clip_polygons: not the sphere.")
-    segments: Segments = left_out("clip_segments: two end points each.")
-    polygons: Annotated[Array, Numbers(POINTS, Axis(1, "max_points"), DIMENSION)] = left_out(
+    points: Points = optional("contains.")
+    first: Solid = optional("collide: a polyhedron.")
+    second: Solid = optional("collide: a polyhedron.")
+    region: Solid = optional("clip_segments: half_space, aabb, convex, sphere; clip_polygons: not the sphere.")
+    segments: Segments = optional("clip_segments: two end points each.")
+    polygons: Annotated[Array, Numbers(POINTS, Axis(1, "max_points"), DIMENSION)] = optional(
         "clip_polygons: one ring each, all of as many vertices."
     )
 

@@ -8,7 +8,7 @@ from pydantic import Field, RootModel, WithJsonSchema, create_model
 
 import engine
 from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
-from service.schemas.base import AtMost, Count, Schema, left_out, with_example
+from service.schemas.base import AtMost, Count, Schema, optional, with_example
 
 Number = Annotated[float, Numbers()]
 Position = Annotated[Array, Numbers(DIMENSION)]
@@ -109,7 +109,7 @@ class RigidPose(Schema):
 
     rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)] = Field(description="R, a list of rows.")
     translation: Position = Field(description="t.")
-    tolerance: Annotated[float, WithJsonSchema({"type": "number", "format": "double"})] = left_out(
+    tolerance: Annotated[float, WithJsonSchema({"type": "number", "format": "double"})] = optional(
         "How far an entry of R^T R may be from that of the unit matrix: 0 to 0.1, 1e-12 if left out. A matrix farther "
         "than 1e-12 stands for the rotation nearest to it, each entry the nearest double; 1e-6 takes float32 matrices."
     )
@@ -119,7 +119,7 @@ class Body(Schema):
     """A solid in its place; without a pose, where it stands."""
 
     solid: Solid
-    pose: RigidPose = left_out("Where the body is; left out, where its solid stands.")
+    pose: RigidPose = optional("Where the body is; left out, where its solid stands.")
 
 
 class StoredSolidSummary(Schema):
@@ -128,10 +128,10 @@ class StoredSolidSummary(Schema):
     id: SolidId
     type: str = Field(description="Type of the solid.")
     dimension: Annotated[int, Numbers(kind="integer", minimum=2)] = Field(description="2 or 3.")
-    vertices: Count = left_out("Number of vertices, for solids that have them.")
-    faces: Count = left_out("Number of faces, planes, rings, terms or operands, for solids that have them.")
+    vertices: Count = optional("Number of vertices, for solids that have them.")
+    faces: Count = optional("Number of faces, planes, rings, terms or operands, for solids that have them.")
     memory: Count = Field(description="Bytes its arrays hold.")
-    collapsed: Count = left_out(
+    collapsed: Count = optional(
         "Triangles of a file that are left out: two of their corners have equal coordinates.", [248]
     )
 

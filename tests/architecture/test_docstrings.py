@@ -54,7 +54,16 @@ def methods_of(kind: type) -> Iterator[tuple[str, Any]]:
 
 def is_internal(function: Any) -> bool:
     """Of methods that only the engine calls: those that pickles, kernels and caches use."""
-    return function.__name__ in ("of_arrays", "of_checked", "restored", "prepared", "kept", "attach", "detach", "take")
+    return function.__name__ in (
+        "of_arrays",
+        "of_checked",
+        "restored",
+        "prepared",
+        "cached",
+        "attach",
+        "detach",
+        "take",
+    )
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -115,7 +115,7 @@ def test_arrays_are_put_one_after_another_by_parts(axis: int, monkeypatch: pytes
     parts = [draw.random(shape) for shape in shapes]
     whole = np.concatenate(parts, axis)
     assert np.array_equal(concatenated(parts, axis), whole)
-    monkeypatch.setattr(budget, "_AT_ONCE", 200)
+    monkeypatch.setattr(budget, "_BLOCK", 200)
     assert np.array_equal(concatenated(parts, axis), whole)
     cancel = Cancel()
     cancel.set()

@@ -67,10 +67,10 @@ def seed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def ask(home: Path, before: str = "", **more: str) -> subprocess.Popen[str]:
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("ENGINE_", "XDG_"))}
+    read_cached = {name: value for name, value in os.environ.items() if not name.startswith(("ENGINE_", "XDG_"))}
     return subprocess.Popen(
         [sys.executable, "-c", before + PROBE],
-        env={**kept, "HOME": str(home), "TMPDIR": str(home), **more},
+        env={**read_cached, "HOME": str(home), "TMPDIR": str(home), **more},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -114,12 +114,12 @@ def test_a_pipe_in_the_cache_is_no_file(tmp_path: Path, monkeypatch: pytest.Monk
     kernel_cache.cache_folder.cache_clear()
     try:
         os.mkfifo(tmp_path / "a kernel", 0o600)
-        thread = threading.Thread(target=lambda: found.append(kernel_cache.kept("a kernel")), daemon=True)
+        thread = threading.Thread(target=lambda: found.append(kernel_cache.read_cached("a kernel")), daemon=True)
         found: list[bytes | None] = []
         thread.start()
         thread.join(20)
         assert found == [None]
-        kernel_cache.keep("a kernel", b"compiled")
-        assert kernel_cache.kept("a kernel") == b"compiled"
+        kernel_cache.write_cached("a kernel", b"compiled")
+        assert kernel_cache.read_cached("a kernel") == b"compiled"
     finally:
         kernel_cache.cache_folder.cache_clear()

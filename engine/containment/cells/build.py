@@ -1,9 +1,10 @@
-"""Builds the cells of a polyhedron, with the budget of the call that pays for it.
+"""Builds the cells of a polyhedron: a uniform grid with a reference point of known location in each cell.
 
-Two cells without triangles that share a wall lie on one side of the surface, so only the first of each such group, in
-scanning order, is asked about, by a vertical ray; the others copy. So are the reference points of the others.
+Adjacent cells without triangles lie on one side of the surface. So one cell of each connected group, the first in
+scanning order, is located by a vertical ray, and the others copy its side (flood fill). The reference point of a cell
+with triangles is located by a ray of its own.
 
-Cost: linear in the faces and the entries, some 0.5 us a face on one thread and 150 to 500 bytes.
+Cost: linear in the faces and the entries of the lists, some 0.5 us a face on one thread and 150 to 500 bytes.
 
 Source: C. Ericson, Real-Time Collision Detection, 2005, 7.1 (uniform grids), with a reference point a cell.
 """
@@ -36,48 +37,48 @@ from engine.solids.mesh import Polyhedron
 from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 
 MIXED_CELL: Final = -1
-"""Code of a cell that is left to the tree: its side is not known, or its list costs more than the tree."""
+"""Code of a cell that is left to the tree: its side is unknown, or its list costs more than the tree."""
 _UNKNOWN: Final = 0
 _GROUP: Final = 8.0
-"""Nanoseconds that a group of a list costs a point."""
+"""Nanoseconds that a point takes for one group of a list."""
 _FEWEST_GROUPS: Final = 32
 MOST_FACES: Final = 1 << 14
-"""Of a solid whose sides serve scenes."""
+"""Largest solid for which scenes build sides of cells."""
 _PAYS_FROM, _PAYS_PER_FACE = 1 << 10, 2
-_AT_ONCE: Final = 4096
+_BLOCK: Final = 4096
 
 
 class Cells(NamedTuple):
-    """What `locate_by_cells` reads."""
+    """Grid, statuses and lists of a polyhedron, the argument of `locate_by_cells`."""
 
     lattice: Lattice
     statuses: Int8Array
-    """(n + 1,): the location of all points of a cell, UNDECIDED where a triangle may reach into it, and last that of
-    points beyond the lattice."""
+    """(n + 1,): location of all points of a cell, UNDECIDED if a triangle may reach into it; last the location beyond
+    the grid."""
     codes: Int32Array
-    """(n,): of an UNDECIDED cell its first group, doubled, and whether its reference point is inside; MIXED_CELL."""
+    """(n,): of an UNDECIDED cell 2 * first group + (1 if its reference point is inside), or MIXED_CELL."""
     groups: Float32Array
-    """(n_groups, 14, 8): what cells keep of their triangles (lanes/cells.py)."""
+    """(n_groups, 14, 8): the triangles of cells in the layout of lanes/cells.py."""
 
 
 class Sides(NamedTuple):
-    """What `side_in_cell` reads."""
+    """Grid and statuses of a polyhedron, the argument of `side_in_cell`."""
 
     frame: FloatArray
-    """``(6,)``: the low corner of the lattice, and cells to a unit."""
+    """``(6,)``: low corner of the grid, and cells per unit."""
     place: tuple[int, int, int, int]
-    """Address of `statuses`, and cells along each axis."""
+    """Address of `statuses`, and number of cells along each axis."""
     statuses: Int8Array
     """As `Cells` has them."""
 
 
 def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
-    """Return the cells of a solid that can have them, prepared once."""
+    """Return the cells of a solid for which `can_have_cells` holds, built once."""
     return solid.prepared("cells", lambda: build_cells(solid, budget), budget.check)
 
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
-    """Return the cells of `solid`. Raises what `Budget.check` raises."""
+    """Build the cells of `solid`. Raises what `Budget.check` raises."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
     counts = count_triangles(mesh, budget)
@@ -85,23 +86,23 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
     lists = np.empty(int(ends[-1]), np.int32)
     list_triangles(mesh, ends - counts, lists, True, budget.flag)
     budget.check()
-    found = _sides_of(tree, lattice, counts, False, budget)
+    sides = _sides_by_rays(tree, lattice, counts, False, budget)
     longest = LANES * max(_FEWEST_GROUPS, cost_in_tree(solid) / _GROUP)
-    leaves = np.flatnonzero((counts > 0) & (found != _UNKNOWN) & (counts <= longest))
+    leaves = np.flatnonzero((counts > 0) & (sides != _UNKNOWN) & (counts <= longest))
     last_groups = np.cumsum((counts[leaves] + LANES - 1) // LANES)
     starts = np.append(0, last_groups)[:-1]
     codes = np.full(len(counts), MIXED_CELL, np.int32)
-    codes[leaves] = 2 * starts + (found[leaves] > 0)
+    codes[leaves] = 2 * starts + (sides[leaves] > 0)
     groups = groups_of(int(last_groups[-1]) if len(leaves) else 0)
     fill_groups(mesh, leaves, starts, (ends - counts)[leaves], ends[leaves], lists, groups, budget.flag)
     budget.check()
-    return Cells(lattice, _statuses(found, counts), codes, groups)
+    return Cells(lattice, _statuses(sides, counts), codes, groups)
 
 
-def sides_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Sides | None:
-    """Return the sides of the cells of `solid` if the points asked in scenes so far pay for building them.
+def sides_if_profitable(solid: Polyhedron, n_points: int, budget: Budget) -> Sides | None:
+    """Return the sides of the cells of `solid`, built if the points that scenes located so far pay for it; else None.
 
-    That takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us.
+    Building takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us.
     """
     seen = solid.prepared("scene_points_seen", lambda: [0], budget.check)
     seen[0] += n_points
@@ -114,22 +115,22 @@ def sides_if_they_pay(solid: Polyhedron, n_points: int, budget: Budget) -> Sides
 
 
 def build_sides(solid: Polyhedron, budget: Budget) -> Sides:
-    """Return the sides of the cells of `solid`. Raises what `Budget.check` raises."""
+    """Build the sides of the cells of `solid`. Raises what `Budget.check` raises."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget)
-    statuses = _statuses(_sides_of(tree, lattice, counts, True, budget), counts)
+    statuses = _statuses(_sides_by_rays(tree, lattice, counts, True, budget), counts)
     return Sides(np.array([*lattice.low, *lattice.scale]), (statuses.ctypes.data, *lattice.n), statuses)
 
 
-def _statuses(found: Int8Array, counts: IntArray) -> Int8Array:
-    return np.append(np.where((counts > 0) | (found == _UNKNOWN), UNDECIDED, found), -1).astype(np.int8)
+def _statuses(sides: Int8Array, counts: IntArray) -> Int8Array:
+    return np.append(np.where((counts > 0) | (sides == _UNKNOWN), UNDECIDED, sides), -1).astype(np.int8)
 
 
 @kernel
-def label_empty(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
-    """Fill labels (nz * ny * nx,) int64 with the cell that each empty cell copies from, itself for one that is asked.
+def label_empty_cells(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
+    """Fill labels (nz * ny * nx,) int64 with the cell from which each empty cell copies its side (flood fill).
 
-    Cells with a list label themselves.
+    A cell that is located itself, and every cell with a list, has its own number.
     """
     for cell in range(len(counts)):
         labels[cell] = cell
@@ -143,25 +144,27 @@ def label_empty(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
             labels[cell] = labels[cell - nx * ny]
 
 
-def _sides_of(tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget) -> Int8Array:
-    """Return the sides of cells, by vertical rays: of all of an empty one, of the reference point of another one.
+def _sides_by_rays(
+    tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget
+) -> Int8Array:
+    """Return the side of each empty cell, and of the reference point of each other cell, by vertical rays.
 
-    _UNKNOWN where that point is not in its cell, on the boundary, or not decided by the compiled ray. counts: lengths
-    of the cells' lists. only_empty: the other ones are not asked about.
+    _UNKNOWN: the reference point rounds out of its cell, is on the boundary, or is UNDECIDED. counts: lengths of the
+    lists of cells. only_empty: skip cells with a list.
     """
     (nx, ny, _), labels = lattice.n, np.empty(len(counts), np.int64)
-    label_empty(counts, nx, ny, labels)
-    asked = np.flatnonzero((labels == np.arange(len(labels))) & ((counts == 0) | (not only_empty)))
-    sides, no_blurs = np.zeros(len(counts), np.int8), np.zeros(_AT_ONCE)
-    for start in range(0, len(asked), _AT_ONCE):
-        cells = asked[start : start + _AT_ONCE]
+    label_empty_cells(counts, nx, ny, labels)
+    queried = np.flatnonzero((labels == np.arange(len(labels))) & ((counts == 0) | (not only_empty)))
+    sides, no_blurs = np.zeros(len(counts), np.int8), np.zeros(_BLOCK)
+    for start in range(0, len(queried), _BLOCK):
+        cells = queried[start : start + _BLOCK]
         places = np.stack([cells % nx, cells // nx % ny, cells // (nx * ny)], axis=1)
-        points, found = np.array(lattice.low) + (places + PLACE) * lattice.size, np.empty(len(cells), np.int8)
+        points, locations = np.array(lattice.low) + (places + PLACE) * lattice.size, np.empty(len(cells), np.int8)
         with np.errstate(all="ignore"):
-            locate_by_tree(read_only(points), no_blurs[: len(cells)], tree, found, budget.flag)
+            locate_by_tree(read_only(points), no_blurs[: len(cells)], tree, locations, budget.flag)
         budget.check()
         is_in_cell = (((points - lattice.low) * lattice.scale).astype(np.int64) == places).all(axis=1)
-        sides[cells] = np.where(is_in_cell & (np.abs(found) == 1), found, _UNKNOWN)
+        sides[cells] = np.where(is_in_cell & (np.abs(locations) == 1), locations, _UNKNOWN)
     return sides[labels]
 
 
@@ -170,7 +173,7 @@ def fill_groups(
     mesh: Mesh, leaves: IntArray, starts: IntArray, firsts: IntArray, ends: IntArray, lists: Int32Array,
     groups: Float32Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill groups (n, 14, 8) with the lists of cells, each from the group in `starts`, about its reference point."""
+    """Fill groups (n, 14, 8) with the triangles of `leaves`, each cell from its group in `starts` on."""
     nx, ny, _ = mesh.lattice.n
     for item in range(len(leaves)):
         if flag[0]:
@@ -184,7 +187,7 @@ def fill_groups(
 def _fill_list(
     mesh: Mesh, triangles: Int32Array, reference: tuple[float, ...], groups: Float32Array, first_group: int
 ) -> None:
-    """Write the groups of a cell's triangles, in units of cells."""
+    """Write the groups of a cell's triangles relative to its reference point, in units of cells."""
     scale, n_groups = mesh.lattice.scale, (len(triangles) + LANES - 1) // LANES
     for place in range(n_groups * LANES):
         row = groups[first_group + place // LANES, :, place % LANES]

@@ -1,10 +1,8 @@
-"""The grid of cells over a polyhedron, and which triangles reach into which cell.
+"""The uniform grid over a polyhedron, and a conservative list of the triangles that reach into each cell.
 
 Sizes are powers of two. An index is ``int((x - low) * scale)``, each step monotone, so the doubles of a cell are those
-between two borders; a triangle is listed in every cell from the index of its least to that of its largest coordinate,
-but where a separating axis proves that it stays outside (reach.py). The lists are conservative.
-
-Which cells a triangle may reach into: intervals of rows, from the planes of the separating axes.
+between two borders; a triangle is listed in every cell of its index box, unless a separating axis proves that it stays
+outside.
 
 A triangle and a cell are apart if they are apart along the triangle's normal, or, seen along an axis, along the normal
 of an edge. Each says that a linear function of the cell's centre w is not negative where they may meet,
@@ -20,9 +18,9 @@ coefficients are products of rounded differences u, v of corners, and |w| is at 
 what a function is off by is below 12 units of rounding of size * (size + 4): `_ROUNDING` counts 32. (Rows are counted
 from cell 0 of a block, at most 98 cells off: that adds 2^-45 of a slope, which `_MARGIN` covers.) The end of an
 interval is a quotient with two roundings, and `_SLACK` is more than these for numbers up to 2^31; one beyond is out of
-the lattice either way. The result is conservative.
-
-Source: the separating axes of a triangle and a box after Akenine-Moeller 2001; listing by rows is a scan conversion.
+the lattice either way.
+Source: separating axes of a triangle and a box after T. Akenine-Moeller, Fast 3D triangle-box overlap testing, 2001;
+listing by rows is a scan conversion.
 """
 
 from __future__ import annotations
@@ -43,26 +41,26 @@ _MARGIN: Final = 0.5 + 2.0**-20
 _ROUNDING: Final = 32.0 * 2.0**-53
 _SLACK: Final = 2.0**-16
 _FLAT: Final = 2.0**-300
-"""A slope below this cuts nothing: the quotient could overflow."""
+"""Smallest slope that cuts an interval: below it the quotient could overflow."""
 
 
 class Walls(NamedTuple):
-    """Functions that are not negative where a cell may meet the triangle: two slopes and a constant each."""
+    """Linear functions, two slopes and a constant each, that are >= 0 wherever a cell may meet the triangle."""
 
     seen_along_z: Any
-    """Three over (x, y)."""
+    """Three functions of (x, y): the edges projected along z."""
     seen_along_x: Any
-    """Three over (y, z)."""
+    """Three functions of (y, z)."""
     seen_along_y: Any
-    """Three over (z, x)."""
+    """Three functions of (z, x)."""
     normal: Any
-    """The plane: |normal . w| is at most `reach` where they may meet."""
+    """The plane of the triangle: |normal . w| <= `reach` wherever they may meet."""
     reach: float
 
 
 @inline
 def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
-    """Return the walls of the triangle 0, u, v."""
+    """Return the separating functions of the triangle 0, u, v."""
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     su, sv = abs(u[0]) + abs(u[1]) + abs(u[2]), abs(v[0]) + abs(v[1]) + abs(v[2])
     reach = _MARGIN * (abs(nx) + abs(ny) + abs(nz)) + _ROUNDING * su * sv * (su + sv + 6.0)
@@ -74,7 +72,7 @@ def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
 
 @inline
 def _edges(ux: float, uy: float, vx: float, vy: float) -> Any:
-    """Return the functions of the three edges of a triangle (0, u, v) of the plane, of none if it may have no area."""
+    """Return the functions of the three edges of a planar triangle (0, u, v); zeros if it may have no area."""
     area = ux * vy - uy * vx
     if not abs(area) > _ROUNDING * (abs(ux * vy) + abs(uy * vx)):
         return (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
@@ -95,7 +93,7 @@ def _wall(a: float, b: float, c: float) -> tuple[float, float, float]:
 
 @inline
 def _narrowed(low: float, high: float, slope: float, value: float) -> tuple[float, float]:
-    """Return the part of an interval where slope * t + value may be at least 0; low > high where it is nowhere."""
+    """Return the part of an interval of t where slope * t + value may be >= 0; low > high if there is none."""
     if abs(slope) > _FLAT:
         end = -value / slope
         if slope > 0.0:
@@ -107,8 +105,8 @@ def _narrowed(low: float, high: float, slope: float, value: float) -> tuple[floa
 
 
 @inline
-def layer_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
-    """Return the first and last row of a layer that the triangle may reach into; z: of the centres, y: of row 0."""
+def rows_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
+    """Return the first and last row of a layer that the triangle may reach; z: of the cell centres, y: of row 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_x:
         low, high = _narrowed(low, high, wall[0], wall[0] * y + wall[1] * z + wall[2])
@@ -116,8 +114,8 @@ def layer_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tu
 
 
 @inline
-def row_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
-    """Return the first and last cell of a row that the triangle may reach into; x: of the centre of cell 0."""
+def cells_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
+    """Return the first and last cell of a row that the triangle may reach; x: of the centre of cell 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_z:
         low, high = _narrowed(low, high, wall[0], wall[0] * x + wall[1] * y + wall[2])
@@ -130,23 +128,22 @@ def row_reached(walls: Walls, z: float, y: float, x: float, first: int, last: in
 
 
 PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
-"""Where the reference point lies in its cell: no symmetry that faces of a lattice might share."""
+"""Position of the reference point in its cell: on no plane of symmetry that faces of a lattice might share."""
 _WANTED: Final = 4.0
-"""Cells along an axis for each triangle along an edge of a cube."""
+"""Cells along an axis for each triangle along an edge of a cube of as many triangles."""
 _MOST_CELLS: Final = 160.0
-"""Along an axis."""
+"""Largest number of cells along an axis."""
 _FEWEST_CELLS: Final = 12
 _MOST_ENTRIES: Final = 12.0
 _FEW_ENTRIES: Final = 1 << 16
-"""Cells that list a triangle, in the mean, and in all, from which the grid is made coarser, to so many along an axis at
-least."""
+"""Mean numbers of cells that list a triangle, in all and at most, from which the grid is made coarser."""
 _SAMPLE: Final = 1024
 _RANGE: Final = 2.0**400
-"""Largest extent, and 1 / smallest, of a solid that gets cells: products of three stay far from its ends."""
+"""Largest extent, and 1 / smallest, of a solid with cells: products of three extents stay within the exponents."""
 
 
 class Lattice(NamedTuple):
-    """A grid of cells; sizes are powers of two."""
+    """A uniform grid of cells whose sizes are powers of two."""
 
     low: tuple[float, float, float]
     scale: tuple[float, float, float]
@@ -156,7 +153,7 @@ class Lattice(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """A polyhedron and its lattice."""
+    """A polyhedron and its grid."""
 
     vertices: FloatArray
     triangles: Int32Array
@@ -165,13 +162,13 @@ class Mesh(NamedTuple):
 
 @inline
 def index_of(value: float, low: float, scale: float) -> int:
-    """Return the index of a value that is not below `low`."""
+    """Return the index of the cell that contains a value >= `low`."""
     return int((value - low) * scale)
 
 
 @inline
 def reference_point(lattice: Lattice, x: int, y: int, z: int) -> Any:
-    """Return the reference point of a cell."""
+    """Return the reference point of cell (x, y, z)."""
     low, size = lattice.low, lattice.size
     return low[0] + (x + PLACE[0]) * size[0], low[1] + (y + PLACE[1]) * size[1], low[2] + (z + PLACE[2]) * size[2]
 
@@ -184,13 +181,13 @@ def scaled_difference(a: Any, b: Any, scale: tuple[float, ...]) -> Any:
 
 @inline
 def _span(a: float, b: float, c: float, low: float, scale: float, n: int) -> tuple[int, int]:
-    """Return the first and the last index that the coordinates of a triangle's corners reach."""
+    """Return the first and the last index over the coordinates of a triangle's corners."""
     return max(index_of(min(a, b, c), low, scale), 0), min(index_of(max(a, b, c), low, scale), n - 1)
 
 
 @kernel
 def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray) -> None:
-    """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) what reaches into each cell."""
+    """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) the triangles that may reach into each cell."""
     low, scale, (nx, ny, nz) = mesh.lattice.low, mesh.lattice.scale, mesh.lattice.n
     for triangle in range(len(mesh.triangles)):
         if flag[0]:
@@ -204,11 +201,11 @@ def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool,
         base = scaled_difference(low, a, scale)
         x0, y0, z0 = base[0] + 0.5, base[1] + 0.5, base[2] + 0.5
         for z in range(z_first, z_last + 1):
-            y_from, y_to = (y_first, y_last) if is_small else layer_reached(walls, z0 + z, y0, y_first, y_last)
+            y_from, y_to = (y_first, y_last) if is_small else rows_reached(walls, z0 + z, y0, y_first, y_last)
             for y in range(y_from, y_to + 1):
                 x_from, x_to = x_first, x_last
                 if not is_small:
-                    x_from, x_to = row_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
+                    x_from, x_to = cells_reached(walls, z0 + z, y0 + y, x0, x_first, x_last)
                 for cell in range((z * ny + y) * nx + x_from, (z * ny + y) * nx + x_to + 1):
                     if is_fill:
                         items[ends[cell]] = triangle
@@ -216,7 +213,7 @@ def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool,
 
 
 def can_have_cells(solid: Polyhedron) -> bool:
-    """Tell whether the coordinates are in the range of the cells; all but scenes near the ends of the exponents are."""
+    """Return whether all coordinates are within `_RANGE`."""
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     with np.errstate(over="ignore"):
         extent = (high - low).max()
@@ -224,7 +221,7 @@ def can_have_cells(solid: Polyhedron) -> bool:
 
 
 def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
-    """Return the grid, prepared once: so coarse that needles and large faces are not listed in more than some cells."""
+    """Return the grid of a solid, built once; coarse enough that few cells list the same triangle."""
 
     def find() -> Lattice:
         tree, most = tree_of(solid, budget.check), _MOST_CELLS
@@ -240,7 +237,7 @@ def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
 
 
 def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
-    """Return of each cell how many triangles reach into it."""
+    """Return for each cell how many triangles may reach into it."""
     nx, ny, nz = mesh.lattice.n
     counts = np.zeros(nx * ny * nz, np.int64)
     list_triangles(mesh, counts, np.empty(0, np.int32), False, budget.flag)
@@ -249,7 +246,7 @@ def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
 
 
 def _make_lattice(tree: TriangleTree, most: float) -> Lattice:
-    """Return a grid of at most so many cells along the longest axis; flat axes are in one cell."""
+    """Return a grid of at most `most` cells along the longest axis; a flat axis has one cell."""
     extent = np.subtract(tree.high, tree.low)
     largest = float(extent.max())
     size = _power_of_two(largest / min(most, max(8.0, _WANTED * len(tree.triangles) ** (1.0 / 3.0))))
@@ -260,6 +257,6 @@ def _make_lattice(tree: TriangleTree, most: float) -> Lattice:
 
 
 def _power_of_two(value: float) -> float:
-    """Return the power of two next above or equal to value."""
+    """Return the smallest power of two >= value."""
     mantissa, exponent = frexp(value)
     return ldexp(1.0, exponent - 1 if mantissa == 0.5 else exponent)

@@ -1,13 +1,14 @@
-"""Polyhedron by cells: the parity of the segment from a cell's reference point, beyond the band of the entries.
+"""Point location in a polyhedron by cells: parity of the crossings on the segment from the cell's reference point.
 
-A point in a cell without triangles has the cell's side; in another one, the side of the reference point, turned by each
-triangle that the segment crosses. Points too close to a plane of an entry are left UNDECIDED, for the vertical ray.
+A point in a cell without triangles has the side of the cell. In another cell it has the side of the reference point,
+flipped by each triangle that the segment to it crosses. Points too close to the plane of an entry stay UNDECIDED and go
+to the vertical ray.
 
-For scenes a point, which may carry a blur (filters.py), is looked up in the cells of one of many polyhedra (`Sides`).
-It must lie in one cell with all of its blur.
+Scenes look up a blurred point (filters.py) in the cells of one of many polyhedra (`Sides`): it is decided if one cell
+contains all of its blur.
 
-Source: space-partitioned point containment with reference points, over the uniform grid of C. Ericson, 2005.
-Changed: certified in single precision, exact behind.
+Source: reference points over the uniform grid of C. Ericson, Real-Time Collision Detection, 2005. Changed: certified in
+single precision, with an exact fallback.
 """
 
 from __future__ import annotations
@@ -26,20 +27,21 @@ from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray
 
 _BLOCK: Final = 256
-"""Points that pass through the first stage together."""
+"""Points that go through the first stage together."""
 _FEWEST: Final = 128
-"""Points that go on to the later stages together, at least: of most blocks but a few do. The scratch, for at most
-`_FEWEST + _BLOCK`, fits the first-level cache."""
+"""Least number of UNDECIDED points for the later stages; the scratch of `_FEWEST + _BLOCK` points fits the L1 cache."""
 _AHEAD: Final = 6
-"""Points between asking for a list's first group and reading it: some 100 ns."""
+"""Points between the prefetch of a list and its use: some 100 ns."""
 
 
 @inline
-def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_kept: Any) -> Any:
-    """Write the status of the cells of points start .. end, and append those that are UNDECIDED to item_of.
+def _look_up_statuses(
+    points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_undecided: Any
+) -> Any:
+    """Write the statuses of the cells of points start .. end, and append the UNDECIDED ones to item_of.
 
-    Returns how many that makes, and how many lie beyond the lattice. One pass without a branch: a point beyond, or not
-    finite, gets the status behind the last one.
+    Returns their new number, and how many points are beyond the grid. Branchless: a point beyond the grid, or not
+    finite, gets the last status.
     """
     low, scale, n, statuses = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.statuses
     nx, ny, beyond = np.int32(n[0]), np.int32(n[1]), np.uint32(n[0] * n[1] * n[2])
@@ -54,43 +56,43 @@ def _first_status(points: Any, start: Any, end: Any, cells: Any, locations: Any,
         cell = np.uint32((np.int32(z) * ny + np.int32(y)) * nx + np.int32(x))
         status = statuses[cell if is_within else beyond]
         locations[item] = status
-        item_of[n_kept] = item
-        n_kept += np.uint64(status == UNDECIDED)
+        item_of[n_undecided] = item
+        n_undecided += np.uint64(status == UNDECIDED)
         n_beyond += np.uint64(not is_within)
-    return n_kept, n_beyond
+    return n_undecided, n_beyond
 
 
 @merged
-def _enter(points: Any, cells: Any, kept_points: Any, n_kept: int) -> Any:
-    """Look up the codes of the points kept; return how many have a list, and so wait."""
+def _look_up_codes(points: Any, cells: Any, undecided: Any, n_undecided: int) -> Any:
+    """Look up the codes of the UNDECIDED points; return how many cells have a list."""
     low, scale, n, codes = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.codes
-    item_of, code_of, places, waiting = kept_points
+    item_of, code_of, places, waiting = undecided
     n_waiting = np.uint64(0)
-    for kept in range(n_kept):
-        item = item_of[kept]
+    for slot in range(n_undecided):
+        item = item_of[slot]
         x = index_of(points[item, 0], low[0], scale[0])
         y = index_of(points[item, 1], low[1], scale[1])
         z = index_of(points[item, 2], low[2], scale[2])
-        places[kept, 0], places[kept, 1], places[kept, 2] = x, y, z
-        code_of[kept] = codes[np.uint64((z * n[1] + y) * n[0] + x)]
-        waiting[n_waiting] = kept
-        n_waiting += np.uint64(code_of[kept] != MIXED_CELL)
+        places[slot, 0], places[slot, 1], places[slot, 2] = x, y, z
+        code_of[slot] = codes[np.uint64((z * n[1] + y) * n[0] + x)]
+        waiting[n_waiting] = slot
+        n_waiting += np.uint64(code_of[slot] != MIXED_CELL)
     return n_waiting
 
 
 @merged
-def _ask_lists(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locations: Any) -> None:
-    """Locate the points that wait, by the lists of their cells."""
+def _query_lists(points: Any, cells: Any, undecided: Any, n_waiting: Any, locations: Any) -> None:
+    """Locate the points whose cells have a list, by the parity over that list."""
     lattice, groups = cells.lattice, cells.groups
-    item_of, code_of, places, waiting = kept_points
+    item_of, code_of, places, waiting = undecided
     for turn in range(min(n_waiting, np.uint64(_AHEAD))):
         prefetch_group(groups, code_of[waiting[turn]] >> 1)
     for turn in range(n_waiting):
         if turn + np.uint64(_AHEAD) < n_waiting:
             prefetch_group(groups, code_of[waiting[turn + np.uint64(_AHEAD)]] >> 1)
-        kept = waiting[turn]
-        item, code = item_of[kept], code_of[kept]
-        reference = reference_point(lattice, places[kept, 0], places[kept, 1], places[kept, 2])
+        slot = waiting[turn]
+        item, code = item_of[slot], code_of[slot]
+        reference = reference_point(lattice, places[slot, 0], places[slot, 1], places[slot, 2])
         w = scaled_difference(as_point3(points, item), reference, lattice.scale)
         parity = parity_across(groups, code >> 1, np.float32(w[0]), np.float32(w[1]), np.float32(w[2]))
         locations[item] = UNDECIDED if parity & UNDECIDED else ((code ^ parity) & 1) * 2 - 1
@@ -98,38 +100,37 @@ def _ask_lists(points: Any, cells: Any, kept_points: Any, n_waiting: Any, locati
 
 @allocating_kernel
 def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; returns how many are left UNDECIDED.
+    """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; return how many stay UNDECIDED, or NOT_FINITE.
 
-    Points go through one stage after another, many at a time, so that the loads of a stage do not wait for each other:
-    status, where most points end; code; groups of the list, parity.
-    Returns NOT_FINITE, with the rest undone, where a point is not: it is in no cell, so it costs little to look.
+    Points go through the stages in blocks, so that memory loads of a stage overlap: status (where most points end),
+    code, parity over the list. Only points beyond the grid are tested for NaN and infinity.
     """
     room = _FEWEST + _BLOCK + 1
     item_of, waiting = np.empty(room, np.uint64), np.empty(room, np.uint64)
-    kept_points = item_of, np.empty(room, np.int32), np.empty((room, 3), np.int32), waiting
-    n_open, n_kept = 0, np.uint64(0)
+    undecided = item_of, np.empty(room, np.int32), np.empty((room, 3), np.int32), waiting
+    n_open, n_undecided = 0, np.uint64(0)
     for start in range(0, len(points), _BLOCK):
         if flag[0]:
             break
         first, end = np.uint64(start), np.uint64(min(start + _BLOCK, len(points)))
-        n_kept, n_beyond = _first_status(points, first, end, cells, locations, item_of, n_kept)
+        n_undecided, n_beyond = _look_up_statuses(points, first, end, cells, locations, item_of, n_undecided)
         if n_beyond > 0 and has_not_finite(points[first:end]):
             return NOT_FINITE
-        if n_kept < _FEWEST and end < len(points):
+        if n_undecided < _FEWEST and end < len(points):
             continue
-        n_waiting = _enter(points, cells, kept_points, n_kept)
-        _ask_lists(points, cells, kept_points, n_waiting, locations)
-        for kept in range(n_kept):
-            n_open += locations[item_of[kept]] == UNDECIDED
-        n_kept = np.uint64(0)
+        n_waiting = _look_up_codes(points, cells, undecided, n_undecided)
+        _query_lists(points, cells, undecided, n_waiting, locations)
+        for slot in range(n_undecided):
+            n_open += locations[item_of[slot]] == UNDECIDED
+        n_undecided = np.uint64(0)
     return n_open
 
 
 @inline
 def side_in_cell(frames: FloatArray, places: IntArray, row: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of a blurred point (x, y, z) if its cell tells it, else UNDECIDED.
+    """Return the location of a blurred point (x, y, z) if one cell contains its blur, else UNDECIDED.
 
-    frames: (n, 6), places: (n, 4), what `Sides` has of each polyhedron, of which `row` counts.
+    frames (n, 6), places (n, 4): frame and place of the `Sides` of each polyhedron; `row` selects one.
     """
     x, y, z = p
     x_low, y_low, z_low = frames[row, 0], frames[row, 1], frames[row, 2]

@@ -1,32 +1,28 @@
-"""Locations that hold for every point within a blur of a given one: the filters for points in a posed body's frame.
+"""Filters of point location: sign of a value in floating point with a proven error bound, or UNDECIDED.
 
-A blurred point stands for all points whose coordinates are at most blur / 2 away. Each kernel answers where one
-location is proven for all of them, else UNDECIDED. Each bound is that of the plain filter plus the largest change
-that the blur can make, taken twice to pay for its own rounding; infinities and NaN compare false and so count as
-unsure.
+**Blurred points.** A blurred point stands for all points whose coordinates differ by at most blur / 2. A filter decides
+if all of them have the same location, else returns UNDECIDED. Its bound is that of the plain filter plus twice the
+largest change that the blur can cause; comparisons with infinities and NaN are false, which means UNDECIDED.
 
-The poses of many bodies side by side, with their inverses; moves points into a posed solid's own frame, with a bound
-on how far off each may be.
+**Points in a body's frame.** The exact preimage of q is R^-1 (q - t), computed as adj(R) (q - t) / det(R), u = 2^-53:
 
-The exact preimage of q is R^-1 (q - t). Floating point gives adj(R) (q - t) / det(R): a pose's entries are at most 1
-and its determinant 1, up to 1e-11, so an entry of the inverse is off by less than 32 u (u = 2^-53), and with the
-roundings of the difference, the products and the sums a coordinate is off by less than 48 u sum |q - t|. The `blur`
-of a point is more than twice that: adding it to a coordinate, or taking it off, in floating point leaves a true
-bound. From 2^1021 on, where a coordinate may overflow that should not, the blur is infinite, and nothing is sure.
+    entries of R <= 1, det(R) = 1 up to 1e-11     |error of an entry of the inverse| <= 32 u
+    difference, products, sums                    |error of a coordinate| <= 48 u sum |q - t|
+    blur                                          > 96 u sum |q - t|, so x + blur and x - blur rounded are bounds too
 
-Where R only turns the axes onto each other and every difference is exact, so is the preimage, and the blur is 0.
+From 2^1021 on, where a coordinate could overflow, the blur is infinite, and all is UNDECIDED. If R only permutes axes
+and the differences are exact, the preimage is exact and the blur is 0.
 
-Spheres: the exact sign of r^2 - |p - c|^2.
+**Balls.** The exact sign of r^2 - |p - c|^2, in three stages:
 
-Three stages. (1) An axis on which |p - c| rounds to more than r: rounding is monotone and r is a double, so the exact
-difference is above r as well, and the point is outside. (2) The plain value with an error bound: each difference
-carries u = 2^-53 relative error, each square 3 u, a sum of up to four terms 3 u more; `_BALL_SLACK` = 16 u covers this
-and the rounding of the bound. (3) Differences as exact pairs high + low; where all low parts are zero (the usual case
-on flush data), r^2 and the squares are exact pairs, and the sign is that of an expansion of at most eight terms. Else
-UNDECIDED. Squares are exact pairs only above 2^-480 in size, smaller ones (but zero) are UNDECIDED too.
+1. If |p - c| on one axis rounds to more than r, the point is outside: rounding is monotone and r is a double.
+2. The value in doubles: relative error u for a difference, 3 u for a square, 3 u more for a sum of up to four terms;
+   `_BALL_SLACK` = 16 u covers this and the rounding of the bound.
+3. Differences as exact pairs high + low. If all low parts are zero (usual on flush data), r^2 and the squares are exact
+   pairs, and the sign is that of an expansion of at most eight terms; else UNDECIDED. Squares are exact pairs above
+   2^-480 only: smaller ones (but zero) are UNDECIDED too.
 
-The first two stages are taken for a block of points at once, without branches: so the compiler uses vectors, and no
-processor has to foretell which points lie inside. In the plane z is 0 throughout.
+The first two stages run on a block of points without branches, so that the compiler vectorises them. In 2D z is 0.
 
 Source: two_diff, two_prod and growing expansions of Shewchuk 1997.
 """
@@ -48,21 +44,21 @@ from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, Int8Array,
 
 
 class Frames(NamedTuple):
-    """The poses of many bodies; those of the plane in the upper left."""
+    """The poses of many bodies with their inverses; 2D poses fill the upper left block."""
 
     rows: Int32Array
-    """Row of each body's pose in what follows, -1 for a body that stays where it is."""
+    """Row of each body's pose in the arrays below, -1 for a body without a pose."""
     rotations: FloatArray
     """``(n, 3, 3)``."""
     inverses: FloatArray
-    """``(n, 3, 3)``: each entry off by less than 32 units of rounding."""
+    """``(n, 3, 3)``: each entry within 32 u of the exact inverse."""
     translations: FloatArray
     is_turn: BoolArray
-    """Whether a rotation only turns the axes onto each other."""
+    """Whether a rotation only permutes the axes, up to sign."""
 
 
 def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
-    """Return the poses that move something, with their inverses."""
+    """Return the poses that are not the identity, with their inverses."""
     given = [(body, pose) for body, pose in enumerate(poses) if pose is not None]
     rotations, translations = np.zeros((len(given), 3, 3)), np.zeros((len(given), 3))
     rotations[:, 2, 2] = 1.0
@@ -92,15 +88,15 @@ def _inverses(rotations: FloatArray) -> FloatArray:
 
 
 _BLUR: Final = 16.0 * 2.0**-53
-"""Of eight times the differences: these overflow before a coordinate does."""
+"""Factor of eight times the differences: these overflow before a coordinate does."""
 
 
 @inline
 def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
-    """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 where it is exact.
+    """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 if it is exact.
 
-    frames: has inverses (n, 3, 3) of R^-1 rounded, translations (n, 3) and is_turn (n,): whether the entries are
-    exactly -1, 0 and 1. frame: which of them, -1 for none.
+    frames: inverses (n, 3, 3) of R^-1 rounded, translations (n, 3), is_turn (n,): whether all entries are exactly -1, 0
+    or 1. frame: row of the pose, -1 for none.
     """
     if frame < 0:
         return p, 0.0
@@ -118,7 +114,7 @@ def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
 
 @kernel
 def move_to_body_frame(points: FloatArray, frames: Frames, moved: FloatArray, blurs: FloatArray) -> None:
-    """Fill moved (n, dim) and blurs (n,) by the only one of `frames`."""
+    """Fill moved (n, dim) and blurs (n,) with points in the frame of the only pose in `frames`."""
     for item in range(len(points)):
         p, blurs[item] = to_frame(frames, 0, in_space(points, item))
         moved[item, 0], moved[item, 1] = p[0], p[1]
@@ -129,21 +125,21 @@ def move_to_body_frame(points: FloatArray, frames: Frames, moved: FloatArray, bl
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
 NOT_FINITE: Final = -1
-"""Returned by kernels in place of a count."""
+"""Returned by kernels instead of a count."""
 
 
 @inline
 def has_not_finite(points: FloatArray) -> bool:
-    """Tell whether NaN or an infinity is among points (n, dim): without a branch, at the speed of the memory."""
-    is_found, flat = False, points.reshape(points.size)
+    """Return whether points (n, dim) contain NaN or an infinity; branchless, at memory speed."""
+    is_any, flat = False, points.reshape(points.size)
     for place in range(len(flat)):
-        is_found |= flat[place] - flat[place] != 0.0
-    return is_found
+        is_any |= flat[place] - flat[place] != 0.0
+    return is_any
 
 
 @inline
 def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
-    """Return the sign of orient2d(a, b, .) on all of the blurred q, or UNDECIDED."""
+    """Return the sign of orient2d(a, b, .) that all of the blurred q share, or UNDECIDED."""
     left = (a.x - q.x) * (b.y - q.y)
     right = (a.y - q.y) * (b.x - q.x)
     turn = left - right
@@ -171,7 +167,7 @@ def side_of_box(
 
 @inline
 def side_of_rows(rows: FloatArray, first: int, last: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of a blurred point (x, y, z) by the rows first ... last of rows (n, 4)."""
+    """Return the location of a blurred point (x, y, z) by the rows first ... last of plane rows (n, 4)."""
     location = 1
     for row in range(first, last):
         ax, by, cz, d = rows[row, 0] * p[0], rows[row, 1] * p[1], rows[row, 2] * p[2], rows[row, 3]
@@ -188,7 +184,7 @@ def side_of_rows(rows: FloatArray, first: int, last: int, p: tuple[float, ...], 
 
 @inline
 def in_space(points: FloatArray, item: int) -> Any:
-    """Return a row of points (n, 2 or 3) as (x, y, z); z is 0 in the plane."""
+    """Return a row of points (n, 2 or 3) as (x, y, z), with z = 0 in 2D."""
     return float(points[item, 0]), float(points[item, 1]), 0.0 if points.shape[1] == 2 else float(points[item, 2])
 
 
@@ -196,9 +192,9 @@ def in_space(points: FloatArray, item: int) -> Any:
 def locate_in_rows_blurred(
     points: FloatArray, blurs: FloatArray, rows: FloatArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for rows (m, 4), each given or correctly rounded; returns how many stay open.
+    """Fill `locations` (n,) int8 for plane rows (m, 4), exact or correctly rounded; return how many stay UNDECIDED.
 
-    Those of the plane have 0 in the third place.
+    Planar rows have 0 in the third place.
     """
     n_open = 0
     for item in range(len(points)):
@@ -213,12 +209,11 @@ def locate_in_rows_blurred(
 def locate_in_box(
     points: FloatArray, blurs: FloatArray, low: FloatArray, high: FloatArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) and the corners low, high (dim,); returns how many stay open.
+    """Fill `locations` (n,) int8 for points (n, dim) and box corners (dim,); return how many stay UNDECIDED, or
+    NOT_FINITE.
 
-    Six comparisons, exact as they stand.
-    blurs: (n,), or (0,) for points that are exact; then none stays open, and NOT_FINITE is returned where one is not
-    finite. Where low = high on an axis every point of the box lies on its boundary: the comparisons say so by
-    themselves.
+    Six exact comparisons. blurs: (n,), or (0,) for exact points, which are all decided. Where low = high on an axis
+    every point of the box is BOUNDARY, by the comparisons themselves.
     """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
@@ -242,7 +237,7 @@ def locate_by_polynomial(
     """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED.
 
     blurs: as for `locate_in_box`. powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns
-    the count beyond the filter, or NOT_FINITE.
+    the number of points beyond the filter, or NOT_FINITE.
     """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
@@ -264,12 +259,12 @@ _BALL_SLACK: Final = 16.0 * 2.0**-53
 _SMALLEST: Final = 2.0**-480
 _LARGEST: Final = 2.0**500
 _BALL_BLOCK: Final = 64
-"""Points looked at together: four numbers each stay in the nearest cache."""
+"""Points of a block: four numbers each fit the L1 cache."""
 
 
 @merged
-def located(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
-    """Return the location of a point at that difference from the centre, UNDECIDED where the filter is unsure."""
+def location_in_ball(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
+    """Return the location of a point at that difference from the centre, UNDECIDED if the filter cannot prove it."""
     ax, ay, az = abs(dx), abs(dy), abs(dz)
     total = dx * dx + dy * dy + dz * dz
     excess, bound = square - total, _BALL_SLACK * (square + total) + _TINY
@@ -285,7 +280,7 @@ def _has_exact_square(value: float) -> bool:
 
 @called
 def _settle(points: FloatArray, item: int, center: FloatArray, radius: float, expansion: Any) -> int:
-    """Return the location by exact sums; UNDECIDED where differences or squares are no exact pairs."""
+    """Return the location by exact sums; UNDECIDED if differences or squares are no exact pairs."""
     if not _has_exact_square(radius):
         return UNDECIDED
     n = grow_product(expansion, 0, radius, radius)
@@ -301,16 +296,16 @@ def _settle(points: FloatArray, item: int, center: FloatArray, radius: float, ex
 def locate_in_ball(
     points: FloatArray, center: FloatArray, blur: float, radius: float, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim); returns how many needed more than the filter, or NOT_FINITE.
+    """Fill `locations` (n,) int8 for points (n, dim); return how many were beyond the filter, or NOT_FINITE.
 
-    blur: bound on the error of each coordinate of `center`; 0.0 where it is exact, else what stays open is UNDECIDED.
+    blur: bound on the error of each coordinate of `center`; if it is not 0.0, what the filter leaves stays UNDECIDED.
     """
     if has_not_finite(points):
         return NOT_FINITE
     is_flat, n_beyond = len(center) == 2, 0
     x, y, z = center[0], center[1], 0.0 if is_flat else center[2]
     square, reach, expansion = radius * radius, radius + 2.0 * blur, workspace(8)
-    dx, dy, dz, found = workspace(64), workspace(64), workspace(64), workspace(64)
+    dx, dy, dz, results = workspace(64), workspace(64), workspace(64), workspace(64)
     for first in range(0, len(points), _BALL_BLOCK):
         if flag[0]:
             break
@@ -319,11 +314,11 @@ def locate_in_ball(
             dx[j], dy[j] = points[first + j, 0] - x, points[first + j, 1] - y
             dz[j] = 0.0 if is_flat else points[first + j, 2] - z
         for j in range(_BALL_BLOCK):  # a number of turns that the compiler knows; those past `size` are not looked at
-            found[j] = located(dx[j], dy[j], dz[j], square, reach, blur)
+            results[j] = location_in_ball(dx[j], dy[j], dz[j], square, reach, blur)
         n_open = 0
         for j in range(size):
-            locations[first + j] = int(found[j])
-            n_open += found[j] == UNDECIDED
+            locations[first + j] = int(results[j])
+            n_open += results[j] == UNDECIDED
         n_beyond += n_open
         if n_open == 0 or blur > 0.0:
             continue

@@ -1,18 +1,19 @@
-"""Convex solids by their planes: a point is inside when it is on the inner side of every one.
+"""Convex solids by their planes: a point is inside if it is on the inner side of every plane.
 
-The signed distance is taken in floating point first. With u = 2^-53, each of at most four terms of
-a x + b y + c z + d carries at most one product and three sums, so the error is below 4 u (1 + 4 u) times the sum of the
-terms' sizes; `_SLACK` is 8 u, which also covers the rounding of that sum itself. A product that underflows is off by
-less than 2^-1075; `_TINY` covers all of them. Infinities and NaN fail the comparison and count as unsure.
+**Filter.** With u = 2^-53, each of at most four terms of a x + b y + c z + d carries at most one product and three
+sums:
 
-Points go in blocks through all rows, a row at a time, which is arithmetic on short arrays without a branch: what is
-kept of a point is its least signed distance. The sizes of the terms are taken at the block's largest coordinates, and
-the largest bound of all rows serves for all of them. The few points within it, and blocks whose terms are not far from
-overflow, are taken one by one. Where there are many rows, the points that are outside some of those taken so far, by
-more than the largest bound of these, are settled and leave the block.
+    |error| <= 4 u (1 + 4 u) sum |terms|          `_SLACK` = 8 u also covers the rounding of that sum
+    underflow of a product: < 2^-1075             `_TINY` covers all of them
 
-A row may also be the rounded image of a rational one (a posed plane, a wall of a prism): each coefficient then carries
-another u, which the slack has room for (5 u of 8 u), but what the filter leaves open stays UNDECIDED.
+Comparisons with infinities and NaN are false, which means UNDECIDED.
+
+**Blocks.** A block of points goes through all rows without branches and stores the least signed distance of each point.
+The bound is evaluated at the largest coordinates of the block and the largest row. Points within it, and blocks whose
+terms could overflow, are decided one by one. With many rows, points that are certainly outside leave the block early.
+
+A row may be the rounded image of a rational one (a posed plane, a wall of a prism): each coefficient then carries
+another u, which the slack covers (5 u of 8 u), but points beyond the filter stay UNDECIDED.
 
 Source: Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric predicates", for the form
 of the filter; the exact sign is `side.py`'s.
@@ -32,25 +33,25 @@ from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
 _BLOCK: Final = 256
-"""Points taken together: their coordinates and least distances fit the first-level cache."""
+"""Points of a block: their coordinates and least distances fit the L1 cache."""
 _FEW: Final = 16
-"""Points below which a block would cost more than it spares."""
+"""Number of points below which a block costs more than it saves."""
 _ROWS: Final = 4
-"""Rows taken together: coordinates and least distances are loaded once for all of them."""
+"""Rows per pass over a block: coordinates and least distances are loaded once for all of them."""
 _LARGE: Final = 1e300
-"""Terms of a row whose sizes add up to less than this cannot overflow, in any order; NaN is not less."""
+"""Bound on the sum of |terms| of a row below which no partial sum overflows; false for NaN."""
 
 
 @merged
 def _row(planes: FloatArray, row: int, is_flat: bool) -> HalfSpace3:
-    """Return row `row` of planes (m, 3 or 4); those of the plane have 0 in the third place, as points have."""
+    """Return row `row` of planes (m, 3 or 4) as four numbers; planar rows have 0 in the third place."""
     a, b, d = float(planes[row, 0]), float(planes[row, 1]), float(planes[row, 2 if is_flat else 3])
     return HalfSpace3(a, b, 0.0 if is_flat else float(planes[row, 2]), d)
 
 
 @inline
 def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: BoolArray) -> tuple[int, bool]:
-    """Return the location of a point (n, 2 or 3) and whether it needed more than the filter."""
+    """Return the location of a point (n, 2 or 3), and whether it was beyond the filter."""
     x, y, z = in_space(points, item)
     p, location, is_unsure = Point3(x, y, z), 1, False
     for row in range(len(planes)):
@@ -72,7 +73,7 @@ def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: Boo
 
 @inline
 def _largest(values: FloatArray, folded: FloatArray) -> float:
-    """Return the largest size of values (_BLOCK,), by halves: short loops that the compiler turns into vectors."""
+    """Return max |values| of (_BLOCK,) by pairwise reduction, which the compiler vectorises."""
     half = _BLOCK // 2
     for k in range(half):
         folded[k] = max(abs(values[k]), abs(values[k + half]))
@@ -94,8 +95,8 @@ def locate_in_half_spaces(
 ) -> int:
     """Fill `locations` (n,) int8 for points (n, dim) and planes (m, dim + 1); UNDECIDED beyond the exponents' range.
 
-    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow.
-    Returns how many points needed more than the filter, or NOT_FINITE. Stops early once flag[0] is set.
+    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow. Returns how
+    many points were beyond the filter, or NOT_FINITE. Stops early once flag[0] is set.
     """
     is_flat = planes.shape[1] == 3
     if has_not_finite(points):
@@ -108,7 +109,7 @@ def locate_in_half_spaces(
         return n_beyond
     xs, ys, zs = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
     least, folded = np.empty(_BLOCK), np.empty(_BLOCK)
-    places, found = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
+    places, results = np.empty(_BLOCK, np.uint32), np.empty(_BLOCK, np.int8)
     for start in range(0, len(points), _BLOCK):
         stop, is_thinned = min(start + _BLOCK, len(points)), False
         count = stop - start
@@ -151,10 +152,10 @@ def locate_in_half_spaces(
         n_open = 0
         for k in range(count):
             is_in, is_out = least[k] > bound, least[k] < -bound
-            found[k] = UNDECIDED - is_in - 3 * is_out  # no branch: 1, -1 or 2
+            results[k] = UNDECIDED - is_in - 3 * is_out  # no branch: 1, -1 or 2
             n_open += not (is_in | is_out)
         for k in range(count):
-            locations[start + (places[k] if is_thinned else k)] = found[k]
+            locations[start + (places[k] if is_thinned else k)] = results[k]
         for item in range(start, stop if n_open > 0 else start):
             if locations[item] == UNDECIDED:
                 locations[item], is_unsure = _locate_one(points, item, planes, is_exact)

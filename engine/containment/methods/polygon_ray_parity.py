@@ -1,17 +1,19 @@
-"""Polygon by ray and parity: even-odd over all edges of all rings, exact, with no ray ever cast again.
+"""Point location in a polygon by ray parity: even-odd over all edges of all rings, exact, one ray a point.
 
-The ray goes right from q. Moving q up by an infinitesimal eps makes it miss every vertex: an edge is passed if one end
-has y <= q.y and the other y > q.y, and counts if its crossing lies to the right, which is a sign of orient2d. Where
-that sign is zero and q is between the ends, q is on the edge: BOUNDARY, whatever the parity. Horizontal edges are
-never passed and are only looked at for BOUNDARY.
+The ray goes right from q, moved up by an infinitesimal eps (simulation of simplicity), so it misses every vertex:
 
-Edges are listed as runs, from one vertex of a ring to another: the rings themselves, or what a horizontal slab holds of
-them (prepared.py). The filter looks at all edges of a run without a branch, so that the compiler works on several at a
-time; where the sign at a passed edge is not sure, or a vertex is level with q (which may then lie on a horizontal
-edge), the edges are taken one by one. A grid of cells, if there is one, knows the location of all points of most cells.
+| edge | decision |
+|---|---|
+| one end with y <= q.y, the other with y > q.y | crossed if the crossing is right of q: sign of orient2d |
+| that sign is zero | q is on the edge: BOUNDARY, whatever the parity |
+| horizontal | never crossed, tested for BOUNDARY only |
 
-A point may carry a blur, a bound on its coordinates' error as in methods/filters.py; then what is not sure stays
-UNDECIDED.
+Edges are listed as runs, from one vertex of a ring to another: whole rings, or the parts of them in a horizontal slab
+(prepared.py). The filter goes over all edges of a run without branches, so that the compiler vectorises it; the edges
+are decided one by one if the sign at a crossed edge is uncertain or a vertex has the height of q. A grid of cells, if
+built, knows the location of all points of most cells.
+
+A point may have a blur, a bound on its coordinates' error as in methods/filters.py; what it leaves open is UNDECIDED.
 
 Source: Shimrat 1962, "Algorithm 112: position of point relative to polygon"; Hormann and Agathos 2001, "The point in
 polygon problem for arbitrary polygons". Changed: exact signs, three values.
@@ -31,33 +33,33 @@ from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point2
 
 MISSED, CROSSED, ON_EDGE = 0, 1, 3
-"""How a ray meets an edge."""
+"""Whether a ray crosses an edge."""
 MIXED: Final = 2
-"""Status of a cell that an edge may reach into; others have the location of their points."""
+"""Status of a cell that an edge may reach into; another cell has the location of its points."""
 
 
 class Rings(NamedTuple):
     """Edges of a polygon by horizontal slabs, for rays to the right."""
 
     xs: FloatArray
-    """The vertices of all rings, each ended by its first one."""
+    """x of the vertices of all rings, each ring closed by its first vertex."""
     ys: FloatArray
     slabs: Axis
     offsets: IntArray
-    """``(n_slabs + 1,)``: where the runs of each slab begin."""
+    """``(n_slabs + 1,)``: first run of each slab."""
     runs: Int32Array
-    """``(n, 2)``: the first and the last vertex of each."""
+    """``(n, 2)``: first and last vertex of each run."""
     box: tuple[float, float, float, float]
     """xmin, xmax, ymin, ymax."""
     u: Axis
     v: Axis
     statuses: Int8Array
-    """Of the cells, row by row; none where there is no grid."""
+    """Of the cells, row by row; empty without a grid."""
 
 
 @merged
-def _pass_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
-    """Tell whether the edge counts for q, and whether that is not sure."""
+def _crosses_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
+    """Return whether the ray from q crosses the edge, and whether the filter cannot prove it."""
     above = ay - y
     left = (ax - x) * (by - y)
     right = above * (bx - x)
@@ -73,11 +75,11 @@ def _pass_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, b
 def _count_crossings(
     xs: FloatArray, ys: FloatArray, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, int]:
-    """Return how many edges between the vertices first ... last count for q, and how many are not sure."""
+    """Return how many edges between the vertices first ... last are crossed, and how many are uncertain."""
     n_crossed = n_unsure = 0
     for edge in range(np.uint64(first), np.uint64(last)):  # unsigned: no index that counts from the end
         follow = edge + np.uint64(1)
-        is_crossed, is_unsure = _pass_edge(xs[edge], ys[edge], xs[follow], ys[follow], x, y, blur)
+        is_crossed, is_unsure = _crosses_edge(xs[edge], ys[edge], xs[follow], ys[follow], x, y, blur)
         n_crossed += is_crossed
         n_unsure += is_unsure
     return n_crossed, n_unsure
@@ -85,7 +87,7 @@ def _count_crossings(
 
 @inline
 def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
-    """Return CROSSED if the ray to the right from q passes the edge, MISSED, ON_EDGE or UNDECIDED."""
+    """Return CROSSED, MISSED, ON_EDGE or UNDECIDED for the ray to the right from q and an edge."""
     if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
         return MISSED
     is_passed = (a.y <= q.y) != (b.y <= q.y)
@@ -103,8 +105,8 @@ def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
 
 
 @called
-def _one_by_one(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
-    """Return the location of q by some runs, UNDECIDED where a sign is out of the compiled range."""
+def _locate_edge_by_edge(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
+    """Return the location of q by some runs, edge by edge; UNDECIDED if a sign is out of the compiled range."""
     is_odd, is_open = False, False
     for run in range(first, last):
         for edge in range(runs[run, 0], runs[run, 1]):
@@ -123,10 +125,10 @@ def _one_by_one(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, la
 def locate_in_runs(
     xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, bool]:
-    """Return the location of (x, y) by the runs first ... last, and whether it took more than a filter.
+    """Return the location of (x, y) by the runs first ... last, and whether it was beyond the filter.
 
     xs, ys: of closed rings. Caller guarantees that every edge at the height of the point is in one of these runs; so a
-    vertex at that height is never the end of a run but where it closes a ring.
+    vertex at that height never ends a run unless it closes a ring.
     """
     n_crossed = n_unsure = 0
     for run in range(first, last):
@@ -137,12 +139,12 @@ def locate_in_runs(
         return (1 if n_crossed & 1 else -1), False
     if blur != 0.0:
         return UNDECIDED, True
-    return _one_by_one(xs, ys, runs, first, last, Point2(x, y)), True
+    return _locate_edge_by_edge(xs, ys, runs, first, last, Point2(x, y)), True
 
 
 @merged
-def _look_up(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
-    """Give each point the status of its cell, without a branch."""
+def _write_cell_statuses(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
+    """Write the status of each point's cell to locations; branchless."""
     u, v, (x_min, x_max, y_min, y_max), statuses = rings.u, rings.v, rings.box, rings.statuses
     for item in range(len(points)):
         x, y = points[item, 0], points[item, 1]
@@ -155,9 +157,10 @@ def _look_up(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
 
 @kernel
 def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2) from a `Rings`; returns how many needed more than the filter.
+    """Fill `locations` (n,) int8 for points (n, 2) from a `Rings`; return how many were beyond the filter, or
+    NOT_FINITE.
 
-    blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite.
+    blurs: (n,), or (0,) for exact points; only these are tested for NaN and infinity.
     """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
@@ -165,7 +168,7 @@ def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locatio
     slabs, offsets, n_beyond = rings.slabs, rings.offsets, 0
     has_cells = len(rings.statuses) > 0 and len(blurs) == 0
     if has_cells:
-        _look_up(points, rings, locations)
+        _write_cell_statuses(points, rings, locations)
     for item in range(len(points)):
         if has_cells and locations[item] != MIXED:
             continue

@@ -1,8 +1,10 @@
-"""Polyhedron by ray and parity for few points: one pass over the triangles, with nothing prepared.
+"""Point location in a polyhedron by ray parity in one pass over the triangles, with nothing prepared.
 
-The points are sorted into a grid over x and y, and each triangle looks up those below it. The decisions are those of
-polyhedron_ray_parity.py, so the answers are too. A pass costs some 20 ns a triangle, where a tree costs 0.5 us a
-triangle to build: it is for a solid that is asked once or a few times.
+Points are sorted into a grid over x and y, and each triangle looks up the points below it. The decisions are those of
+polyhedron_ray_parity.py, so the answers are too. A pass costs some 20 ns a triangle, building a tree 0.5 us: a pass is
+for the first few batches on a solid.
+
+Source: ray parity after Shimrat 1962; the grid over the points after C. Ericson, Real-Time Collision Detection, 2005.
 """
 
 from __future__ import annotations
@@ -19,12 +21,13 @@ from engine.predicates.vectors import as_point3, corners_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 
 _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
-"""Bits of what is known of a point."""
+"""Bits of the state of a point."""
 
 
 @inline
 def _sort_into_cells(points: FloatArray, u: Axis, v: Axis, firsts: IntArray, order: Int32Array) -> None:
-    """Fill order (n,) int32 with the points (n, 3) by their cell, and firsts (u_cells * v_cells + 1,) with the places.
+    """Fill order (n,) int32 with the points (n, 3) sorted by cell, and firsts (u_cells * v_cells + 1,) with the
+    offsets.
 
     u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
     """
@@ -48,8 +51,8 @@ def _cell_at(points: FloatArray, item: int, u: Axis, v: Axis) -> int:
 
 
 @inline
-def _take_down(states: FlagArray, item: int, met: int) -> None:
-    """Enter in a point's state how its ray met a triangle."""
+def _record(states: FlagArray, item: int, met: int) -> None:
+    """Record in a point's state how its ray meets a triangle."""
     if met & BEYOND:
         states[item] |= _BEYOND
     met &= 3
@@ -62,8 +65,8 @@ def _take_down(states: FlagArray, item: int, met: int) -> None:
 
 
 @inline
-def _conclude(states: FlagArray, locations: Int8Array) -> int:
-    """Fill the locations from the states; returns how many points needed more than the filter."""
+def _write_locations(states: FlagArray, locations: Int8Array) -> int:
+    """Fill the locations from the states; return how many points were beyond the filter."""
     n_beyond = 0
     for item in range(len(states)):
         state = states[item]
@@ -78,13 +81,13 @@ def _conclude(states: FlagArray, locations: Int8Array) -> int:
 
 
 @inline
-def _pass_over(
+def _cast_rays(
     points: FloatArray, cells: Any, vertices: FloatArray, triangles: IntArray, z_min: float, states: FlagArray,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Enter in states (n,) uint8 how the rays of points (n, 3) meet the triangles (m, 3).
+    """Record in states (n,) uint8 how the vertical rays from points (n, 3) meet the triangles (m, 3).
 
-    cells: u, v, firsts, order as `_sort_into_cells` leaves them. z_min: least of the points.
+    cells: u, v, firsts, order as `_sort_into_cells` leaves them. z_min: least z of the points.
     """
     u, v, firsts, order = cells
     for triangle in range(len(triangles)):
@@ -107,12 +110,12 @@ def _pass_over(
                 is_above = q.z > z_high
                 if is_above or q.x < x_low or q.x > x_high or q.y < y_low or q.y > y_high or states[item] & _ON_FACE:
                     continue
-                _take_down(states, item, meet_upwards(a, b, c, q))
+                _record(states, item, meet_upwards(a, b, c, q))
 
 
 @inline
 def _axis_over(points: FloatArray, axis: int, n_cells: int) -> Axis:
-    """Return cells over the points along an axis, one where there is no extent: `make_axis`, compiled."""
+    """Return the cells over the points along an axis, one if they have no extent: `make_axis`, compiled."""
     low = high = float(points[0, axis])
     for item in range(1, len(points)):
         low, high = min(low, float(points[item, axis])), max(high, float(points[item, axis]))
@@ -124,7 +127,7 @@ def _axis_over(points: FloatArray, axis: int, n_cells: int) -> Axis:
 def locate_by_pass(
     points: FloatArray, vertices: FloatArray, triangles: IntArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3), n > 0; returns how many needed more than the filter, or NOT_FINITE.
+    """Fill `locations` (n,) int8 for points (n, 3), n > 0; return how many were beyond the filter, or NOT_FINITE.
 
     triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge.
     """
@@ -135,5 +138,5 @@ def locate_by_pass(
     firsts, order = np.zeros(u.n_cells * v.n_cells + 1, np.int64), np.empty(len(points), np.int32)
     _sort_into_cells(points, u, v, firsts, order)
     states = np.zeros(len(points), np.uint8)
-    _pass_over(points, (u, v, firsts, order), vertices, triangles, z_min, states, flag)
-    return int(_conclude(states, locations))
+    _cast_rays(points, (u, v, firsts, order), vertices, triangles, z_min, states, flag)
+    return int(_write_locations(states, locations))

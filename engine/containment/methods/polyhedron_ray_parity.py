@@ -1,24 +1,26 @@
-"""Polyhedron by ray and parity: even-odd over all triangles, exact, with no ray ever cast again.
+"""Point location in a polyhedron by ray parity: even-odd over all triangles, exact, one ray a point.
 
-The ray goes straight up from q = (x, y, z), moved by the symbolic (eps, eps^2, 0). So moved, no vertex, no edge and no
-vertical triangle lies over it, and every other triangle is passed in its interior or not at all:
+The ray goes straight up from q = (x, y, z), moved by the symbolic (eps, eps^2, 0) (simulation of simplicity). So moved,
+no vertex, no edge and no vertical triangle is above q, and every other triangle is crossed in its interior or missed:
 
-- q' is in the triangle's projection if orient2d(a, b, q), (b, c, q), (c, a, q) have one sign, that of its area. A zero
-  is decided by the move: see predicates/orientation.py.
-- orient3d(a, b, c, q) tells whether the triangle passes above q or below. Where it is zero and q is in the closed
-  projection, q is on the triangle: BOUNDARY, whatever the parity.
-- The three signs add up to the area: all are zero where the triangle is vertical (or less) and q on its line. It is
-  only looked at for BOUNDARY. Such a q is in its plane and on no projection on both sides of its edges; that also
-  holds for triangles that are a segment or a point.
+| test | decision |
+|---|---|
+| orient2d(a, b, q), (b, c, q), (c, a, q) have the area's sign | q' is in the projection; zeros: see orientation.py |
+| orient3d(a, b, c, q) | whether the triangle is above q or below |
+| orient3d = 0, q in the closed projection | q is on the triangle: BOUNDARY, whatever the parity |
+| all three orient2d = 0 (their sum is the area) | the triangle is vertical or degenerate: tested for BOUNDARY only |
+
+In the last case q is on the triangle if it is in its plane and no projection has q on both sides of its edges; that
+also holds for triangles that are a segment or a point.
 
 Both triangles at an edge decide the zero on their common edge alike, so the parity is that of a generic ray close to q
 for every surface that is even at each edge: also self-intersecting, non-manifold and degenerate ones.
 
-The triangles over q are found in a tree of boxes (bvh.py), whose float32 boxes hold theirs; q is widened by more than
-its own rounding. Eight at a time are counted or left out in single precision (`overhead`), the rest one by one. A q
-with a blur (methods/filters.py) is located where all rays of it agree, else left UNDECIDED.
+A tree of boxes (bvh.py) gives the triangles above q; its float32 boxes contain theirs, and q is widened by more than
+its own rounding. Eight triangles at a time are counted or excluded in single precision (`overhead`), the rest one by
+one. A q with a blur (methods/filters.py) is located if all of its rays agree, else UNDECIDED.
 
-Source: the textbook's ray and parity test.
+Source: ray parity after Shimrat 1962 and the textbook.
 """
 
 from __future__ import annotations
@@ -48,18 +50,17 @@ from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Arr
 MISSED: Final = 0
 CROSSED: Final = 1
 ON_FACE: Final = 3
-"""How a ray meets a triangle; UNDECIDED where a sign is out of the compiled range, for rational arithmetic."""
+"""How a ray meets a triangle; UNDECIDED if a sign is out of the compiled range."""
 BEYOND: Final = 4
-"""Added to one of these where the filter was not enough."""
+"""Added to one of these if the filter did not suffice."""
 _SLACK: Final = 2.0**-22
-"""Part of a coordinate in the tree's coordinates by which a point is widened, for its rounding to float32 and that of
-the ends of boxes near it."""
+"""Relative widening of a coordinate in the tree, for its rounding to float32 and that of the boxes near it."""
 _ABOVE_ALL: Final = np.float32(8.0)
 
 
 @inline
-def decide2(a: Point2, b: Point2, c: Point2) -> Any:
-    """Return (orient2d, 0), or (orient2d, BEYOND) where it took more than the filter."""
+def orient2d_with_stage(a: Point2, b: Point2, c: Point2) -> Any:
+    """Return (orient2d, 0), or (orient2d, BEYOND) if the filter did not suffice."""
     turn = orient2d_filter(a, b, c)
     if turn != UNDECIDED:
         return turn, 0
@@ -67,14 +68,14 @@ def decide2(a: Point2, b: Point2, c: Point2) -> Any:
 
 
 @inline
-def moved_sign(turn: int, a: Point2, b: Point2) -> int:
+def perturbed_sign(turn: int, a: Point2, b: Point2) -> int:
     """Return `turn` = orient2d(a, b, q), a zero decided as for q + (eps, eps^2)."""
     return turn if turn != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
 @inline
-def is_astride(first: int, second: int, third: int) -> bool:
-    """Tell whether both 1 and -1 are among the three signs; UNDECIDED counts as neither."""
+def has_both_signs(first: int, second: int, third: int) -> bool:
+    """Return whether both 1 and -1 are among three signs; UNDECIDED counts as neither."""
     has_left = first == 1 or second == 1 or third == 1
     has_right = first == -1 or second == -1 or third == -1
     return has_left and has_right
@@ -82,9 +83,9 @@ def is_astride(first: int, second: int, third: int) -> bool:
 
 @inline
 def touch_in_plane(a: Point2, b: Point2, c: Point2, q: Point2) -> int:
-    """Return ON_FACE, MISSED or UNDECIDED for 2D points: q among the signs of all three edges never on both sides."""
+    """Return ON_FACE, MISSED or UNDECIDED for a 2D point and triangle: ON_FACE unless the edge signs differ."""
     first, second, third = orient2d(a, b, q), orient2d(b, c, q), orient2d(c, a, q)
-    if is_astride(first, second, third):
+    if has_both_signs(first, second, third):
         return MISSED
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED
@@ -93,7 +94,7 @@ def touch_in_plane(a: Point2, b: Point2, c: Point2, q: Point2) -> int:
 
 @inline
 def touch_triangle(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
-    """Return ON_FACE if q lies on the closed triangle a, b, c, which may be degenerate; else MISSED, or UNDECIDED.
+    """Return ON_FACE if q lies on the closed, maybe degenerate triangle a, b, c; else MISSED, or UNDECIDED.
 
     Caller guarantees that q lies in the triangle's box.
     """
@@ -119,30 +120,30 @@ def touch_triangle(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
 
 @inline
 def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
-    """Return CROSSED if the ray up from the moved q meets the triangle, ON_FACE if q is on it, MISSED or UNDECIDED.
+    """Return CROSSED if the ray up from the moved q crosses the triangle, ON_FACE if q is on it, MISSED or UNDECIDED.
 
-    BEYOND is added where it took more than the filter.
+    BEYOND is added if the filter did not suffice.
     """
     if q.z > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
-    first, beyond = decide2(a2, b2, q2)
-    second, more = decide2(b2, c2, q2)
+    first, beyond = orient2d_with_stage(a2, b2, q2)
+    second, more = orient2d_with_stage(b2, c2, q2)
     if first * second == -1:
         return MISSED | beyond | more
-    third, most = decide2(c2, a2, q2)
+    third, most = orient2d_with_stage(c2, a2, q2)
     beyond |= more | most
-    if is_astride(first, second, third):
+    if has_both_signs(first, second, third):
         return MISSED | beyond
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED | beyond
     area = first if first != 0 else second if second != 0 else third
     if area == 0:
-        is_beside = q.x < min(a.x, b.x, c.x) or q.x > max(a.x, b.x, c.x)
-        is_beside |= q.y < min(a.y, b.y, c.y) or q.y > max(a.y, b.y, c.y)
-        return (MISSED if is_beside or q.z < min(a.z, b.z, c.z) else touch_triangle(a, b, c, q)) | beyond
-    is_inside = moved_sign(first, a2, b2) == area and moved_sign(second, b2, c2) == area
-    is_inside = is_inside and moved_sign(third, c2, a2) == area
+        is_outside = q.x < min(a.x, b.x, c.x) or q.x > max(a.x, b.x, c.x)
+        is_outside |= q.y < min(a.y, b.y, c.y) or q.y > max(a.y, b.y, c.y)
+        return (MISSED if is_outside or q.z < min(a.z, b.z, c.z) else touch_triangle(a, b, c, q)) | beyond
+    is_inside = perturbed_sign(first, a2, b2) == area and perturbed_sign(second, b2, c2) == area
+    is_inside = is_inside and perturbed_sign(third, c2, a2) == area
     if q.z < min(a.z, b.z, c.z):
         return (CROSSED if is_inside else MISSED) | beyond
     side = orient3d_filter(a, b, c, q)
@@ -158,13 +159,13 @@ def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
 
 @inline
 def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> int:
-    """Return CROSSED if the rays up from all of the blurred q meet the triangle, MISSED if none does, or UNDECIDED."""
+    """Return CROSSED or MISSED if all rays up from the blurred q agree, else UNDECIDED."""
     if q.z - blur > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
     first, second = orient2d_blurred(a2, b2, q2, blur), orient2d_blurred(b2, c2, q2, blur)
     third = orient2d_blurred(c2, a2, q2, blur)
-    if is_astride(first, second, third):
+    if has_both_signs(first, second, third):
         return MISSED
     if first == UNDECIDED or second == UNDECIDED or third == UNDECIDED:
         return UNDECIDED | BEYOND
@@ -176,8 +177,8 @@ def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> in
 
 @merged
 def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, bool]:
-    """Return q in the coordinates of the tree, its z widened upwards, the least and the most that the rays up from the
-    blurred one may reach there, the blur there, and whether q is near enough for that."""
+    """Return q in tree coordinates, its z widened upwards, the range of z of its blurred rays, its blur there, and
+    whether q is near enough for that."""
     origin, scale = tree.origin, tree.scale
     x, y, z, wide = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale, blur / scale
     u, v, w = _SLACK * abs(x) + wide + LEAST, _SLACK * abs(y) + wide + LEAST, _SLACK * abs(z) + wide + LEAST
@@ -188,13 +189,13 @@ def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, b
 
 
 @allocating_kernel
-def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: IntArray) -> tuple[int, bool]:
-    """Fill found (n,) int64 with the rows of `tree.triangles` of which it is not sure how the rays up from all of the
-    blurred (x, y, z) meet them; return how many, and whether they meet an odd number of the others.
+def list_uncertain(tree: Any, x: float, y: float, z: float, blur: float, uncertain: IntArray) -> tuple[int, bool]:
+    """List the triangles for which the rays up from a blurred point (x, y, z) may disagree.
 
-    The number is -1 where there is no room, or the point is too far from the tree.
+    Fills uncertain (n,) int64 with their rows in `tree.triangles`; returns their number and whether the rays cross an
+    odd number of the others. The number is -1 if there is no room, or the point is too far from the tree.
     """
-    q, stack, n_found, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
+    q, stack, n_uncertain, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
     _, least, most, _, is_near = _in_tree(tree, q, blur)
     if not is_near:
         return -1, False
@@ -214,18 +215,18 @@ def list_unsure(tree: Any, x: float, y: float, z: float, blur: float, found: Int
             met = _meet_blurred(a, b, c, q, blur)
             is_odd ^= met == CROSSED
             if met & 3 == UNDECIDED:
-                if n_found == len(found):
+                if n_uncertain == len(uncertain):
                     return -1, False
-                found[n_found] = -1 - child
-                n_found += 1
-    return n_found, is_odd
+                uncertain[n_uncertain] = -1 - child
+                n_uncertain += 1
+    return n_uncertain, is_odd
 
 
 @inline
 def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: FlagArray) -> tuple[int, bool]:
-    """Return the location of a blurred q in a `TriangleTree`, and whether it took more than a filter.
+    """Return the location of a blurred q by a `TriangleTree`, and whether it was beyond the filter.
 
-    stack: (STACK,) int32. Coordinates of the tree are at most 2, and so is q in it, or it is outside.
+    stack: (STACK,) int32. Tree coordinates are at most 2; a q beyond them is outside.
     """
     low, high = tree.low, tree.high
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
@@ -242,9 +243,9 @@ def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: F
         lanes = inside_box(tree.boxes, node, least, most)
         if lanes != 0 and tree.child[node, 0] < 0:
             u, v = local.x - float(tree.boxes[node, 0, 0]), local.y - float(tree.boxes[node, 1, 0])
-            over, beside = overhead(tree.blocks, tree.boxes, node, u, v, local.z, wide)
+            over, apart = overhead(tree.blocks, tree.boxes, node, u, v, local.z, wide)
             is_odd ^= (count_bits(lanes & over) & 1) == 1
-            lanes &= ~(over | beside)
+            lanes &= ~(over | apart)
         while lanes != 0:
             child = int(tree.child[node, lowest_bit(lanes)])
             lanes &= lanes - 1
@@ -264,10 +265,10 @@ def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: F
 
 @allocating_kernel
 def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3); returns how many needed more than the filter.
+    """Fill `locations` (n,) int8 for points (n, 3); return how many were beyond the filter, or NOT_FINITE.
 
-    blurs: (n,), or (0,) for points that are exact; then NOT_FINITE is returned where one is not finite. tree: a
-    `TriangleTree`. Caller guarantees a surface that is even at each edge.
+    blurs: (n,), or (0,) for exact points; only these are tested for NaN and infinity. tree: a `TriangleTree`. Caller
+    guarantees a surface that is even at each edge.
     """
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
@@ -278,7 +279,7 @@ def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: 
 def _locate_each(
     points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, stack: Int32Array, flag: FlagArray
 ) -> int:
-    """Do what `locate_by_tree` does, without counting references to the arrays of the tree for each point."""
+    """Do the work of `locate_by_tree`, without reference counts for the tree's arrays at each point."""
     n_beyond = 0
     for item in range(len(points)):
         if flag[0]:
@@ -300,10 +301,10 @@ def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatA
 
 
 @kernel
-def lay_out(
+def reorder_by_tree(
     vertices: FloatArray, triangles: IntArray, tree: Bvh, child: Int32Array, ordered: Int32Array, blocks: Float32Array
 ) -> None:
-    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, child with its children numbered so.
+    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and renumber child accordingly.
 
     blocks: (n_nodes, 8, 8) float32, zero; filled as `overhead` reads them.
     """

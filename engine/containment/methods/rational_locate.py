@@ -1,11 +1,10 @@
-"""Locates one point of any rational coordinates in any solid, posed or not, in integer arithmetic.
+"""Exact fallback: locates one point of any rational coordinates in any solid, posed or not, in integer arithmetic.
 
-Plain Python: what the compiled kernels leave undecided comes here one point at a time, and so do points that are no
-float64 (exact images under a pose, sample points of an arrangement). Signs do not change when all coordinates are
-multiplied by a common positive denominator, so every decision is a polynomial over Python integers.
+Plain Python, one point at a time: for points that compiled kernels leave UNDECIDED, and for points that are no float64
+(exact images under a pose, sample points of an arrangement). A common positive denominator does not change a sign, so
+every decision is the sign of a polynomial of Python integers.
 
-Source: the sign rules are those of polyhedron_ray_parity.py and polygon_ray_parity.py; here they have no filter in
-front.
+Source: the sign rules are those of polyhedron_ray_parity.py and polygon_ray_parity.py, without a filter.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, list_unsure
+from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, list_uncertain
 from engine.errors import UnsupportedSolidError
 from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import (
@@ -53,7 +52,7 @@ _MOST_UNSURE = 1 << 10
 
 
 def no_check() -> None:
-    """Stand in for `Budget.check` where there is no budget."""
+    """Do nothing: stands for `Budget.check` if there is no budget."""
 
 
 def _orient2d(a: Sequence[int], b: Sequence[int], c: Sequence[int]) -> int:
@@ -62,15 +61,15 @@ def _orient2d(a: Sequence[int], b: Sequence[int], c: Sequence[int]) -> int:
 
 
 def _orient3d(a: Sequence[int], b: Sequence[int], c: Sequence[int], d: Sequence[int]) -> int:
-    """Return 1 when d lies on the side that the normal of (a, b, c) points to, -1 on the other, 0 in the plane."""
+    """Return 1 if d is on the side that the normal of (a, b, c) points to, -1 on the other, 0 in the plane."""
     return sign_of(dot(cross(minus(b, a), minus(c, a)), minus(d, a)))
 
 
 def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -> bool:
-    """Tell whether q lies on the closed triangle a, b, c of space, which may be a segment or a point.
+    """Return whether q lies on the closed triangle a, b, c of space, which may be a segment or a point.
 
-    In the plane of a proper triangle q is inside when no projection sees it on both sides of the three edges; beside
-    the line of a degenerate one some projection does, because the three signed areas add up to zero.
+    In the plane of a proper triangle q is inside if no projection has it on both sides of the three edges. Off the line
+    of a degenerate one some projection does, because the three signed areas add up to zero.
     """
     if any(not min(a[k], b[k], c[k]) <= q[k] <= max(a[k], b[k], c[k]) for k in range(3)):
         return False
@@ -86,7 +85,7 @@ def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -
 
 
 def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
-    """Return ON_FACE, or whether the ray from q moved by (eps, eps^2, 0) straight up meets the triangle."""
+    """Return ON_FACE, or whether the ray straight up from q + (eps, eps^2, 0) crosses the triangle."""
     area = _orient2d(a, b, c)
     if area != 0:
         turns = [_orient2d(p, r, q) for p, r in ((a, b), (b, c), (c, a))]
@@ -102,8 +101,8 @@ def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
     return ON_FACE if _is_on_closed_triangle(a, b, c, q) else MISSED
 
 
-def _around(value: Number) -> tuple[float, float]:
-    """Return floats (low, high) with low <= value <= high, both equal to it where it is a float."""
+def _enclosing_floats(value: Number) -> tuple[float, float]:
+    """Return floats (low, high) with low <= value <= high, both equal to value if it is a float."""
     try:
         near = float(value)
     except OverflowError:
@@ -114,7 +113,7 @@ def _around(value: Number) -> tuple[float, float]:
 
 
 def triangle_boxes(solid: Polyhedron) -> FloatArray:
-    """Return the six rows xmin, xmax, ymin, ymax, zmin, zmax over the triangles of `solid`, prepared once."""
+    """Return the six rows xmin, xmax, ymin, ymax, zmin, zmax over the triangles of `solid`, built once."""
 
     def build() -> FloatArray:
         boxes = np.empty((len(solid.triangles), 6))
@@ -124,27 +123,28 @@ def triangle_boxes(solid: Polyhedron) -> FloatArray:
     return solid.prepared("triangle_boxes", build)
 
 
-def _unsure_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntArray, bool]:
-    """Return the triangles (n, 3) that the ray up from a point may meet, and whether it meets an odd number of others.
+def _uncertain_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntArray, bool]:
+    """Return the triangles (n, 3) that the ray up from a point may meet, and whether it crosses an odd number of
+    others.
 
-    By the tree where there is one, else by a look at all boxes.
+    By the tree if there is one, else by all boxes.
     """
-    near = [_around(value) for value in point]
-    tree, found = solid.kept("tree"), np.empty(_MOST_UNSURE, np.int64)
+    near = [_enclosing_floats(value) for value in point]
+    tree, uncertain = solid.cached("tree"), np.empty(_MOST_UNSURE, np.int64)
     if tree is not None:
         middle = [low if math.isfinite(low) else high for low, high in near]
-        n_found, odd = list_unsure(tree, *middle, 2.0 * max(high - low for low, high in near), found)
-        if n_found >= 0:
-            return tree.triangles[found[:n_found]], odd
+        n_uncertain, odd = list_uncertain(tree, *middle, 2.0 * max(high - low for low, high in near), uncertain)
+        if n_uncertain >= 0:
+            return tree.triangles[uncertain[:n_uncertain]], odd
     boxes = triangle_boxes(solid)
-    held = (boxes[0] <= near[0][1]) & (boxes[1] >= near[0][0]) & (boxes[2] <= near[1][1])
-    held &= (boxes[3] >= near[1][0]) & (boxes[5] >= near[2][0])
-    return solid.triangles[held], False
+    is_near = (boxes[0] <= near[0][1]) & (boxes[1] >= near[0][0]) & (boxes[2] <= near[1][1])
+    is_near &= (boxes[3] >= near[1][0]) & (boxes[5] >= near[2][0])
+    return solid.triangles[is_near], False
 
 
 def in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
     """Return the location of a point in a polyhedron."""
-    triangles, odd = _unsure_triangles(point, solid)
+    triangles, odd = _uncertain_triangles(point, solid)
     for turn, triangle in enumerate(triangles):
         if turn % _CHECK_EVERY == 0:
             check()
@@ -158,18 +158,18 @@ def in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> i
 
 
 def next_in_ring(solid: Polygon | Triangle) -> IntArray:
-    """Return for each vertex the index of the one after it in its ring, prepared once."""
+    """Return for each vertex the index of the next vertex of its ring, built once."""
     return solid.prepared("next_in_ring", lambda: next_in_rings(solid.ring_offsets))
 
 
 def in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:
-    """Return the location of a point in a polygon, or a triangle of the plane."""
+    """Return the location of a point in a polygon or a planar triangle."""
     starts, ends = solid.vertices, solid.vertices[next_in_ring(solid)]
-    (x_low, _), (y_low, y_high) = _around(point[0]), _around(point[1])
-    held = (np.minimum(starts[:, 1], ends[:, 1]) <= y_high) & (np.maximum(starts[:, 1], ends[:, 1]) >= y_low)
-    held &= np.maximum(starts[:, 0], ends[:, 0]) >= x_low
+    (x_low, _), (y_low, y_high) = _enclosing_floats(point[0]), _enclosing_floats(point[1])
+    is_near = (np.minimum(starts[:, 1], ends[:, 1]) <= y_high) & (np.maximum(starts[:, 1], ends[:, 1]) >= y_low)
+    is_near &= np.maximum(starts[:, 0], ends[:, 0]) >= x_low
     odd = False
-    for turn, index in enumerate(np.flatnonzero(held)):
+    for turn, index in enumerate(np.flatnonzero(is_near)):
         if turn % _CHECK_EVERY == 0:
             check()
         v = scaled_integers((*starts[index].tolist(), *ends[index].tolist(), *point))
@@ -183,10 +183,11 @@ def in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check)
 
 
 def prism_walls(solid: Triangle) -> list[list[int]]:
-    """Return the three rows of the prism over a triangle of space, as integers; all zero for a triangle without area.
+    """Return the three plane rows of the prism over a triangle of space, as integers; zeros for a triangle without
+    area.
 
-    Wall e of the edge from p to r is {x : dot((n x (r - p)), x - p) >= 0} with n = (b - a) x (c - a), which is the
-    textbook's comparison of cross products by their dot product.
+    Wall of the edge from p to r: dot(n x (r - p), x - p) >= 0 with n = (b - a) x (c - a), which is the textbook's
+    comparison of cross products by their dot product.
     """
 
     def build() -> list[list[int]]:
@@ -204,19 +205,20 @@ def prism_walls(solid: Triangle) -> list[list[int]]:
 
 
 def in_triangle(point: Sequence[Number], solid: Triangle, check: Check) -> int:
-    """Return the location of a point in a triangle of the plane, or in the prism over one of space."""
+    """Return the location of a point in a planar triangle, or in the prism over a triangle of space."""
     if solid.dimension == 2:
         return in_polygon(point, solid, check)
     return min(side_rational(wall, point) for wall in prism_walls(solid))
 
 
 def in_rows(point: Sequence[Number], solid: HalfSpace | Aabb | Convex, _: Check) -> int:
-    """Return the location of a point in what planes bound."""
+    """Return the location of a point in a solid bounded by planes."""
     return min(side_rational(row, point) for row in rows_of(solid).tolist())
 
 
 def in_sphere(point: Sequence[Number], solid: Sphere, pose: Pose | None, _: Check) -> int:
-    """Return the location of a point in a ball, which keeps its radius about the exact image of its centre."""
+    """Return the location of a point in a ball; a posed ball has the same radius about the exact image of its
+    centre."""
     center: Sequence[Number] = solid.center.tolist()
     center = center if pose is None else to_world_frame(center, pose)
     *flat, r = scaled_integers((*center, *point, solid.radius))
@@ -225,12 +227,12 @@ def in_sphere(point: Sequence[Number], solid: Sphere, pose: Pose | None, _: Chec
 
 
 def in_csg(point: Sequence[Number], solid: Csg, pose: Pose | None, check: Check) -> int:
-    """Return the location of a point in a Boolean tree."""
-    return int(over_tree(solid, lambda leaf: rational_location(point, leaf, pose, check), combine))
+    """Return the location of a point in a CSG tree."""
+    return int(fold_csg_tree(solid, lambda leaf: rational_location(point, leaf, pose, check), combine))
 
 
 def in_implicit(point: Sequence[Number], solid: Implicit, _: Check) -> int:
-    """Return the location of a point where a polynomial, or a caller's function, is not negative."""
+    """Return the location of a point in an implicit solid."""
     if solid.function is not None:
         value = np.asarray(solid.function(np.array([[float(x) for x in point]])), dtype=np.float64).ravel()[0]
         return sign_of(float(value))
@@ -238,7 +240,7 @@ def in_implicit(point: Sequence[Number], solid: Implicit, _: Check) -> int:
 
 
 def adjugate(r: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
-    """Return adj(R) and det(R) of a matrix of floats or of rationals; R^-1 is their quotient."""
+    """Return adj(R) and det(R) of a matrix of floats or rationals; R^-1 = adj(R) / det(R)."""
     if len(r) == 2:
         return [[r[1][1], -r[0][1]], [-r[1][0], r[0][0]]], r[0][0] * r[1][1] - r[0][1] * r[1][0]
 
@@ -246,8 +248,8 @@ def adjugate(r: Sequence[Sequence[Any]]) -> tuple[list[list[Any]], Any]:
         (i1, i2), (j1, j2) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
         return r[i1][j1] * r[i2][j2] - r[i1][j2] * r[i2][j1]
 
-    found = [[cofactor(j, i) for j in range(3)] for i in range(3)]
-    return found, sum(r[0][k] * found[k][0] for k in range(3))
+    adjugates = [[cofactor(j, i) for j in range(3)] for i in range(3)]
+    return adjugates, sum(r[0][k] * adjugates[k][0] for k in range(3))
 
 
 def to_body_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
@@ -309,8 +311,8 @@ def combine(operation: str, located: Sequence[Any]) -> Any:
     return functools.reduce(np.maximum if operation == "union" else np.minimum, located)
 
 
-def over_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, list[Any]], Any]) -> Any:
-    """Return what a tree makes of its leaves: each distinct node once, operands first; its depth is bounded."""
+def fold_csg_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, list[Any]], Any]) -> Any:
+    """Fold a CSG tree: evaluate each distinct leaf once, then join operands bottom-up; the depth is bounded."""
     known: dict[int, Any] = {}
 
     def visit(node: Solid) -> Any:
@@ -325,7 +327,7 @@ def over_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, 
 
 
 def unsupported(solid: object) -> UnsupportedSolidError:
-    """Return the error for a solid that has no inside, or for what is no solid at all."""
+    """Return the error for a solid without an interior, or for something that is no solid."""
     return UnsupportedSolidError(
         f"nothing is inside a {kind_of(solid)}; a point can be located in a {names(is_located)}. A closed triangle "
         "mesh is a polyhedron; a planar 3D polygon can be asked as triangles",
@@ -334,5 +336,5 @@ def unsupported(solid: object) -> UnsupportedSolidError:
 
 
 def is_located(row: Row) -> bool:
-    """Tell whether points are located in solids of a type."""
+    """Return whether points can be located in solids of this type."""
     return row.exact is not None or row.exact_posed is not None

@@ -1,8 +1,9 @@
-"""Segments on polygons and polyhedra: contacts by a box tree, pieces between them; several for each segment.
+"""Clips segments to polygons and polyhedra: contacts by a box tree, then the pieces between them, maybe several a
+segment.
 
-The locator of the region tells the location of each first end. A kernel cuts segments at what they cross
-and touch (boundary_cut.py); what it leaves, those in the plane of a face above all, is cut in exact
-arithmetic (exact_pieces.py). Zero-length segments are points.
+The locator of the region locates each first end. A kernel cuts segments at crossings and touches (boundary_cut.py);
+what it leaves OPEN, above all segments in the plane of a face, goes to the exact fallback (exact_pieces.py).
+Zero-length segments are points.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.compiling.jit import entry_of, kernel
-from engine.containment.locate import located_at_once
+from engine.containment.locate import locate_small_batch
 from engine.containment.locators import Locator, locator_of
 from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.vectors import as_point2
@@ -23,8 +24,8 @@ from engine.segment_clipping.on_boundary.boundary_cut import cut_on_mesh, cut_on
 from engine.segment_clipping.on_boundary.contacts import GROUP, INSIDE_BEFORE, OUTSIDE_BEFORE, Bit, Kind, Place
 from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with, corner, triangle_at
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline, boundary_of
-from engine.segment_clipping.pieces import Pieces, completed, first_of, joined, room_for
-from engine.segment_clipping.profiles import settled
+from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, in_order_of_source, joined
+from engine.segment_clipping.profiles import clip_exactly
 from engine.solids.checks import check_finite
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
@@ -32,24 +33,24 @@ from engine.solids.primitives import Triangle
 from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
 
 Bounded = Polygon | Polyhedron | Triangle
-"""What a boundary bounds; triangles of the plane."""
+"""Solids with a boundary of edges or triangles; triangles only in 2D."""
 _LEAST_ROOM: Final = 1 << 8
-"""Contacts, or pieces, looked for at once; doubled where one segment has more."""
+"""Least capacity for contacts, or pieces; doubled if one segment has more."""
 _CONTACTS: Final = 4
-"""Of each segment of a group; likewise."""
+"""Capacity for each segment of a group; likewise."""
 _BYTES: Final = 180
-"""Of a piece, in its part and joined."""
+"""Memory of a piece, in its part and joined."""
 _MOST_FEW: Final = 1 << 10
 _CONTACTS_OF_FEW: Final = 1 << 16
-"""Segments that are cut in one piece: that many at most, and so many that they have no more contacts than these."""
+"""Largest batch that runs as one chunk: that many segments, and no more contacts than these."""
 _CONTACT_BYTES: Final = 60
-"""Of a contact, while a kernel runs."""
+"""Memory of a contact while a kernel runs."""
 _FIRST_CHUNK: Final = 16
-"""Segments, one of which may cross everything."""
+"""Segments of the first chunk, one of which may cross everything."""
 
 
 def on_boundary(region: Polygon | Polyhedron) -> Plan:
-    """Return how segments are clipped on a polygon or polyhedron."""
+    """Return the clipping plan of a polygon or polyhedron."""
     return Plan("box_tree", clip_on_boundary, max(FEW, min(_MOST_FEW, _CONTACTS_OF_FEW // len(region.vertices))))
 
 
@@ -60,8 +61,8 @@ def clip_on_boundary(
     if len(segments) > _MOST_FEW or not np.isfinite(segments).all():
         check_finite(segments, ("segments",))
     if budget is UNLIMITED or not len(segments):
-        found, open_ones = clip_chunk(segments, 0, len(segments), region, None, budget)
-        return found, len(open_ones), len(open_ones)
+        few_pieces, open_ones = clip_chunk(segments, 0, len(segments), region, None, budget)
+        return few_pieces, len(open_ones), len(open_ones)
     chunks: dict[int, tuple[Pieces, IntArray]] = {}
     locator = locator_of(region).chosen(len(segments), budget)
 
@@ -78,14 +79,14 @@ def clip_on_boundary(
 def clip_chunk(
     segments: FloatArray, first: int, last: int, region: Bounded, locator: Locator | None, budget: Budget
 ) -> tuple[Pieces, IntArray]:
-    """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, in order of source and t, and which of them
-    were cut in exact arithmetic.
+    """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, by source and t, and which used the exact
+    fallback.
 
-    locator: None where these are few, whose first ends are located at once.
+    locator: None for a small batch, whose first ends are located on the fast path.
     """
-    boundary, part = region.kept("clipping_boundary") or boundary_of(region), segments[first:last]
+    boundary, part = region.cached("clipping_boundary") or boundary_of(region), segments[first:last]
     points, locations = part[:, 0].copy(), np.zeros((last - first, 2), np.int8)
-    at_once = located_at_once(points, region) if locator is None else None
+    at_once = locate_small_batch(points, region) if locator is None else None
     if at_once is None:
         locator = locator or locator_of(region).chosen(len(points), budget)
         locator.fill(points, of_starts := np.empty(len(points), np.int8), budget)
@@ -93,36 +94,36 @@ def clip_chunk(
         of_starts = at_once[0]
     locations[:, 0] = of_starts
     if np.count_nonzero(of_starts) < len(points):
-        _look_further(part, locations, boundary, locator or locator_of(region), budget)
+        _locate_second_ends(part, locations, boundary, locator or locator_of(region), budget)
     parts, state = cut_at_crossings(part, locations, boundary, budget)
     left = state.nonzero()[0]  # not SETTLED
     if len(left):
         locations[np.abs(locations) > 1] = 0
-        parts.append(settled(part, left, region, None, budget, locations[left].tolist()))
-    pieces = completed(parts) if len(left) else joined(parts) if len(parts) > 1 else parts[0]
+        parts.append(clip_exactly(part, left, region, None, budget, locations[left].tolist()))
+    pieces = in_order_of_source(parts) if len(left) else joined(parts) if len(parts) > 1 else parts[0]
     return (pieces._replace(source=pieces.source + first) if first else pieces), left
 
 
-def _look_further(
+def _locate_second_ends(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set the second of the locations (n, 2) where the first is on the boundary; where both are, see `look_before`."""
+    """Set the second of the locations (n, 2) where the first is BOUNDARY; if both are, see `locate_before_contacts`."""
     chords = np.flatnonzero(locations[:, 0] == 0)
     locator.fill(segments[chords, 1], second := np.empty(len(chords), np.int8), budget)
     locations[chords, 1] = second
-    look_before(segments, locations, boundary, locator, budget)
+    locate_before_contacts(segments, locations, boundary, locator, budget)
 
 
 def cut_at_crossings(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[list[Pieces], FlagArray]:
-    """Return the pieces of those segments that the kernel settles, and the state of each."""
+    """Return the pieces of the segments that the kernel decides, and the state of each segment."""
     n, _, dimension = segments.shape
     cut: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
     room, least, reached, parts = _LEAST_ROOM + n, _LEAST_ROOM + _CONTACTS * min(GROUP, n), 0, []
     counted, done, state = least, np.array([0, 0, least]), np.empty(n, np.uint8)
     while reached < n:
-        before, pieces = reached, room_for(room, dimension)
+        before, pieces = reached, allocate_pieces(room, dimension)
         entry_of(cut)(segments, locations, boundary, budget.flag, pieces, state, done)
         reached, m, n_contacts = done.tolist()
         if reached == before:
@@ -134,53 +135,55 @@ def cut_at_crossings(
         parts.append(first_of(pieces, m))
     if counted > least:
         budget.take(_CONTACT_BYTES * (least - counted))
-    return parts or [room_for(0, dimension)], state
+    return parts or [allocate_pieces(0, dimension)], state
 
 
 _AT_END: Final = 2 * Place.END + 5
-"""The code of what is crossed there; one less, of what is not."""
-_AT_ONCE: Final = 64
-"""Chords whose contacts are held together."""
+"""Code of an element crossed at the segment's end; one less if it is touched."""
+_PER_BLOCK: Final = 64
+"""Chords of a block, whose contacts are in memory together."""
 _PLACES: Final = (0.5, 0.3125, 0.8125)
-"""Where along a segment a point beside it is tried; the next where one is on the boundary, or elements part it."""
+"""Parameters at which an inner point is tried; the next one if a point is on the boundary or separated by elements."""
 
 
-def look_before(
+def locate_before_contacts(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set the second of locations (n, 2) where both are 0 and it can be told, see `INSIDE_BEFORE`."""
-    if not boundary.are_safe:  # signs of the line beside the segment are exact only then
+    """Set the second of locations (n, 2) where both are 0 and the filter decides it, see `INSIDE_BEFORE`."""
+    if not boundary.are_safe:  # signs of the perturbed line are exact only then
         return
     chords = np.flatnonzero((locations == 0).all(axis=1))
-    for begin in range(0, len(chords), _AT_ONCE):
-        some = chords[begin : begin + _AT_ONCE]
+    for begin in range(0, len(chords), _PER_BLOCK):
+        some = chords[begin : begin + _PER_BLOCK]
         locations[some, 1] = _before(segments[some], boundary, locator, budget)
 
 
 def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
-    """Return what `look_before` sets for chords (n, 2, dim), 0 where it cannot be told."""
-    found = np.zeros(len(segments), np.int8)
-    is_odd, is_left, met, owners = _turns(segments, boundary, budget)
+    """Return the values that `locate_before_contacts` sets for chords (n, 2, dim), 0 if undecided."""
+    sides = np.zeros(len(segments), np.int8)
+    is_odd, is_left, met, owners = _crossing_parity(segments, boundary, budget)
     for place in _PLACES:
         if not is_left.any():
             break
         inner = segments.copy()
         inner[:, 0] = (1.0 - place) * segments[:, 0] + place * segments[:, 1]
         locator.fill(inner[:, 0].copy(), of_inner := np.empty(len(segments), np.int8), budget)
-        turns_odd, is_told, _, _ = _turns(inner, boundary, budget)
-        entry_of(leave_parted)(boundary.elements, met, owners, segments, inner, is_told)
-        is_told &= is_left & (of_inner != 0)
+        turns_odd, is_known, _, _ = _crossing_parity(inner, boundary, budget)
+        entry_of(exclude_separated)(boundary.elements, met, owners, segments, inner, is_known)
+        is_known &= is_left & (of_inner != 0)
         is_in = (of_inner > 0) ^ turns_odd ^ is_odd
-        found[is_told] = np.where(is_in, INSIDE_BEFORE, OUTSIDE_BEFORE)[is_told]
-        is_left &= ~is_told
-    return found
+        sides[is_known] = np.where(is_in, INSIDE_BEFORE, OUTSIDE_BEFORE)[is_known]
+        is_left &= ~is_known
+    return sides
 
 
-def _turns(
+def _crossing_parity(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
-    """Return of each segment whether the location turns over an odd number of times before its end, and whether that is
-    sure and no edge runs there; then the elements that hold its end, and whose they are."""
+    """Return for each segment the parity of crossings before its end, and whether it is certain and no edge runs there.
+
+    Also the elements that contain its end, and the segment of each.
+    """
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
     holds_end = kinds | Bit.CROSSES == _AT_END
@@ -196,11 +199,13 @@ def _turns(
 
 
 @kernel
-def leave_parted(
-    elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_told: BoolArray
+def exclude_separated(
+    elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_known: BoolArray
 ) -> None:
-    """Set is_told (n,) False where an element met does not have the first ends of a segment and of the one beside it
-    strictly on one side."""
+    """Set is_known (n,) False for segments whose first end and inner point an element may separate.
+
+    elements, met, owners: all elements met, and their segments.
+    """
     for place in range(met.size):
         element, item = met[place], owners[place]
         if elements.shape[1] == 2:
@@ -211,4 +216,4 @@ def leave_parted(
             c, d, e = triangle_at(elements, element)
             side, other = orient3d(c, d, e, corner(segments, item, 0)), orient3d(c, d, e, corner(inner, item, 0))
         if side != other or abs(side) != 1:
-            is_told[item] = False
+            is_known[item] = False

@@ -1,13 +1,13 @@
-"""The pieces of segments on polygons and meshes, compiled.
+"""Pieces of segments in polygons and meshes, compiled.
 
-Where all contacts are proper crossings every one turns the location over, so only the first end's location and the
-order of the crossings along the segment matter. Parameters that are surely rounded (crossing_values.py) and differ as
-doubles are in their exact order.
+If all contacts of a segment are proper crossings, each flips the location, so the location of the first end and the
+order of the crossings decide. Parameters that are certainly rounded (crossing_values.py) and differ as doubles are in
+their exact order.
 
-A segment that touches in corners and sides, ends on the boundary or runs along edges of the plane is cut as
-exact_pieces.py cuts with integers, where signs tell all: contacts are put in order by their parameters; those that
-round alike are one point, by their codes (contacts.py), or the segment is left open. From span to span the location
-turns over as often as the line beside the segment crosses what it meets.
+A segment that touches corners and sides, ends on the boundary or runs along edges of the plane is cut like in
+exact_pieces.py, if signs suffice: contacts are sorted by parameter; those that round alike must be one point, by their
+codes (contacts.py), else the segment stays OPEN. From span to span the location flips once for each element that the
+perturbed line crosses (simulation of simplicity).
 """
 
 from __future__ import annotations
@@ -26,31 +26,30 @@ from engine.segment_clipping.on_boundary.contacts import (
     Bit,
     Kind,
     Place,
-    are_one,
+    allocate_contacts,
+    are_same_point,
     axis_of,
     code_of,
-    contacts_for,
-    edges_waiting,
+    decode_place,
+    edge_stack,
     gather_edges,
-    place_of,
 )
 from engine.segment_clipping.on_boundary.crossing_values import cross_exactly, cut_at, is_item_safe, parameter_exactly
-from engine.segment_clipping.on_boundary.mesh_contacts import blocks_waiting, gather_triangles
+from engine.segment_clipping.on_boundary.mesh_contacts import gather_triangles, traversal_buffers
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.pieces import Pieces, put_own_end
 from engine.types import OPEN, FlagArray, FloatArray, Int8Array, IntArray
 
 SETTLED: Final = 0
-"""State of a segment, beside OPEN."""
+"""State of a segment, besides OPEN."""
 UNSURE: Final = -1
 Crossings = namedtuple("Crossings", "t points faces order codes met")
-"""Crossings of one segment, as many as there is room for: t, points and faces of each; codes, met: how it meets which
-element, see contacts.py; order: of t."""
+"""Crossings of one segment: t, points, faces; codes and met: kind of contact (contacts.py) and element; order: by t."""
 
 
 @called
 def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> int:
-    """Make the crossings and touches of a segment, in order along it; return how many, UNSURE where not all is."""
+    """Compute the contacts of a segment, sorted along it; return their number, UNSURE if not all are certain."""
     first, last, n = contacts.offsets[item], contacts.offsets[item + 1], 0
     if not is_item_safe(segments, item) or 2 * (last - first) > cuts.t.size:
         return UNSURE
@@ -60,9 +59,9 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
             return UNSURE
         cuts.met[n], cuts.faces[n] = element, boundary.faces[element]
         if kind == Kind.ALONG:
-            n = _put_stretch(segments, item, boundary.elements, cuts, n)
+            n = _write_overlap(segments, item, boundary.elements, cuts, n)
         else:
-            n = _put_place(segments, item, boundary.elements, CROSSED if kind == Kind.PROPER else kind, cuts, n)
+            n = _write_contact(segments, item, boundary.elements, CROSSED if kind == Kind.PROPER else kind, cuts, n)
         if n == UNSURE:
             return UNSURE
     sort_crossings(cuts, n)
@@ -70,9 +69,9 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
 
 
 @called
-def _put_place(segments: FloatArray, item: int, elements: FloatArray, code: int, cuts: Crossings, n: int) -> int:
-    """Write parameter and point of a crossing or touch of ``cuts.met[n]``; return n + 1, UNSURE where not all is."""
-    place, element, dimension = place_of(code), cuts.met[n], segments.shape[2]
+def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: int, cuts: Crossings, n: int) -> int:
+    """Write parameter and point of a contact with ``cuts.met[n]``; return n + 1, UNSURE if not certain."""
+    place, element, dimension = decode_place(code), cuts.met[n], segments.shape[2]
     cuts.codes[n] = code
     if Place.START <= place <= Place.END:
         cuts.t[n] = place - Place.START
@@ -92,8 +91,8 @@ def _put_place(segments: FloatArray, item: int, elements: FloatArray, code: int,
 
 
 @inline
-def _put_stretch(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
-    """Write where a segment begins to run along an edge of its line, and where it ends to; as `_put_place` does."""
+def _write_overlap(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
+    """Write both ends of an overlap of a segment and a collinear edge; return as `_write_contact` does."""
     k, element, face = axis_of(segments, item), cuts.met[n], cuts.faces[n]
     p, q = segments[item, 0, k], segments[item, 1, k]
     rises = q > p
@@ -102,41 +101,43 @@ def _put_stretch(segments: FloatArray, item: int, elements: FloatArray, cuts: Cr
     begin = Place.START if (a <= p if rises else a >= p) else near
     end = Place.END if (b >= q if rises else b <= q) else 1 - near
     if b == p or a == q:  # case: one point
-        return _put_place(
+        return _write_contact(
             segments, item, elements, code_of(Place.START if b == p else Place.END, False) | Bit.ALONG, cuts, n
         )
-    n = _put_place(segments, item, elements, code_of(begin, False) | Bit.ALONG | Bit.BEGINS, cuts, n)
+    n = _write_contact(segments, item, elements, code_of(begin, False) | Bit.ALONG | Bit.BEGINS, cuts, n)
     if n == UNSURE:
         return UNSURE
     cuts.met[n], cuts.faces[n] = element, face
-    return _put_place(segments, item, elements, code_of(end, False) | Bit.ALONG | Bit.CEASES, cuts, n)
+    return _write_contact(segments, item, elements, code_of(end, False) | Bit.ALONG | Bit.CEASES, cuts, n)
 
 
 class Before(IntEnum):
-    """Where the line beside a segment is before its first contact."""
+    """Location of the perturbed line before the first contact of a segment."""
 
     OUTSIDE = 0
     INSIDE = 1
     ANYWHERE = -1
-    """It does not matter, unless there is a span off the boundary."""
+    """Irrelevant, unless a span is off the boundary."""
     UNKNOWN = -2
-    """Contacts round alike that are not one."""
+    """Different contacts round alike."""
 
 
 @inline
-def _is_in_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
-    """Return where the line beside the segment is before the first of n contacts, see `Before`."""
+def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
+    """Return the location of the perturbed line before the first of n contacts, see `Before`."""
     begin, turns = 0, False
     for place in range(n):
         i, first = cuts.order[place], cuts.order[begin]
         if cuts.t[i] != cuts.t[first]:
             begin = place
-        elif i != first and not are_one(elements, cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]):
+        elif i != first and not are_same_point(
+            elements, cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]
+        ):
             return Before.UNKNOWN
-        turns ^= (cuts.codes[i] & Bit.CROSSES != 0) & (place_of(cuts.codes[i]) != Place.END)
+        turns ^= (cuts.codes[i] & Bit.CROSSES != 0) & (decode_place(cuts.codes[i]) != Place.END)
     if of_p != 0:
         return int(of_p > 0)
-    if n == 0 or place_of(cuts.codes[cuts.order[0]]) != Place.START:
+    if n == 0 or decode_place(cuts.codes[cuts.order[0]]) != Place.START:
         return Before.UNKNOWN
     if abs(of_q) == INSIDE_BEFORE:
         return int(of_q > 0)
@@ -144,11 +145,11 @@ def _is_in_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q
 
 
 @inline
-def _put_node(
+def _write_end(
     out: Pieces, row: int, end: int, segments: FloatArray, item: int, cuts: Crossings, i: int, face: int
 ) -> None:
-    """Write an end of a piece at a contact; where the segment itself begins or ends there, as its own end."""
-    if place_of(cuts.codes[i]) == Place.START + end:
+    """Write a contact as an end of a piece; as the segment's own end if the segment begins or ends there."""
+    if decode_place(cuts.codes[i]) == Place.START + end:
         put_own_end(out, row, end, segments, item, segments.shape[2] == 2)
         return
     out.t[row, end], out.faces[row, end] = cuts.t[i], face
@@ -161,10 +162,13 @@ def emit_touching(
     segments: FloatArray, item: int, source: int, ends: Int8Array, elements: FloatArray, cuts: Crossings, n: int,
     out: Pieces, row: int,
 ) -> int:  # fmt: skip
-    """Write the pieces between n contacts to the rows of `out` from `row` on, n + 1 at most; return the row after them,
-    or UNSURE. ends: (2,) int8 locations of the segment's ends, the second where the first is 0 at least, or what
-    `look_before` sets."""
-    is_in, turned, n_along, is_open, place = _is_in_before(elements, cuts, n, ends[0], ends[1]), 0, 0, ends[0] > 0, 0
+    """Write the at most n + 1 pieces between n contacts to the rows of `out` from `row` on; return the next row, or
+    UNSURE.
+
+    ends: (2,) int8 locations of the segment's ends, the second only if the first is not OUTSIDE, or what
+    `locate_before_contacts` sets.
+    """
+    is_in, turned, n_along, is_open, place = _location_before(elements, cuts, n, ends[0], ends[1]), 0, 0, ends[0] > 0, 0
     if is_in == Before.UNKNOWN:
         return UNSURE
     if is_open:
@@ -179,15 +183,15 @@ def emit_touching(
             n_along += (1 if code & Bit.BEGINS else 0) - (1 if code & Bit.CEASES else 0)
             if code & Bit.ALONG < best or (code & Bit.ALONG == best and cuts.faces[i] < face):
                 best, face = code & Bit.ALONG, cuts.faces[i]
-        is_last = place_of(cuts.codes[first]) == Place.END
+        is_last = decode_place(cuts.codes[first]) == Place.END
         if is_in == Before.ANYWHERE and n_along == 0 and not is_last:
             return UNSURE
         if not is_open:
             out.source[row] = source
-            _put_node(out, row, 0, segments, item, cuts, first, face)
+            _write_end(out, row, 0, segments, item, cuts, first, face)
         is_open = not is_last and (n_along > 0 or (is_in ^ turned) == 1)
         if not is_open:
-            _put_node(out, row, 1, segments, item, cuts, first, face)
+            _write_end(out, row, 1, segments, item, cuts, first, face)
             row += 1
     if is_open:
         put_own_end(out, row, 1, segments, item, segments.shape[2] == 2)
@@ -196,8 +200,8 @@ def emit_touching(
 
 
 @allocating
-def crossings_for(n: int, dimension: int) -> Crossings:
-    """Return room for n contacts."""
+def allocate_crossings(n: int, dimension: int) -> Crossings:
+    """Return uninitialised arrays for n contacts."""
     return Crossings(
         np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64),
         np.empty(n, np.int64),
@@ -206,7 +210,7 @@ def crossings_for(n: int, dimension: int) -> Crossings:
 
 @inline
 def sort_crossings(cuts: Crossings, n: int) -> bool:
-    """Set the order of the first n crossings by t; False where two are equal."""
+    """Sort the first n crossings by t; return False if two are equal."""
     t, order = cuts.t, cuts.order
     for i in range(n):
         order[i] = i
@@ -227,7 +231,7 @@ def sort_crossings(cuts: Crossings, n: int) -> bool:
 
 @inline
 def group_size(n: int) -> int:
-    """Return the size of the groups, all about as large, that n segments are cut in."""
+    """Return the size of the groups, all about equal, into which n segments are split."""
     n_groups = max(1, (n + GROUP - 1) // GROUP)
     return (n + n_groups - 1) // n_groups
 
@@ -236,7 +240,7 @@ def group_size(n: int) -> int:
 def emit(
     segments: FloatArray, item: int, source: int, is_inside: bool, cuts: Crossings, n: int, out: Pieces, row: int
 ) -> int:
-    """Write the pieces between n crossings to the rows of `out` from `row` on; return the row after them."""
+    """Write the pieces between n crossings to the rows of `out` from `row` on; return the next row."""
     is_flat, end = segments.shape[2] == 2, 1 if is_inside else 0
     if is_inside:
         out.source[row] = source
@@ -255,7 +259,7 @@ def emit(
 
 @inline
 def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
-    """Tell whether some contacts are proper crossings."""
+    """Return whether contacts first .. last - 1 are all proper crossings."""
     are_proper = True
     for i in range(first, last):
         are_proper &= kinds[i] == Kind.PROPER
@@ -264,7 +268,7 @@ def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
 
 @inline
 def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
-    """Make the crossings of a segment, in order along it; False where not all is surely rounded, or two are one."""
+    """Compute the crossings of a segment, sorted along it; return False if one is uncertain or two are equal."""
     first, last = contacts.offsets[item], contacts.offsets[item + 1]
     if first < last and not is_item_safe(segments, item):
         return False
@@ -285,9 +289,9 @@ def cut_group(
     segments: FloatArray, locations: Int8Array, first: int, boundary: Any, contacts: Any, cuts: Crossings,
     stop: FlagArray, out: Pieces, row: int, state: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Cut the segments of a group, those from `first` on, at their contacts; return the place reached, and the row.
+    """Cut the segments of a group, from `first` on, at their contacts; return the next segment, and the next row.
 
-    Stops short where there is no room in `out`, or `stop` is set. See `cut_on_outline`.
+    Stops early if `out` is full or `stop` is set. See `cut_on_outline`.
     """
     for item in range(segments.shape[0]):
         begin, end, place = contacts.offsets[item], contacts.offsets[item + 1], first + item
@@ -315,37 +319,41 @@ def cut_on_outline(
     segments: FloatArray, locations: Int8Array, outline: Outline, stop: FlagArray, out: Pieces, state: FlagArray,
     n: IntArray,
 ) -> None:  # fmt: skip
-    """Cut segments (m, 2, 2) float64 on a polygon, as far as double-doubles and filters go.
+    """Cut segments (m, 2, 2) float64 to a polygon, as far as filters and double-doubles decide.
 
-    locations: (m, 2) int8 of their ends, the second where the first is 0 at least. outline: see `Outline`. stop: one
-    uint8, polled. out: their source is their place. state: (m,) uint8, SETTLED or OPEN. n: the place to begin with,
-    afterwards where to go on, short of the end where there is no room; how many rows are filled; and for how many
-    contacts of a group there is to be room.
+    | argument | content |
+    |---|---|
+    | locations (m, 2) int8 | of their ends, the second only if the first is not OUTSIDE |
+    | outline | see `Outline` |
+    | stop (1,) uint8 | polled |
+    | out | pieces; their source is the index of the segment |
+    | state (m,) uint8 | out: SETTLED or OPEN |
+    | n (3,) int64 | in and out: next segment (less than m if `out` is full), rows filled, capacity for contacts |
     """
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = contacts_for(size, n[2], edges_waiting()), crossings_for(2 * n[2], 2), n[0]
-    n[1], found = 0, 0
-    while n[0] == last < locations.shape[0] and found >= 0:  # bound: every turn takes a group
+    contacts, cuts, last = allocate_contacts(size, n[2], edge_stack()), allocate_crossings(2 * n[2], 2), n[0]
+    n[1], n_contacts = 0, 0
+    while n[0] == last < locations.shape[0] and n_contacts >= 0:  # bound: every turn takes a group
         last = min(n[0] + size, locations.shape[0])
         group = segments[n[0] : last]
-        found = gather_edges(contacts, outline, group, group.shape[0], stop)
-        if found >= 0:
+        n_contacts = gather_edges(contacts, outline, group, group.shape[0], stop)
+        if n_contacts >= 0:
             n[0], n[1] = cut_group(group, locations, n[0], outline, contacts, cuts, stop, out, n[1], state)
-    n[2] *= 2 if found < 0 else 1
+    n[2] *= 2 if n_contacts < 0 else 1
 
 
 @allocating_kernel
 def cut_on_mesh(
     segments: FloatArray, locations: Int8Array, mesh: Mesh, stop: FlagArray, out: Pieces, state: FlagArray, n: IntArray
 ) -> None:
-    """Cut segments (m, 2, 3) float64 on a polyhedron, `Mesh`: see `cut_on_outline`."""
+    """Cut segments (m, 2, 3) float64 to a polyhedron, `Mesh`: see `cut_on_outline`."""
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = contacts_for(size, n[2], blocks_waiting()), crossings_for(2 * n[2], 3), n[0]
-    n[1], found = 0, 0
-    while n[0] == last < locations.shape[0] and found >= 0:
+    contacts, cuts, last = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(2 * n[2], 3), n[0]
+    n[1], n_contacts = 0, 0
+    while n[0] == last < locations.shape[0] and n_contacts >= 0:
         last = min(n[0] + size, locations.shape[0])
         group = segments[n[0] : last]
-        found = gather_triangles(contacts, mesh, group, group.shape[0], stop)
-        if found >= 0:
+        n_contacts = gather_triangles(contacts, mesh, group, group.shape[0], stop)
+        if n_contacts >= 0:
             n[0], n[1] = cut_group(group, locations, n[0], mesh, contacts, cuts, stop, out, n[1], state)
-    n[2] *= 2 if found < 0 else 1
+    n[2] *= 2 if n_contacts < 0 else 1

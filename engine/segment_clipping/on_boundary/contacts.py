@@ -1,6 +1,6 @@
-"""Which elements of a boundary does a segment meet, and how: edges of a polygon, triangles of a polyhedron.
+"""Contacts of segments with the elements of a boundary: edges of a polygon, triangles of a polyhedron.
 
-For each segment a tree of boxes (in space: mesh_contacts.py) gives the elements nearby, exact orientation signs sort
+For each segment a tree of boxes (in 3D: mesh_contacts.py) gives the elements nearby; exact orientation signs classify
 them:
 
     edge a b, segment p q in the plane         triangle a b c, segment p q in space
@@ -8,18 +8,19 @@ them:
     p, q on either side of a b                 on one side of all three edges
         PROPER: crossed in a point inside of both, the location changes there
 
-Signs that exclude a common point drop the element. A zero sign says that one point is touched, or that both lie on
-one line or plane. An undecided one, and triangles that the segment runs in, are DEGENERATE: exact arithmetic looks at
-them (exact_pieces.py). A segment whose contacts are all proper needs no other decision than the location of its first
-end.
+Signs that exclude a common point drop the element. A zero sign means that one point is touched, or that both are
+collinear or coplanar. An UNDECIDED sign, and a triangle coplanar with the segment, are DEGENERATE: the exact fallback
+decides them (exact_pieces.py). A segment whose contacts are all proper needs only the location of its first end.
 
-What touches in a point has a code (`code_of`), its bits from the lowest:
+A contact in one point has a code (`code_of`), `CROSSES | place + 2 << 1 | ALONG | BEGINS | CEASES`:
 
-    CROSSES   the line beside the segment crosses the element there
-    4 bits    place + 2: 0 .. 2 that corner, 3 .. 5 the side from corner place - 3 on, then START, END, WITHIN
-    ALONG     the segment runs along an edge of the plane, which is crossed nowhere; others are named before it
-    BEGINS    it begins to there
-    CEASES    it ends to there
+| bits | name | meaning |
+|---|---|---|
+| 0 | CROSSES | the perturbed line crosses the element there |
+| 1-4 | place + 2 | 0 .. 2: that corner; 3 .. 5: the side from corner place - 3 on; then START, END, WITHIN |
+| 5 | ALONG | the segment is collinear with an edge of the plane, which it crosses nowhere |
+| 6 | BEGINS | the overlap begins there |
+| 7 | CEASES | the overlap ends there |
 
 Source: the separating axes of segment and box stand in C. Ericson, Real-time collision detection, 2005, section 5.3.3.
 """
@@ -38,7 +39,7 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2
 
 
 class Kind(IntEnum):
-    """How a segment and an element meet, where that is no code of `code_of`."""
+    """Kind of a contact that has no code of `code_of`."""
 
     APART = 0
     PROPER = 1
@@ -47,7 +48,7 @@ class Kind(IntEnum):
 
 
 class Place(IntEnum):
-    """Where an element is touched, beside its corners (0 .. 2) and its sides (3 .. 5, from corner place - 3 on)."""
+    """Place of a contact, besides corners (0 .. 2) and sides (3 .. 5, from corner place - 3 on)."""
 
     START = 6
     END = 7
@@ -55,7 +56,7 @@ class Place(IntEnum):
 
 
 class Bit(IntEnum):
-    """The bits of a code beside the place, which is held plus 2 from the second bit on."""
+    """Bits of a code besides place + 2, which starts at bit 1."""
 
     CROSSES = 1
     ALONG = Kind.ALONG
@@ -64,67 +65,67 @@ class Bit(IntEnum):
 
 
 CROSSED: Final = 2 * Place.WITHIN + 5
-"""The code of what is met in its open interior, no end of the segment."""
+"""Code of an element crossed in its open interior, at no end of the segment."""
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
-"""Locations of a second end that say where the line beside the segment is before its first contact."""
+"""Locations of a second end that encode the location of the perturbed line before the first contact."""
 GROUP: Final = 2048
-"""Segments that are looked at together at most."""
+"""Largest number of segments of a group."""
 NO_ROOM: Final = -1
 STOPPED: Final = -2
-"""Instead of a number of contacts."""
+"""Returned instead of a number of contacts."""
 
 
 LEAF_SIZE: Final = 4
 """Edges of a leaf, see `build_box_tree`."""
 _DEEPEST: Final = 64
-"""Places on the traversal's stack: a tree of depth d holds at most d + 1 nodes at once, and d < 60."""
+"""Capacity of the traversal stack: a tree of depth d < 60 needs d + 1 nodes."""
 _SLACK: Final = 2.0**-46
-"""Bound of the axis test: about 24 roundings of 2^-53, in terms up to 4 times the largest product."""
+"""Error bound of the axis test: about 24 roundings of 2^-53, in terms up to 4 times the largest product."""
 _TOO_LARGE: Final = 2.0**500
-"""Beyond this products may overflow, and only the boxes are compared."""
+"""Size beyond which products may overflow, and only the boxes are compared."""
 
 
 class Contacts(NamedTuple):
-    """Room for the contacts of a group of segments: elements and kinds one segment after another, and offsets."""
+    """Output arrays for the contacts of a group: elements and kinds by segment, and offsets."""
 
     met: Any
     kinds: Any
     offsets: Any
-    """(m + 1,) where those of each segment begin."""
+    """(m + 1,): first contact of each segment."""
     waiting: Any
-    """What a traversal works in: (_DEEPEST,) int64, nodes that wait; of a mesh see `Waiting`."""
+    """Traversal scratch: (_DEEPEST,) int64 nodes; for a mesh see `Waiting`."""
 
 
 @allocating
-def contacts_for(n_segments: int, n_contacts: int, waiting: Any) -> Contacts:
-    """Return room for groups of so many segments at most, and so many contacts of a group."""
+def allocate_contacts(n_segments: int, n_contacts: int, waiting: Any) -> Contacts:
+    """Return uninitialised arrays for groups of at most n_segments segments and n_contacts contacts."""
     return Contacts(
         np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64), waiting
     )
 
 
 @allocating
-def edges_waiting() -> IntArray:
-    """Return what a traversal of edges works in."""
+def edge_stack() -> IntArray:
+    """Return the traversal stack for edges."""
     return np.empty(_DEEPEST, np.int64)
 
 
 @merged
 def code_of(place: int, is_crossed: bool) -> int:
-    """Return the code of what is touched at a place."""
+    """Return the code of a contact at a place."""
     return 2 * place + (5 if is_crossed else 4)
 
 
 @merged
-def place_of(code: int) -> int:
-    """Return the place that a code tells."""
+def decode_place(code: int) -> int:
+    """Decode the place of a contact."""
     return ((code & (Bit.ALONG - 1)) >> 1) - 2
 
 
 @merged
 def axis_of(segments: FloatArray, item: int) -> int:
-    """Return the axis along which a segment is longest."""
+    """Return the longest axis of a segment."""
     best = 0
     for k in range(1, segments.shape[2]):
         length = abs(segments[item, 1, k] - segments[item, 0, k])
@@ -135,7 +136,7 @@ def axis_of(segments: FloatArray, item: int) -> int:
 
 @inline
 def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> bool:
-    """Tell whether a row of one array (n, dim) and one of another are equal."""
+    """Return whether a row of one array (n, dim) equals a row of another."""
     are_same = True
     for k in range(points.shape[1]):
         are_same &= points[point, k] == others[other, k]
@@ -143,9 +144,9 @@ def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> 
 
 
 @inline
-def are_one(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
-    """Tell whether what two codes say of two elements is one point: an end, or a corner or one side of both."""
-    n, m = place_of(code), place_of(other)
+def are_same_point(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
+    """Return whether two codes of two elements denote one point: an end, or a common corner or side."""
+    n, m = decode_place(code), decode_place(other)
     if n >= Place.START or m >= Place.START:
         return n == m and n <= Place.END
     if (n < 3) != (m < 3):
@@ -159,8 +160,10 @@ def are_one(elements: FloatArray, first: int, code: int, second: int, other: int
 
 @called
 def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
-    """Return the code of an edge a b of the plane that a segment p q touches, by their signs; ALONG where all are on
-    one line, if they meet at all, DEGENERATE where a sign is UNDECIDED."""
+    """Return the code of the contact of an edge a b and a segment p q in 2D from their four signs.
+
+    ALONG if they are collinear and overlap, DEGENERATE if a sign is UNDECIDED.
+    """
     if of_a == UNDECIDED or of_b == UNDECIDED or of_p == UNDECIDED or of_q == UNDECIDED:
         return Kind.DEGENERATE
     if of_a == 0 and of_b == 0:
@@ -171,7 +174,7 @@ def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
 
 @called
 def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
-    """Return ALONG where a segment p q and an edge a b of one line meet, else APART; DEGENERATE for an edge a = b."""
+    """Return ALONG if a segment p q and a collinear edge a b overlap, else APART; DEGENERATE for an edge a = b."""
     if a.x == b.x and a.y == b.y:
         return Kind.DEGENERATE
     if max(a.x, b.x) < min(p.x, q.x) or max(p.x, q.x) < min(a.x, b.x):
@@ -181,7 +184,7 @@ def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
 
 @inline
 def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
-    """Return how a segment and an edge of the plane meet, (2, 2) float64 both: what touches by its code."""
+    """Return the kind or code of the contact of a segment and an edge in 2D, (2, 2) float64 both."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
@@ -198,7 +201,7 @@ def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
 
 @inline
 def may_meet(segment: FloatArray, box: FloatArray) -> bool:
-    """Tell whether a segment may meet a closed box; False only where some axis surely separates them."""
+    """Return whether a segment may meet a closed box; False only if a separating axis is proven."""
     n = segment.shape[1]
     largest = 0.0
     for k in range(n):
@@ -222,8 +225,8 @@ def may_meet(segment: FloatArray, box: FloatArray) -> bool:
 
 
 @inline
-def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, found: int) -> int:
-    """Append the contacts of a segment (2, 2) to the `found` first ones; return how many these are then, or NO_ROOM."""
+def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contacts: int) -> int:
+    """Append the contacts of a segment (2, 2) to the first `n_contacts` ones; return their new number, or NO_ROOM."""
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -240,39 +243,39 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, found: i
             element = outline.order[place]
             kind = edge_contact(outline.elements[element], segment)
             if kind != Kind.APART:
-                if found == contacts.met.size:
+                if n_contacts == contacts.met.size:
                     return NO_ROOM
-                contacts.met[found], contacts.kinds[found] = element, kind
-                found += 1
-    return found
+                contacts.met[n_contacts], contacts.kinds[n_contacts] = element, kind
+                n_contacts += 1
+    return n_contacts
 
 
 @called
 def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 2); return how many.
+    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 2); return their number.
 
-    Those of no length have none. NO_ROOM where they have no room, STOPPED where `stop` (one uint8) is set.
+    Zero-length segments have none. NO_ROOM if the capacity is too small, STOPPED if `stop` (one uint8) is set.
     """
-    found = 0
+    n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
         if not are_same(segments[i], 0, segments[i], 1):
-            found = append_edges(contacts, outline, segments[i], found)
-        contacts.offsets[i + 1] = found
-        if found < 0:
+            n_met = append_edges(contacts, outline, segments[i], n_met)
+        contacts.offsets[i + 1] = n_met
+        if n_met < 0:
             return NO_ROOM
         if stop[0]:
             return STOPPED
-    return found
+    return n_met
 
 
 @allocating_kernel
 def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return how many contacts segments (n, 2, 2) float64 have with the edges of a polygon, and these.
+    """Return the number of contacts of segments (n, 2, 2) float64 with the edges of a polygon, and the contacts.
 
-    elements met and kinds, int64 and uint8, one segment after another; offsets (n + 1,) int64, where those of each
-    begin. NO_ROOM where there are more than `room`. stop: one uint8, polled.
+    elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of each segment. NO_ROOM if there are more
+    than `room`. stop: one uint8, polled.
     """
-    contacts = contacts_for(segments.shape[0], room, edges_waiting())
-    found = gather_edges(contacts, outline, segments, segments.shape[0], stop)
-    return found, contacts.met, contacts.kinds, contacts.offsets
+    contacts = allocate_contacts(segments.shape[0], room, edge_stack())
+    n_met = gather_edges(contacts, outline, segments, segments.shape[0], stop)
+    return n_met, contacts.met, contacts.kinds, contacts.offsets

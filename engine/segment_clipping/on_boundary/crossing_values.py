@@ -1,20 +1,30 @@
-"""Where a segment p q crosses an edge a b of the plane or a triangle a b c of space: t and point, surely rounded.
+"""Crossing of a segment p q and an edge a b of the plane or a triangle a b c of space: t and point, provably rounded.
 
 With s(x) = ((b - a) x (c - a)) . (x - a), in the plane (b - a) x (x - a), the crossing is at
 
     t = s(p) / d,    d = s(p) - s(q) = ((b - a) x (c - a)) . (p - q),    x = p + t (q - p),
 
-all in double-double with a running bound. What that leaves open is found from the exact values s(p) and s(q), ties and
-zeros too (cut_point.py).
+all in double-double with a running bound. What that leaves open is computed from the exact values s(p) and s(q), ties
+and zeros too (cut_point.py).
 
-**The bound.** With u = 2^-53, differences of coordinates are pairs without error, tails below u of the head. A
-component n = U V - X Y of the normal is kept as h + low, with m = |u v| + |x y|: products of two tails are left out
-(2 u^2 m), products with one tail are rounded (2 u^2 m), and so are the six sums of terms below u m, 2 u m, 3 u m and
-4 u m (12 u^2 m): 16 u^2 m, and |low| <= 4.1 u m. Its product with a difference w leaves out low w' (4.1 u^2), rounds
-the other two products (5.1 u^2), their sum (5.1 u^2) and that with the head's tail (6.1 u^2), and carries the normal's
-error (16.1 u^2): below 37 u^2 m |w|. Three of them are added up with exact heads, their tails, below 6.2 u m |w| each,
-in four sums (29 u^2): 66 u^2 of the sum of m |w|. `VALUE_BOUND` has room for the rounding of that sum and for terms of
-third order.
+**The bound.** u = 2^-53; differences of coordinates are exact pairs head + tail, |tail| <= u |head|. A component of the
+normal n = U V - X Y is stored as h + low, m = |u v| + |x y|:
+
+    step                                              error of n, in u^2 m
+    products of two tails, left out                   2
+    products with one tail, rounded                   2
+    six sums of terms <= u m, 2 u m, 3 u m, 4 u m     12
+    together: |error| <= 16 u^2 m, |low| <= 4.1 u m
+
+    step of n w, w = head + tail a difference         error, in u^2 m |w|
+    low times the tail of w, left out                 4.1
+    the other two products, rounded                   5.1
+    their sum; the sum with the tail of h w           5.1 + 6.1
+    error of n                                        16.1
+    together: |error| <= 37 u^2 m |w|, tail <= 6.2 u m |w|
+
+The sum of three such products, heads exactly, tails in four sums (29 u^2): |error| <= 66 u^2 sum m |w|. `VALUE_BOUND`
+also covers the rounding of that sum and terms of third order.
 """
 
 from __future__ import annotations
@@ -38,7 +48,7 @@ Vector = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 @merged
 def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float, y: float, y_low: float) -> Triple:
-    """Return U V - X Y for pairs without error as a sum of two doubles, and |u v| + |x y|."""
+    """Return U V - X Y of exact pairs as a sum of two doubles, and |u v| + |x y|."""
     ph, pl = two_prod(u, v)
     qh, ql = two_prod(x, y)
     h, tail = two_diff(ph, qh)
@@ -48,7 +58,7 @@ def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float
 
 @merged
 def product(n: Triple, w: float, w_low: float) -> Triple:
-    """Return (h + low) (w + w_low) for what `minor` returns as a sum of two doubles, and its size m |w|."""
+    """Return (h + low) (w + w_low), h + low of `minor`, as a sum of two doubles, and its size m |w|."""
     g, tail = two_prod(n[0], w)
     return g, tail + (n[0] * w_low + n[1] * w), n[2] * abs(w)
 
@@ -67,7 +77,7 @@ def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
 
 @merged
 def dot(n: Normal, w: Vector) -> Triple:
-    """Return n . w as a double-double, and its bound."""
+    """Return n . w as a double-double, and its error bound."""
     x, x_low, x_size = product(n[0], w[0][0], w[0][1])
     y, y_low, y_size = product(n[1], w[1][0], w[1][1])
     z, z_low, z_size = product(n[2], w[2][0], w[2][1])
@@ -79,7 +89,7 @@ def dot(n: Normal, w: Vector) -> Triple:
 
 @merged
 def line_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d for one of some edges (k, 2, 2) as double-doubles, each with its bound."""
+    """Return s(p) and d for one of the edges (k, 2, 2) as double-doubles, each with its error bound."""
     ax, ay = elements[element, 0, 0], elements[element, 0, 1]
     px, py = segments[item, 0, 0], segments[item, 0, 1]
     u, u_low = two_diff(elements[element, 1, 0], ax)
@@ -97,7 +107,7 @@ def line_values(elements: FloatArray, element: int, segments: FloatArray, item: 
 
 @merged
 def plane_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d for one of some triangles (k, 3, 3) as double-doubles, each with its bound."""
+    """Return s(p) and d for one of the triangles (k, 3, 3) as double-doubles, each with its error bound."""
     a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
     normal = normal_of(a, b, c)
@@ -108,7 +118,7 @@ def plane_values(elements: FloatArray, element: int, segments: FloatArray, item:
 
 @merged
 def is_item_safe(items: FloatArray, item: int) -> bool:
-    """Tell whether every coordinate of an item is zero or of a size for which double-doubles keep their bounds."""
+    """Return whether every coordinate of an item is zero or in the range in which double-doubles have their bounds."""
     safe = True
     for place in range(items.shape[1]):
         for k in range(items.shape[2]):
@@ -120,7 +130,8 @@ def is_item_safe(items: FloatArray, item: int) -> bool:
 def cut_at(
     segments: FloatArray, item: int, elements: FloatArray, element: int, points: FloatArray, row: int
 ) -> tuple[float, bool]:
-    """Set a row of `points` to where a segment crosses an element; return t and whether all is surely nearest."""
+    """Set a row of `points` to the crossing of a segment and an element; return t and whether all is certainly
+    nearest."""
     if segments.shape[2] == 2:
         at_p, along = line_values(elements, element, segments, item)
     else:
@@ -148,10 +159,10 @@ def cut_at(
 
 @called
 def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
-    """Set e, 192 places, to |s| at an end of a segment; return its length.
+    """Set e, 192 places, to |s| at an end of a segment as an expansion; return its length.
 
-    Of a triangle a b c the sum over k of component k of (b - a) x (c - a) times (x - a)_k; of an edge a b the last
-    component of (b - a) x (x - a).
+    Triangle a b c: sum over k of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b -
+    a) x (x - a).
     """
     m, n, is_flat = workspace(16), 0, segments.shape[2] == 2
     for k in range(2 if is_flat else 0, 3):
@@ -172,8 +183,7 @@ def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int
 def cross_exactly(
     segments: FloatArray, item: int, elements: FloatArray, element: int, point: FloatArray
 ) -> tuple[float, bool]:
-    """Set `point` to where a segment crosses an element, where double-doubles leave that open; return t and whether all
-    is sure.
+    """Set `point` to the crossing of a segment and an element from exact values; return t and whether all is certain.
 
     The ends lie on different sides, or one of them on the element's line or plane. Coordinates are zero or of sizes
     within 2^-120 .. 2^120, so differences are multiples of 2^-172 and values of 2^-516, below 2^366.
@@ -186,7 +196,7 @@ def cross_exactly(
 
 @called
 def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
-    """Return (x - p) / (q - p), x between p and q, and whether it is surely the nearest double."""
+    """Return (x - p) / (q - p), x between p and q, and whether it is certainly the nearest double."""
     wp, wq, e = workspace(2), workspace(2), workspace(24)
     n_wp, n_wq = _put_distance(wp, x, p), _put_distance(wq, q, x)
     h, low = two_diff(q, p)
@@ -196,6 +206,6 @@ def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
 
 @inline
 def _put_distance(e: Components, x: float, y: float) -> int:
-    """Set e to |x - y|; two places."""
+    """Set e to |x - y| as an expansion of two places."""
     h, low = two_diff(x, y)
     return magnitude(e, grow(e, grow(e, 0, low), h))

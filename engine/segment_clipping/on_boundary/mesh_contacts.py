@@ -1,8 +1,8 @@
-"""Which triangles of a mesh a segment meets, and how: one traversal for clipping and for scenes.
+"""Contacts of a segment with the triangles of a mesh: one traversal for clipping and for scenes.
 
-The segment goes down a tree of boxes (bvh.py). Blocks of triangles that it reaches wait in a list, and so do the
-triangles that `near_triangles` leaves of them, so that their lines of memory are fetched side by side. A filter, then
-exact signs decide on each triangle.
+The segment descends a tree of boxes (bvh.py). Blocks of triangles that it reaches are queued, and so are the triangles
+that `near_triangles` leaves of them, so that their cache lines are fetched together. A filter, then exact signs decide
+each triangle.
 
 The tree holds float32 boxes in coordinates of its own. A segment is brought there in doubles, cut to what lies
 near the tree, and stored as its middle and half in float32; the slack covers what all this rounds:
@@ -21,15 +21,14 @@ near the tree, and stored as its middle and half in float32; the slack covers wh
 Let u = 2^-53, S the largest |coordinate| of A, B, C and L = |E_x| + |E_y| + |E_z|. An edge is within (7 u + 56 u^2) of
 its permanent, at most 2 S^2 L (orientation.py): 2^-49 S^2 L; s(p) likewise, its permanent at most 6 S^3: 2^-47 S^3.
 s(q) carries both, thrice that of an edge, and three roundings of at most 6 S^2 L + 6 S^3: below 2^-46 S^2 (S + L). The
-bounds used are twice that, so their own rounding is covered, and 2^-700 more for products that underflow: where S is
-below 2^300 they lose less, where it is not the relative part is more. What overflows is unsure.
+bounds used are twice that, so their own rounding is covered, and 2^-700 more for products that underflow: if S < 2^300
+they lose less, else the relative part is more. What overflows is UNDECIDED.
 
 Where p and q are known to `blur` a coordinate only, below 2^-20 S, the edges move by less than 16 blur S (S + L), the
 ends by less than 64 blur S (S + L).
 
-**Touched.** The line beside the segment is the segment's moved by infinitesimals, and meets no corner and no side: from
-one open span of the segment to the next the location turns over as often as that line crosses elements
-(exact_pieces.py).
+**Touched.** The perturbed line, the segment's line moved by infinitesimals, meets no corner and no side: from one open
+span of the segment to the next the location flips once for each element that it crosses (exact_pieces.py).
 
 Source: I. Wald, C. Benthin, S. Boulos, Getting rid of packets: efficient SIMD single-ray traversal using
 multi-branching BVHs, 2008.
@@ -58,9 +57,9 @@ from engine.segment_clipping.on_boundary.contacts import (
     Contacts,
     Kind,
     Place,
+    allocate_contacts,
     are_same,
     code_of,
-    contacts_for,
     find_contacts_2d,
 )
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
@@ -72,20 +71,20 @@ UNDERFLOW: Final = 2.0**-700
 SLACK: Final = 2.0**-20
 CUT_SLACK: Final = 2.0**-45
 LIMIT: Final = 4.0
-"""Segments are cut to this cube, in coordinates of the tree, that is: far outside of every box."""
+"""Half side of the cube, in tree coordinates, to which segments are cut: far outside of every box."""
 
 _MOST: Final = np.float32(2.0**100)
 Way = namedtuple("Way", "middle half inverse slack is_near")
-"""A segment in the coordinates of a tree, with its slack, in float32. inverse: 1 / half, at most 2^100, where halves
-are far below every slack; is_near: whether it comes near the tree at all."""
+"""A segment in tree coordinates with its slack, float32. inverse: 1 / half, at most 2^100, where halves are far below
+every slack; is_near: whether it comes near the tree."""
 
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return how a segment p q and a triangle a b c meet, by exact signs: what touches in one point by its code.
+    """Return the kind of contact of a segment p q and a triangle a b c by exact signs; a point contact by its code.
 
-    Where an end is off the plane, the triangle has an area, and the line meets the plane in one point, within the
-    segment unless both ends are on one side. That point is outside of the triangle only where two edges tell so.
+    If an end is off the plane and the triangle has an area, the line meets the plane in one point, on the segment
+    unless both ends are on one side. That point is outside of the triangle only if the signs of two edges differ.
     """
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
@@ -101,9 +100,9 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
         return Kind.PROPER
     k = longest_axis((q.x - p.x, q.y - p.y, q.z - p.z))
     way = 1 if q[k] > p[k] else -1
-    first = way * ab if ab != 0 else _beside(a, b, p, q, k)
-    second = way * bc if bc != 0 else _beside(b, c, p, q, k)
-    third = way * ca if ca != 0 else _beside(c, a, p, q, k)
+    first = way * ab if ab != 0 else _side_when_perturbed(a, b, p, q, k)
+    second = way * bc if bc != 0 else _side_when_perturbed(b, c, p, q, k)
+    third = way * ca if ca != 0 else _side_when_perturbed(c, a, p, q, k)
     if max(first, second, third) == UNDECIDED:
         return Kind.DEGENERATE
     place = Place.START if of_p == 0 else Place.END if of_q == 0 else 3 if ab == 0 else 4 if bc == 0 else 5
@@ -113,9 +112,11 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 
 
 @called
-def _beside(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
-    """Return on which side of a side a b, which the line p q meets, that lies when it is moved: by eps along one axis,
-    by eps^2 along the next (orientation.py). UNDECIDED where they are parallel."""
+def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
+    """Return on which side of the side a b the line p q is, perturbed by eps along one axis and eps^2 along the next.
+
+    UNDECIDED if they are parallel.
+    """
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
     if side == 0:
         side = -_slope(a, b, p, q, AXES_BEFORE[k], k)
@@ -126,7 +127,8 @@ def _beside(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
 def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
     """Return the sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j).
 
-    A filter, six roundings and a sum, 2^-50 is twice that; then exact where sizes are what `is_safe` wants."""
+    Filter: six roundings and a sum, twice that is 2^-50; then exact if sizes satisfy `is_safe`.
+    """
     x, y = (a[j] - b[j]) * (q[k] - p[k]), (a[k] - b[k]) * (q[j] - p[j])
     gap, bound = x - y, 2.0**-50 * (abs(x) + abs(y)) + UNDERFLOW
     if abs(gap) > bound:
@@ -136,8 +138,8 @@ def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
 
 @merged
 def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: float) -> int:
-    """Return how a segment and a triangle meet where rounding cannot have changed it, else UNDECIDED; p and q are known
-    to `blur` a coordinate."""
+    """Return the kind of contact of a segment and a triangle if the filter proves it, else UNDECIDED; blur: error bound
+    of each coordinate of p and q."""
     ex, ey, ez = q.x - p.x, q.y - p.y, q.z - p.z
     ax, ay, az = a.x - p.x, a.y - p.y, a.z - p.z
     bx, by, bz = b.x - p.x, b.y - p.y, b.z - p.z
@@ -171,8 +173,10 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 
 @merged
 def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, blur: float) -> int:
-    """Return how a segment, its ends known to `blur` a coordinate, and one of some triangles (k, 3, 3) meet; UNDECIDED
-    where the filter does not decide and blur is above 0."""
+    """Return the kind of contact of a segment and one of the triangles (k, 3, 3).
+
+    UNDECIDED if the filter does not decide and the blur of the segment's ends is above 0.
+    """
     a, b, c = triangle_at(elements, element)
     kind = contact_filter(a, b, c, p, q, blur)
     return kind if kind != UNDECIDED or blur > 0.0 else exact_contact(a, b, c, p, q)
@@ -180,7 +184,7 @@ def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, b
 
 @merged
 def corner(elements: FloatArray, element: int, place: int) -> Point3:
-    """Return a corner of one of some elements (k, corners, 3)."""
+    """Return a corner of one of the elements (k, corners, 3)."""
     return Point3(
         float(elements[element, place, 0]), float(elements[element, place, 1]), float(elements[element, place, 2])
     )
@@ -188,13 +192,13 @@ def corner(elements: FloatArray, element: int, place: int) -> Point3:
 
 @merged
 def triangle_at(elements: FloatArray, element: int) -> tuple[Point3, Point3, Point3]:
-    """Return the corners of one of some triangles (k, 3, 3)."""
+    """Return the corners of one of the triangles (k, 3, 3)."""
     return corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
 
 
 @merged
 def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float) -> Way:
-    """Return a segment, whose ends are known to `blur` a coordinate, in the coordinates of a tree."""
+    """Return a segment in tree coordinates; blur: error bound of each coordinate of its ends."""
     ox, oy, oz = origin[0] * inverse, origin[1] * inverse, origin[2] * inverse
     px, py, pz = p.x * inverse - ox, p.y * inverse - oy, p.z * inverse - oz
     dx, dy, dz = q.x * inverse - p.x * inverse, q.y * inverse - p.y * inverse, q.z * inverse - p.z * inverse
@@ -224,7 +228,7 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float
 
 @merged
 def shear_of(way: Way) -> Any:
-    """Return what `near_triangles` takes of a segment: axes, middle, r, s, reach and slack."""
+    """Return the arguments of `near_triangles` for a segment: axes, middle, r, s, reach and slack."""
     k, middle, half = longest_axis(way.half), way.middle, way.half
     i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
     slack = np.float32(2.0) * way.slack  # 32 u (S + 2) of lanes/faces.py, and twice what cutting loses
@@ -233,16 +237,16 @@ def shear_of(way: Way) -> Any:
 
 
 _ROOM: Final = 512
-"""Blocks, and triangles, that wait at once."""
+"""Capacity of the queues of blocks, and of triangles."""
 
 Waiting = namedtuple("Waiting", "stack entered blocks triangles")
-"""Room for one traversal. stack: (STACK,) int32 nodes; entered: (1, WIDTH) float32, see `enter_boxes`; blocks,
+"""Scratch of one traversal: stack (STACK,) int32 nodes; entered (1, WIDTH) float32, see `enter_boxes`; blocks,
 triangles: int64, at least 2 * LANES each."""
 
 
 @allocating
-def blocks_waiting() -> Waiting:
-    """Return room for one traversal."""
+def traversal_buffers() -> Waiting:
+    """Return the scratch of one traversal."""
     return Waiting(
         np.empty(STACK, np.int32),
         np.empty((1, WIDTH), np.float32),
@@ -253,7 +257,7 @@ def blocks_waiting() -> Waiting:
 
 @inline
 def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
-    """Tell whether a traversal may end: there is no room, or one contact is enough and is decided."""
+    """Return whether a traversal may end: the output is full, or one decided contact is enough."""
     return n_met < 0 or (is_any and n_met > 0 and kinds[0] != Kind.DEGENERATE)
 
 
@@ -261,7 +265,7 @@ def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
 def _append_triangles(
     mesh: Any, ends: Any, is_any: bool, triangles: IntArray, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts with n triangles that wait; see `append_contacts`."""
+    """Append the contacts with n queued triangles; see `append_contacts`."""
     p, q, blur = ends
     for place in range(n):
         element = triangles[place]
@@ -282,7 +286,7 @@ def _append_triangles(
 def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts with the triangles of n blocks that wait; see `append_contacts`. shear: of `shear_of`."""
+    """Append the contacts with the triangles of n queued blocks; see `append_contacts`. shear: of `shear_of`."""
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
@@ -308,10 +312,10 @@ def _append_blocks(
 def append_contacts(
     mesh: Any, p: Point3, q: Point3, blur: float, is_any: bool, waiting: Waiting, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the triangles that a segment meets to met, how to kinds; return how many these are then, or NO_ROOM.
+    """Append the contacts of a segment: triangles to met, kinds to kinds; return their new number, or NO_ROOM.
 
-    p and q are known to `blur` a coordinate; where that is above 0, what a filter cannot decide is Kind.DEGENERATE.
-    is_any: one contact is enough, and stands in the first row; it is Kind.DEGENERATE only where no other is decided.
+    blur: error bound of each coordinate of p and q; if above 0, what the filter leaves is Kind.DEGENERATE. is_any: one
+    contact is enough, in the first row; it is Kind.DEGENERATE only if no other is decided.
     """
     stack, blocks = waiting.stack, waiting.blocks
     way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)
@@ -349,7 +353,7 @@ def append_contacts(
 
 @called
 def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of some segments (m, 2, 3): see `gather_edges`."""
+    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 3): see `gather_edges`."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -366,26 +370,26 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
 
 @allocating_kernel
 def find_contacts_3d(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return the contacts of segments (n, 2, 3) float64, GROUP at most, with triangles: see `find_contacts_2d`."""
-    contacts = contacts_for(segments.shape[0], room, blocks_waiting())
+    """Return the contacts of at most GROUP segments (n, 2, 3) float64 with triangles: see `find_contacts_2d`."""
+    contacts = allocate_contacts(segments.shape[0], room, traversal_buffers())
     n_met = gather_triangles(contacts, mesh, segments, segments.shape[0], stop)
     return n_met, contacts.met, contacts.kinds, contacts.offsets
 
 
 _LEAST_CONTACTS: Final = 1 << 8
-"""Contacts looked for at once, beside a few for each segment; doubled where there are more."""
+"""Least capacity for contacts, besides `_EACH` a segment; doubled if there are more."""
 _EACH: Final = 8
 
 
 def contacts_with(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[IntArray, FlagArray, IntArray]:
-    """Return the elements that segments (n, 2, dim) may meet, GROUP at most, and how; offsets (n + 1,) of each."""
+    """Return the elements that at most GROUP segments (n, 2, dim) may meet, the kinds, and offsets (n + 1,)."""
     kernel: Any = find_contacts_3d if isinstance(boundary, Mesh) else find_contacts_2d
-    room, found = _LEAST_CONTACTS + _EACH * len(segments), NO_ROOM
+    room, n_contacts = _LEAST_CONTACTS + _EACH * len(segments), NO_ROOM
     met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)
-    while found == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
-        found, met, kinds, offsets = entry_of(kernel)(segments, boundary, budget.flag, room)
+    while n_contacts == NO_ROOM:  # bound: room is doubled, and a segment meets an element once
+        n_contacts, met, kinds, offsets = entry_of(kernel)(segments, boundary, budget.flag, room)
         budget.check()
         room *= 2
-    return met[:found], kinds[:found], offsets[: len(segments) + 1]
+    return met[:n_contacts], kinds[:n_contacts], offsets[: len(segments) + 1]

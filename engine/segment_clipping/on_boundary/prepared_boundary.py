@@ -1,9 +1,8 @@
-"""What the kernels read of a polygon or polyhedron whose boundary segments are cut on, prepared once a solid.
+"""Prepared boundary of a polygon or polyhedron for segment clipping, built once a solid.
 
-Of a polygon that is a tree of boxes over its edges. The rings are put in the order of a space-filling curve through
-their centres; the tree over them is implicit: node i has the children 2 i and 2 i + 1, the second half are leaves of
-`LEAF_SIZE` edges, and a box that holds nothing has low = +inf. Boxes are the exact ones of the doubles given, so a test
-without rounding errs on neither side; where the test rounds, it keeps.
+A polygon gets a tree of boxes over its edges. Rings are sorted along a space-filling curve through their centres; the
+tree is implicit: node i has the children 2 i and 2 i + 1, the second half are leaves of `LEAF_SIZE` edges, and an empty
+box has low = +inf. Boxes are exact, so a test without rounding is exact; a test with rounding is conservative.
 
 Source: the order is that of G. M. Morton, A computer oriented geodetic data base, 1966.
 """
@@ -28,18 +27,18 @@ from engine.solids.primitives import Triangle
 from engine.types import Float32Array, FloatArray, Int32Array, IntArray, read_only
 
 _BITS: Final = 20
-"""Of each coordinate in the curve's order."""
+"""Bits of each coordinate in the Morton code."""
 
 
 class Outline(NamedTuple):
     """The edges of all rings of a polygon."""
 
     elements: FloatArray
-    """(k, 2, 2) the corners of each edge: where one is read, all are."""
+    """(k, 2, 2): the corners of each edge."""
     are_safe: bool
-    """Whether every coordinate is zero or of a size for which kernels keep their bounds."""
+    """Whether every coordinate is zero or in the range in which kernels have their bounds."""
     faces: IntArray
-    """(k,) what each edge is reported as."""
+    """(k,): number reported for each edge."""
     order: IntArray
     boxes: FloatArray
     """order, boxes: see `build_box_tree`."""
@@ -60,13 +59,13 @@ class Mesh(NamedTuple):
     inverse: float
     """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
     n_inner: int
-    """How many they are; unless there is but one block, they begin with the root."""
+    """Number of inner nodes; the first is the root, unless there is one block only."""
     corners: Float32Array
     """(n_blocks, 9, 8), see `corners_of`."""
 
 
 def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | Mesh:
-    """Return the prepared boundary of a region; a triangle is one of the plane."""
+    """Return the prepared boundary of a region; a triangle is planar."""
 
     def build() -> Outline | Mesh:
         if isinstance(region, Polyhedron | Surface):
@@ -80,7 +79,7 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
 
 
 def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outline:
-    """Return what the kernels read of the edges (k, 2, 2) of some rings."""
+    """Return the prepared boundary of the edges (k, 2, 2) of rings."""
     low, high = np.minimum(elements[:, 0], elements[:, 1]), np.maximum(elements[:, 0], elements[:, 1])
     order, boxes = build_box_tree(low, high, offsets)
     return Outline(read_only(elements), are_all_safe(elements), read_only(faces), read_only(order), read_only(boxes))
@@ -111,7 +110,7 @@ def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tupl
 
 
 def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
-    """Return elements ring by ring, in the order of the curve; those of a ring follow one another in space too."""
+    """Return the elements ring by ring, rings in Morton order of their centres."""
     if len(offsets) == 2:
         return np.arange(len(low))
     starts = offsets[:-1]
@@ -120,7 +119,7 @@ def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
 
 
 def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
-    """Return the place of each box's centre on the curve; any order is right, a good one is fast."""
+    """Return the Morton code of each box's centre; any order is correct, a good one is fast."""
     centers = low / 2 + high / 2
     smallest = centers.min(axis=0)
     extent = (centers / 2 - smallest / 2).max(axis=0)
@@ -137,7 +136,7 @@ def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
 
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
-    """Return what the kernels read of some triangles (k, 3, 3)."""
+    """Return the prepared boundary of triangles (k, 3, 3)."""
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
@@ -147,7 +146,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
 
 
 def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
-    """Return a tree with its inner nodes before its blocks, each kind in its old order, and how many they are."""
+    """Return a tree with its inner nodes before its blocks, each kind in its old order, and their number."""
     is_block = tree.child[:, 0] < 0
     order = np.argsort(is_block, kind="stable")
     place = np.empty(len(order), np.int32)
@@ -158,9 +157,9 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
-    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in its coordinates.
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in tree coordinates.
 
-    Lanes without a triangle lie far from everything.
+    Unused lanes lie far from everything.
     """
     child = tree.child[n_inner:]
     is_item = child != EMPTY

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import audit
 from benchmarks.__main__ import main
-from benchmarks.contest import ASKED
+from benchmarks.contest import LISTENERS
 from engine.__main__ import main as engine_main
 
 BOX = {"type": "aabb", "min": [0, 0], "max": [1, 1]}
@@ -123,4 +123,4 @@ def test_who_watches_is_told_which_package_is_asked(files: Path, capsys: pytest.
     absent = {row["contender"]: row["absent"] for row in found["rows"]}
     assert absent["shapely (GEOS)"].startswith("not asked: left out")
     assert absent["ours"] == ""
-    assert ASKED == []
+    assert LISTENERS == []

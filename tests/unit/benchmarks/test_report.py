@@ -10,7 +10,7 @@ import pytest
 from benchmarks import errors, page, workloads
 from benchmarks.contenders import Prepared
 from benchmarks.contenders.with_ours import ring_areas
-from benchmarks.contest import Contender, Contest, Row, Size, hold, sketch
+from benchmarks.contest import Contender, Contest, Row, Size, run_contest, sketch
 from benchmarks.fields import tasks
 
 pytest.importorskip("gmpy2", reason="exact answers need gmpy2")
@@ -20,7 +20,7 @@ def held(**answers: object) -> list[Row]:
     """Return the rows of a contest on the numbers 0..99: is a number even?"""
     items = np.arange(100)
     contenders = [Contender(name, lambda ask=ask: Prepared(ask)) for name, ask in answers.items()]
-    return hold(Contest("numbers", "even", True, items, items % 2 == 0, errors.same, contenders), 3, 0.1)
+    return run_contest(Contest("numbers", "even", True, items, items % 2 == 0, errors.same, contenders), 3, 0.1)
 
 
 def test_right_wrong_refused_and_absent_are_told_apart() -> None:
@@ -35,7 +35,7 @@ def test_right_wrong_refused_and_absent_are_told_apart() -> None:
     assert (right.errors["wrong"], right.errors["refused"], right.errors["judged"]) == (0, 0, 100)
     assert (wrong.errors["wrong"], refused.errors["refused"], refused.errors["wrong"]) == (50, 50, 0)
     assert right.rate > 0
-    rows = hold(Contest("n", "e", True, np.arange(3), np.ones(3), errors.same, [Contender("x", absent)]), 1, 0.1)
+    rows = run_contest(Contest("n", "e", True, np.arange(3), np.ones(3), errors.same, [Contender("x", absent)]), 1, 0.1)
     assert rows[0].absent == "ImportError: no such package"
 
 
@@ -68,7 +68,7 @@ def test_ours_has_no_wrong_answer(field: str) -> None:
         each = task.make()
         mine = [contender for contender in each.contenders if contender.name == "ours" or "textbook" in contender.name]
         only = Contest(each.operation, each.name, each.is_hard, each.items, each.exact, each.judge, mine)
-        row = hold(only, 1, 0.01, has_latency=True)[0]
+        row = run_contest(only, 1, 0.01, has_latency=True)[0]
         assert row.errors["judged"] > 0
         assert row.errors["wrong"] + row.errors["refused"] + row.errors.get("off", 0) == 0
 

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import contenders, contest, errors, machine, measure, table, workloads
 from benchmarks.contenders import Prepared, in_threads
-from benchmarks.contest import Contender, Contest, Row, Size, contender, hold
+from benchmarks.contest import Contender, Contest, Row, Size, contender, run_contest
 from benchmarks.fields import Figure, tasks
 
 
@@ -33,7 +33,7 @@ def test_answers_that_differ_are_settled() -> None:
     asked = {"ours": [True, False, True], "peer": [True, True, False]}
     contenders = [Contender(name, lambda said=said: Prepared(lambda _: np.array(said))) for name, said in asked.items()]
     exact = partial(lambda rows: errors.locations(points[rows], square))
-    ours, peer = hold(Contest("o", "c", False, points, exact, errors.same, contenders), 2, 0.01)
+    ours, peer = run_contest(Contest("o", "c", False, points, exact, errors.same, contenders), 2, 0.01)
     assert (ours.errors["differ"], ours.errors["wrong"], peer.errors["wrong"]) == (2, 0, 2)
 
 
@@ -82,7 +82,7 @@ def test_parts_cover_all_items() -> None:
 
 def test_a_missing_peer_says_why() -> None:
     missing = contender("peer", "no_such_peer", "points", None)
-    row = hold(Contest("o", "c", False, np.arange(3), None, errors.same, [missing]), 1, 0.01)[0]
+    row = run_contest(Contest("o", "c", False, np.arange(3), None, errors.same, [missing]), 1, 0.01)[0]
     assert row.absent.startswith("ModuleNotFoundError")
 
 
@@ -132,7 +132,7 @@ def test_all_are_judged_on_all_items_and_the_worst_is_kept() -> None:
     contenders = [Contender(name, lambda ask=ask: Prepared(ask)) for name, ask in asked.items()]
     request = "/v1/x", {"item": 60}
     contest_ = Contest("o", "c", True, items, items % 2 == 0, errors.same, contenders, request=lambda _: request)
-    ours, peer = hold(contest_, 1, 0.01, has_latency=True)
+    ours, peer = run_contest(contest_, 1, 0.01, has_latency=True)
     assert (ours.errors["judged"], peer.errors["judged"], peer.errors["wrong"]) == (100, 100, 21)
     assert (peer.worst["item"], peer.worst["exact"], peer.worst["request"]) == (60, True, request)
     assert ours.worst == {}

@@ -6,7 +6,14 @@ import numpy as np
 
 from engine import Polygon, Polyhedron, locate
 from engine.containment.locators import locator_of
-from engine.containment.policy import LONG_PASS, Choice, choose_for_mesh, choose_for_rings, cost_in_tree, faces_over
+from engine.containment.policy import (
+    LONG_PASS,
+    Choice,
+    choose_for_mesh,
+    choose_for_rings,
+    cost_in_tree,
+    mean_faces_above,
+)
 from engine.running.budget import Budget
 from tests.unit.containment.scenes import box_mesh, made, merged
 
@@ -20,9 +27,9 @@ def test_the_second_question_about_a_large_mesh_builds_the_tree() -> None:
     solid = _boxes(300)
     points = np.random.default_rng(0).uniform(0, 300, (100, 3))
     answers = [locate(points, solid).tobytes()]
-    assert solid.kept("tree") is None
+    assert solid.cached("tree") is None
     answers += [locate(points, solid).tobytes() for _ in range(3)]
-    assert solid.kept("tree") is not None
+    assert solid.cached("tree") is not None
     assert len(set(answers)) == 1
 
 
@@ -50,7 +57,7 @@ def test_many_points_get_cells_and_bad_shapes_a_tree() -> None:
     faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
     needles = made(merged(*({"vertices": four.tolist(), "faces": faces} for four in thin)))
     assert choose_for_mesh(needles, 20_000) == Choice.CELLS
-    assert faces_over(needles) > 20 * faces_over(_boxes(100))
+    assert mean_faces_above(needles) > 20 * mean_faces_above(_boxes(100))
     assert cost_in_tree(needles) > cost_in_tree(_boxes(100))
 
 

@@ -72,7 +72,7 @@ def test_threads_share_what_is_prepared_and_pickles_leave_it_out() -> None:
     bare = solid.memory
     with ThreadPoolExecutor(4) as pool:
         assert all(found == expected for found in pool.map(lambda _: ask(solid, polygon), range(8)))
-    assert solid.memory > bare + solid.kept("sides").statuses.nbytes
+    assert solid.memory > bare + solid.cached("sides").statuses.nbytes
     assert pickle.dumps(solid) == plain
     again = pickle.loads(plain)
     assert again.memory == bare

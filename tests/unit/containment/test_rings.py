@@ -232,6 +232,6 @@ def test_lattice_points_equal_integers() -> None:
                 int(np.linalg.det(np.stack([b - a, q - a])).round()) for a, b in zip(corners, np.roll(corners, -1, 0))
             ]
             is_boxed = (q >= corners.min(axis=0)).all() and (q <= corners.max(axis=0)).all()
-            is_astride = min(sides) < 0 < max(sides)
-            expected.append(-1 if is_astride or not is_boxed else 0 if 0 in sides else 1)
+            has_both_signs = min(sides) < 0 < max(sides)
+            expected.append(-1 if has_both_signs or not is_boxed else 0 if 0 in sides else 1)
         assert locate(points, Triangle(corners)).tolist() == expected

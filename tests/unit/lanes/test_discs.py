@@ -13,10 +13,10 @@ from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.compiling.jit import kernel
 from engine.lanes.boxes import (
-    beside_disc,
     discs_meeting,
     meeting,
     place_discs,
+    unseparated_discs,
 )
 from tests.unit.bounding.test_trees import faces_below, surfaces
 
@@ -27,7 +27,7 @@ TURNED = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 def ask(first: Any, second: Any, frames: Any, scales: Any, work: Any, found: Any) -> None:
     place_discs(second, 0, frames, np.float32(scales[1] / scales[0]), np.float32(scales[0] / scales[1]), work)
     for lane in range(8):
-        found[lane] = beside_disc(lane, first, 0, work)
+        found[lane] = unseparated_discs(lane, first, 0, work)
     low, high = found[8], found[9]
     found[8], found[9] = discs_meeting(low, high, first, 0, second, 0, frames, (scales[0], scales[1]), work)
 
@@ -54,7 +54,7 @@ def test_compiled_lanes_equal_python_and_keep_what_meets(names: tuple[str, str],
         ask(a.arrays.discs, b.arrays.discs, descent.frames, scales, descent.work, found)
         work, ratio = np.zeros_like(descent.work), np.float32(scales[1] / scales[0])
         place_discs(b.arrays.discs, 0, descent.frames, ratio, np.float32(1.0) / ratio, work)
-        lanes = [beside_disc(lane, a.arrays.discs, 0, work) for lane in range(8)]
+        lanes = [unseparated_discs(lane, a.arrays.discs, 0, work) for lane in range(8)]
         assert found[:8].tolist() == lanes
         before, kept = (low | high << 32 for low, high in (boxes, (int(found[8]), int(found[9]))))
         assert kept == before & sum(bits << (8 * lane) for lane, bits in enumerate(lanes))

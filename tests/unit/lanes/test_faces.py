@@ -15,10 +15,10 @@ from engine.compiling.jit import kernel
 from engine.lanes.faces import (
     CORNER_ROWS,
     WORK_ROWS,
-    beside_planes,
     faces_meeting,
     meet_boxes,
     set_normals,
+    unseparated_faces,
 )
 
 TURNED = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
@@ -29,7 +29,7 @@ def ask(first: Any, second: Any, frames: Any, work: Any, found: Any) -> None:
     found[0], found[1] = meet_boxes(first, 0, second, 0, frames, work)
     set_normals(first, 0, second, 0, frames, work)
     for lane in range(8):
-        found[2 + lane] = beside_planes(lane, work)
+        found[2 + lane] = unseparated_faces(lane, work)
     found[10], found[11] = faces_meeting(first, 0, second, 0, frames, work)
 
 
@@ -69,7 +69,7 @@ def test_compiled_lanes_equal_python_and_keep_what_meets(seed: int, size: float)
         arguments = (a.arrays.blocks, 0, b.arrays.blocks, 0, descent.frames, plain)
         assert found[:2].tolist() == list(meet_boxes(*arguments))
         set_normals(*arguments)
-        lanes = [beside_planes(lane, plain) for lane in range(8)]
+        lanes = [unseparated_faces(lane, plain) for lane in range(8)]
         assert found[2:10].tolist() == lanes
         assert work.tobytes() == plain.tobytes()
         boxes, kept = (int(found[k]) | int(found[k + 1]) << 32 for k in (0, 10))

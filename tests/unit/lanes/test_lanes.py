@@ -20,6 +20,7 @@ from engine.lanes.lanes import (
     bytes_of,
     count_bits,
     dot,
+    filter_pairs,
     greater,
     lane_of,
     lesser,
@@ -31,7 +32,6 @@ from engine.lanes.lanes import (
     prefetch,
     root,
     select,
-    sift,
     spread,
     store,
 )
@@ -129,7 +129,7 @@ def above(lane: int, rows: Rows) -> int:
 @kernel
 def ask(rows: Any, words: Any) -> None:
     words[0], words[1] = table(rows)
-    words[2], words[3] = sift(words[0], 0, above, (rows,)), sift(words[1], LANES // 2, above, (rows,))
+    words[2], words[3] = filter_pairs(words[0], 0, above, (rows,)), filter_pairs(words[1], LANES // 2, above, (rows,))
     words[4] = lowest_bit(words[5])
 
 

@@ -173,7 +173,7 @@ def test_a_scene_asked_often_answers_alike() -> None:
     expected = np.stack([locate(points, solid) for solid in solids], axis=1)
     for _ in range(3):
         assert (table(locate_scene(points, solids), len(solids)) == expected).all()
-    assert all(solid.kept("sides") is not None for solid in solids)
+    assert all(solid.cached("sides") is not None for solid in solids)
 
 
 def test_instances_by_cells_equal_the_reference() -> None:
@@ -184,7 +184,7 @@ def test_instances_by_cells_equal_the_reference() -> None:
     points = np.concatenate([np.array(mesh["vertices"]) @ pose.rotation.T + pose.translation for pose in poses])
     points = np.concatenate([points, random.uniform(-6, 8, (4000, 3))])
     found = [table(locate_scene(points, [solid] * len(poses), poses), len(poses)) for _ in range(2)]
-    assert solid.kept("sides") is not None
+    assert solid.cached("sides") is not None
     assert (found[0] == found[1]).all()
     for body in (0, 5, 11):
         as_json = {"rotation": poses[body].rotation.tolist(), "translation": poses[body].translation.tolist()}
@@ -246,7 +246,7 @@ def test_points_get_their_locations(fewest: int, monkeypatch: pytest.MonkeyPatch
     owners = np.repeat(np.arange(200), np.diff(found.offsets)).tolist()
     assert list(zip(owners, found.indices.tolist(), found.on_boundary.tolist())) == expected
     assert few.indices.tolist() == [body for item, body, _ in expected if item < 9]
-    assert solid.kept("tree") is not None
+    assert solid.cached("tree") is not None
     assert accuracy.n_rational > 0
 
 

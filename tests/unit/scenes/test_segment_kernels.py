@@ -15,7 +15,7 @@ from engine.scenes.placements import Placements
 from engine.scenes.posed_mesh import WANTS_BODY
 from engine.scenes.segment_kernels import cut_near
 from engine.segment_clipping.exact_pieces import compare
-from engine.segment_clipping.pieces import Pieces, first_of, joined, room_for
+from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, joined
 from engine.segment_clipping.profiles import exact_pieces
 from engine.solids.registry import BodyKind
 from tests.unit.scenes.scenes import FACES, OCTAHEDRON
@@ -36,7 +36,7 @@ def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]
     """Return the pieces of segments within a placed solid that are settled, and whether each segment is."""
     placements, m = Placements(Bodies((solid,), (pose,)), {}), len(segments)
     n, order, parts, is_settled = np.zeros(7, np.int64), np.arange(m), [], np.ones(m, np.bool_)
-    out, names = room_for(MOST_MET + 2 * m, solid.dimension), np.empty((2, MOST_MET + 2 * m), np.int64)
+    out, names = allocate_pieces(MOST_MET + 2 * m, solid.dimension), np.empty((2, MOST_MET + 2 * m), np.int64)
     left = np.empty((m, 2), np.int64)
     for each in (segments, order):  # as the engine hands them over: writable ones would be compiled anew
         each.setflags(write=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.predicates.cut_point import T_BOUND
 from engine.segment_clipping.clip_segments import clip_segments
-from engine.segment_clipping.cohen_sutherland import gap_between, meeting
+from engine.segment_clipping.cohen_sutherland import compare_parameters, plane_crossing
 from engine.solids.primitives import Aabb, Convex
 from tests.unit.segment_clipping.scenes import through
 
@@ -64,11 +64,13 @@ def test_parameters_are_within_their_bound_and_in_their_order() -> None:
         places = rng.integers(-3, 4, 2) / 2
         if (ends[:, 0] == ends[:, 1]).any():
             continue
-        found = [meeting(p, q, at, float(k)) for k, ((p, q), at) in enumerate(zip(ends.tolist(), places.tolist()))]
+        found = [
+            plane_crossing(p, q, at, float(k)) for k, ((p, q), at) in enumerate(zip(ends.tolist(), places.tolist()))
+        ]
         exact = [Fraction(at - p) / Fraction(q - p) for (p, q), at in zip(map(rational, ends), rational(places))]
         for m, t in zip(found, exact):
             assert abs(Fraction(m.t) + Fraction(m.t_low) - t) <= Fraction(T_BOUND) * abs(t)
-        gap, is_sure = gap_between(*found)
+        gap, is_sure = compare_parameters(*found)
         n_sure += is_sure
         if is_sure:
             assert (gap > 0) - (gap < 0) == (exact[0] > exact[1]) - (exact[0] < exact[1])

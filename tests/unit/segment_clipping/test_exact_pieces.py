@@ -11,12 +11,12 @@ from engine.running.budget import Budget, Cancel
 from engine.segment_clipping.exact_pieces import (
     FIRST,
     Contact,
-    edge_stretch,
+    edge_overlap,
     is_crossed,
     nodes_with_locations,
-    triangle_stretch,
+    triangle_overlap,
 )
-from engine.segment_clipping.pieces import joined, point_of, put_own_end, room_for
+from engine.segment_clipping.pieces import allocate_pieces, joined, point_of, put_own_end
 from engine.segment_clipping.profiles import exact_pieces
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Convex, Sphere
@@ -35,7 +35,7 @@ def test_edges_are_met_in_points_and_stretches() -> None:
         ((0, 0, 0), (4, 0, 0), (2, -1, 1), (2, 1, 1), None),  # the lines pass each other
     ]
     for p, q, a, b, expected in cases:
-        assert edge_stretch(p, q, a, b) == edge_stretch(p, q, b, a) == expected
+        assert edge_overlap(p, q, a, b) == edge_overlap(p, q, b, a) == expected
 
 
 def test_triangles_are_met_whichever_way_they_are_turned() -> None:
@@ -49,8 +49,8 @@ def test_triangles_are_met_whichever_way_they_are_turned() -> None:
     ]
     for p, q, expected in cases:
         for turned in itertools.permutations(corners):
-            assert triangle_stretch(p, q, *turned) == expected
-    assert triangle_stretch((0, 1, 0), (4, 1, 0), (2, 0, 0), (2, 2, 0), (2, 1, 0)) == (half, half, True)  # no area
+            assert triangle_overlap(p, q, *turned) == expected
+    assert triangle_overlap((0, 1, 0), (4, 1, 0), (2, 0, 0), (2, 2, 0), (2, 1, 0)) == (half, half, True)  # no area
 
 
 def test_what_holds_in_the_spans_between_contacts() -> None:
@@ -101,7 +101,7 @@ def test_the_line_beside_crosses_what_meets_in_a_vertex_or_an_edge_an_even_numbe
 def test_an_own_end_is_written_without_negative_zeros_and_parts_are_joined() -> None:
     for dimension in (2, 3):
         segments = np.array([[[-0.0, 1.0, 2.0], [3.0, -0.0, 5.0]]])[:, :, :dimension].copy()
-        pieces = room_for(1, dimension)
+        pieces = allocate_pieces(1, dimension)
         pieces.source[0] = 7
         for end in range(2):
             put_own_end(pieces, 0, end, segments, 0, dimension == 2)

@@ -101,7 +101,7 @@ def test_prepared_is_built_once_under_concurrency() -> None:
     assert builds == [1]
     assert len(set(map(id, found))) == 1
     solid.drop("tree", "what is not there")
-    assert solid.kept("tree") is None
+    assert solid.cached("tree") is None
 
 
 def test_a_build_that_fails_is_tried_again_and_builds_may_nest() -> None:
@@ -127,7 +127,7 @@ def test_who_waits_for_a_build_looks_at_his_own_clock() -> None:
     builder.start()
     try:
         assert is_building.wait(30.0)
-        assert solid.kept("tree") is None
+        assert solid.cached("tree") is None
         with Budget(0.05) as budget, pytest.raises(engine.DeadlineExceededError):
             solid.prepared("tree", lambda: 42, budget.check)
         cancel = engine.Cancel()
@@ -137,7 +137,7 @@ def test_who_waits_for_a_build_looks_at_his_own_clock() -> None:
     finally:
         may_end.set()
         builder.join()
-    assert solid.prepared("tree", lambda: 43) == 41 == solid.kept("tree")
+    assert solid.prepared("tree", lambda: 43) == 41 == solid.cached("tree")
 
 
 def test_memory_counts_every_array_once() -> None:

@@ -15,14 +15,14 @@ from engine.solids import mesh_checks
 from engine.solids.checks import frozen
 from engine.solids.convexity import convexity
 from engine.solids.mesh import first_equal
-from engine.solids.mesh_checks import look_over
+from engine.solids.mesh_checks import check_topology
 
 STILL = np.zeros(1, np.uint8)
 
 
 def looked_over(points: Any, offsets: Any, indices: Any, flag: Any = STILL) -> tuple[Any, list[int], Any]:
     merged, named, bits = np.array(indices), np.full((3, 5), -1), frozen(points).view(np.uint64)
-    found = entry_of(look_over)(bits, np.asarray(offsets), np.asarray(indices), True, merged, named, flag)
+    found = entry_of(check_topology)(bits, np.asarray(offsets), np.asarray(indices), True, merged, named, flag)
     return found, merged.tolist(), named
 
 

@@ -10,7 +10,7 @@ import pytest
 from engine import Cancel, CancelledError, Csg, Polyhedron, locate
 from engine.compiling.jit import kernel
 from engine.containment import policy
-from engine.containment.cells.build import Sides, build_cells, build_sides, label_empty
+from engine.containment.cells.build import Sides, build_cells, build_sides, label_empty_cells
 from engine.containment.cells.lattice import can_have_cells
 from engine.containment.cells.locate import side_in_cell
 from engine.lanes.lanes import array_at, plain_array_at
@@ -110,7 +110,7 @@ def test_each_empty_cell_is_joined_with_its_copy_by_empty_cells() -> None:
     nx, ny, nz = 4, 3, 5
     counts = np.random.default_rng(0).integers(0, 2, nx * ny * nz)
     labels = np.empty(len(counts), np.int64)
-    label_empty(counts, nx, ny, labels)
+    label_empty_cells(counts, nx, ny, labels)
     assert (labels[counts > 0] == np.flatnonzero(counts)).all()
     group = np.arange(len(counts))  # the least empty cell that each empty one is joined with
     empty = counts.reshape(nz, ny, nx) == 0

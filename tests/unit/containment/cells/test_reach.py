@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from engine.containment.cells.lattice import layer_reached, row_reached, walls_of
+from engine.containment.cells.lattice import cells_reached, rows_reached, walls_of
 
 N = 6
 
@@ -19,9 +19,9 @@ def _reached(corners: np.ndarray) -> set[tuple[int, int, int]]:
     walls, (x, y, z) = walls_of(tuple(b - a), tuple(c - a)), 0.5 - a
     found = set()
     for k in range(N):
-        first, last = layer_reached(walls, z + k, y, 0, N - 1)
+        first, last = rows_reached(walls, z + k, y, 0, N - 1)
         for j in range(first, last + 1):
-            left, right = row_reached(walls, z + k, y + j, x, 0, N - 1)
+            left, right = cells_reached(walls, z + k, y + j, x, 0, N - 1)
             found |= {(i, j, k) for i in range(left, right + 1)}
     return found
 

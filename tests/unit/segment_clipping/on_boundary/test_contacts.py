@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from engine.predicates.rational import orient2d_rational
-from engine.segment_clipping.exact_pieces import triangle_stretch
+from engine.segment_clipping.exact_pieces import triangle_overlap
 from engine.segment_clipping.on_boundary.contacts import NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.mesh_contacts import contact_filter, exact_contact
@@ -64,7 +64,7 @@ def test_contacts_are_those_of_whole_numbers() -> None:
         kind, rough = exact_contact(*points), contact_filter(*points, 0.0)
         n_told += rough != UNDECIDED
         a, b, c, p, q = numbers.tolist()
-        stretch = triangle_stretch(p, q, a, b, c)
+        stretch = triangle_overlap(p, q, a, b, c)
         assert rough in (kind, UNDECIDED) or (rough == Kind.APART and stretch is None)
         assert kind in (Kind.APART, Kind.DEGENERATE) if stretch is None else kind != Kind.APART
         if stretch is not None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.predicates.rational import common_integers, cross, minus
-from engine.segment_clipping.exact_pieces import is_crossed, triangle_stretch
+from engine.segment_clipping.exact_pieces import is_crossed, triangle_overlap
 from engine.segment_clipping.on_boundary.contacts import Kind, Place
 from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, exact_contact, find_contacts_3d, local_segment
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
@@ -20,7 +20,7 @@ def code_of(triangle: list[list[float]], p: list[float], q: list[float]) -> int:
     """Return the code of a triangle that is touched in one point, from integers."""
     flat, _ = common_integers([*p, *q, *(x for corner in triangle for x in corner)])
     start, end, *corners = (flat[i : i + 3] for i in range(0, 15, 3))
-    stretch = triangle_stretch(start, end, *corners)
+    stretch = triangle_overlap(start, end, *corners)
     assert stretch is not None
     t, turns = stretch[0], is_crossed(start, end, corners)
     point = [x + t * (y - x) for x, y in zip(start, end)]

@@ -162,9 +162,9 @@ def test_a_long_value_is_emptied() -> None:
     inner: dict[str, Any] = {"b": [[1, [{}]]] * 3}
     value: Any = {"a": [inner, [[0, 0]] * 20_000, "text"], "c": 1}
     listed = value["a"]
-    pieces.let_go(value)
+    pieces.free_in_steps(value)
     assert (value, listed, inner) == ({}, [], {})
-    pieces.let_go(None)
+    pieces.free_in_steps(None)
 
 
 def test_brackets_that_stay_open_are_those_that_pairs_leave() -> None:

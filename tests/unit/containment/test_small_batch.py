@@ -10,7 +10,7 @@ from numba import config as numba_config
 
 import engine
 from engine import Surface, contains, locate, locate_scene
-from engine.containment.locate import MOST, located_at_once
+from engine.containment.locate import SMALL_BATCH, locate_small_batch
 from engine.containment.methods.filters import locate_by_polynomial, locate_in_ball, locate_in_box
 from engine.containment.methods.half_spaces import locate_in_half_spaces
 from engine.containment.methods.polygon_ray_parity import locate_in_rings
@@ -64,16 +64,16 @@ def test_refusals_are_those_of_the_general_way(bad: Any) -> None:
 
 def test_many_points_and_other_solids_go_the_general_way() -> None:
     ball = engine.Sphere([0, 0, 0], 5)
-    assert located_at_once(np.zeros((MOST + 1, 3)), ball) is None
-    assert located_at_once(np.zeros((0, 3)), ball) is None
-    assert located_at_once(np.zeros((1, 3)), engine.Implicit.from_callable(lambda points: points[:, 0], 3)) is None
+    assert locate_small_batch(np.zeros((SMALL_BATCH + 1, 3)), ball) is None
+    assert locate_small_batch(np.zeros((0, 3)), ball) is None
+    assert locate_small_batch(np.zeros((1, 3)), engine.Implicit.from_callable(lambda points: points[:, 0], 3)) is None
     tree = engine.Csg("union", [ball, engine.Implicit.from_callable(lambda points: points[:, 0], 3)])
-    assert located_at_once(np.zeros((1, 3)), tree) is None
+    assert locate_small_batch(np.zeros((1, 3)), tree) is None
     mesh = made(merged(*(box_mesh([k, 0, 0], [k + 1, 1, 1]) for k in range(50))))
-    found = located_at_once(np.zeros((500, 3)), mesh)
+    found = locate_small_batch(np.zeros((500, 3)), mesh)
     assert (found or ("",))[-1] == "ray_parity"
     locate(np.random.default_rng(0).uniform(0, 50, (40_000, 3)), mesh)  # builds cells
-    assert located_at_once(np.zeros((500, 3)), mesh) is None
+    assert locate_small_batch(np.zeros((500, 3)), mesh) is None
     assert locate(np.zeros((500, 3)), mesh, report=True)[1].method == "segment_parity"
 
 
