@@ -142,7 +142,8 @@ class _InnerCodegen(JITCPUCodegen):  # type: ignore[misc]
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _KernelLowering(NativeLowering):  # type: ignore[misc]
-    """Lowers a kernel; the functions that numba itself compiles for it become inner libraries."""
+    """numba's lowering of a kernel; what numba compiles for it on the way becomes an `_InnerLibrary`: code to be linked
+    in, without machine code of its own."""
 
     _name = "engine_kernel_lowering"
 

@@ -235,7 +235,7 @@ def _are_equal(p: Point3, q: Point3) -> bool:
 
 @inline
 def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return the sign of orient3d from pairs of doubles where their bound proves it, else UNDECIDED."""
+    """Return the sign of orient3d(a, b, c, d) in double-doubles where the bound proves it, else UNDECIDED."""
     total, total_tail, permanent, heights, lows, smallest = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
     p, q, r = a, b, c
     for _ in range(3):  # z of p, times the minor of r and q; a loop, because three copies compile three times as long

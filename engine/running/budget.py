@@ -97,7 +97,7 @@ class _Clock:
         return waiting
 
     def drop(self, waiting: _Waiting) -> None:
-        """Forget a flag, set or not."""
+        """Cancel a deadline that `add` scheduled, passed or not; its flag is never touched again."""
         with self._changed:
             waiting.flag = None
             self._n_dropped += 1

@@ -215,8 +215,9 @@ def _first_hit_bound(scratch: Scratch, bodies: BodyTree, way: Way) -> Any:
 def _search_tree(
     words: IntArray, side: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
-    """Query the candidates of one `BodyTree`, about in order of entry, until the first piece precedes all others;
-    return as `_query_body`."""
+    """Query the bodies of one `BodyTree` that a segment may meet, about in order of entry, until no other can have an
+    earlier piece (with is_any: until one is met). Return SETTLED to go on with the next tree, MET or OPEN to end, or
+    the code of a structure that must be prepared first."""
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
     way, last = way_of(segments, item, bodies), np.float32(1.0)
     begin_way(bodies, way, scratch)

@@ -1,11 +1,11 @@
 """Cohen-Sutherland clipping of segments to a box by outcodes, decided exactly: 2D and 3D.
 
                  |        |                One bit for each plane a point lies outside of, in the order
-        0101     |  0100  |   0110         xmin, xmax, ymin, ymax, zmin, zmax (drawn: ymax ymin xmax xmin
+        1001     |  1000  |   1010         xmin, xmax, ymin, ymax, zmin, zmax (drawn: ymax ymin xmax xmin
        ----------+--------+----------      would be 1000, 0100, 0010, 0001). Codes that share a bit: the
         0001     |  0000  |   0010         segment misses the box. Both zero: it lies inside. Else it is
        ----------+--------+----------      cut by planes it crosses, of which at most one per axis is
-        1001     |  1000  |   1010         entered and one left.
+        0101     |  0100  |   0110         entered and one left.
 
 The textbook clips the outside end at one plane after another until the codes accept or reject. Two differences:
 
@@ -159,7 +159,7 @@ def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) ->
 
 @merged
 def corners_of(low: FloatArray, high: FloatArray) -> tuple[Triple, Triple]:
-    """Return the corners of a box, in 2D with z from -1 to 1."""
+    """Return the low and the high corner of a box as triples; a 2D box has z from -1 to 1."""
     is_flat = low.size == 2
     return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
 

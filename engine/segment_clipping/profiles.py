@@ -189,7 +189,8 @@ def unsupported(solid: Solid) -> UnsupportedSolidError:
 
 
 def check_cut(solids: Sequence[Solid]) -> bool:
-    """Return True; raise UnsupportedSolidError for the first solid to which no segment is clipped."""
+    """Return True where segments can be clipped to a solid, leaves of CSG trees included; else raise
+    UnsupportedSolidError for the first whose type does not support it."""
     for body, solid in enumerate(solids):
         waiting = [solid]
         while waiting:  # bound: a tree has so many leaves at most

@@ -17,18 +17,18 @@ def geometry_of(value: Any) -> Mapping[str, Any] | None:
     """Return the GeoJSON object that a value is or has, None if there is none."""
     if not isinstance(value, Mapping):
         value = getattr(value, "__geo_interface__", None)
-    is_geojson = isinstance(value, Mapping) and (value.get("type") in _PLAIN or value.get("type") in _MEMBERS)
-    return value if is_geojson else None
+    kind = value.get("type") if isinstance(value, Mapping) else None
+    return value if isinstance(kind, str) and (kind in _PLAIN or kind in _MEMBERS) else None
 
 
 def geometries_in(value: Mapping[str, Any], depth: int = _DEEPEST) -> Iterator[Mapping[str, Any]]:
     """Yield the plain geometries of a GeoJSON object, those within collections and features too, null left out."""
     kind = value.get("type")
+    if not isinstance(kind, str) or kind not in (*_PLAIN, *_MEMBERS) or not depth:
+        raise InvalidInputError(f"{kind!r:.60} is no geometry of GeoJSON that is accepted here", ("type",))
     if kind in _PLAIN:
         yield value
         return
-    if depth == 0 or kind not in _MEMBERS:
-        raise InvalidInputError(f"{kind!r:.60} is no geometry of GeoJSON that is taken here", ("type",))
     member = _MEMBERS[kind]
     inner = value.get(member)
     for each in [inner] if kind == "Feature" else inner if isinstance(inner, (list, tuple)) else [value]:

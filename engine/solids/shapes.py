@@ -15,12 +15,12 @@ constructor of `engine.solids` refuses is refused here with the same error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from engine.errors import EngineError, InvalidArrayError, UnsupportedSolidError
+from engine.errors import EngineError, InvalidArrayError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
 from engine.solids.checks import as_points, shown, spell
 from engine.solids.geometries import coordinates_of, geometries_in, geometry_of
@@ -47,8 +47,13 @@ def as_solid(value: object, *where: str | int) -> Solid:
         solid = _from_geojson(value) or _from_mesh(value) or _from_arrays(value)
     except EngineError as error:
         raise error.at(*where) from None
+    except Exception as error:  # whatever the parts of an object raise that is none of those above
+        raise InvalidArrayError(
+            f"{spell(where)} cannot be read as a solid: {type(error).__name__}: {error!s:.100}", where
+        ) from error
     if solid is None:
-        raise UnsupportedSolidError(f"{spell(where)} must be a solid, {_TAKEN}; got {shown(value)}", where)
+        got = f"{type(value).__name__} {shown(value)}"
+        raise UnsupportedSolidError(f"{spell(where)} must be a solid, {_TAKEN}; got {got}", where)
     return solid
 
 
@@ -63,10 +68,16 @@ def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
         members = geometry.get("features", geometry.get("geometries"))
         if not isinstance(members, (list, tuple)):
             raise InvalidArrayError(f"{spell(where)} must be a list of polygons, got {type(values).__name__}", where)
-        values = [each if each and each.get("geometry", each) else Polygon([]) for each in members]
+        values = [Polygon([]) if _has_no_geometry(each) else each for each in members]
     if all(isinstance(each, Solid) for each in values):
         return values
     return [as_solid(each, *where, number) for number, each in enumerate(values)]
+
+
+def _has_no_geometry(member: Any) -> bool:
+    """Return whether a member of a collection is null, or a Feature whose geometry is."""
+    is_feature = isinstance(member, Mapping) and member.get("type") == "Feature"
+    return member is None or (is_feature and member.get("geometry") is None)
 
 
 def _from_geojson(value: Any) -> Polygon | None:
@@ -109,7 +120,7 @@ def _from_mesh(value: Any) -> Polyhedron | None:
 
 
 def _polyhedron(vertices: Any, faces: Any) -> Polyhedron:
-    return Polyhedron(np.asarray(vertices, np.float64), faces if isinstance(faces, list) else np.asarray(faces))
+    return Polyhedron(vertices, faces if isinstance(faces, (list, tuple)) else np.asarray(faces))
 
 
 def _unpadded(flat: Any) -> list[list[int]]:
@@ -179,10 +190,12 @@ def as_pose(value: object, dimension: int, *where: str | int) -> Pose:
             return Pose(given.as_matrix(), np.zeros(dimension))
         if isinstance(given, (list, tuple)) and len(given) == 2 and _axes(given[0]) == 2:
             return Pose(*given)
-        if _axes(given) == 2:
+        if _axes(given) == 2 and np.shape(given) == (dimension + 1, dimension + 1):
             return Pose.from_matrix(given)
     except EngineError as error:
         raise error.at(*where) from None
+    except (TypeError, ValueError):  # rows of different lengths, junk
+        pass
     raise InvalidArrayError(
         f"{spell(where)} must be a Pose, a matrix ({dimension + 1}, {dimension + 1}) or (rotation, translation), "
         f"got {shown(value)}",
@@ -195,12 +208,17 @@ def as_pose_arrays(poses: Any, dimension: int) -> tuple[FloatArray, FloatArray]:
     if isinstance(poses, np.ndarray) and poses.ndim == 3 and poses.shape[1:] == (dimension + 1, dimension + 1):
         last = np.append(np.zeros(dimension), 1.0)
         if len(odd := np.flatnonzero((poses[:, -1] != last).any(axis=1))):
-            Pose.from_matrix(poses[odd[0]])  # says what is wrong
+            as_pose(poses[odd[0]], dimension, "poses", int(odd[0]))  # the error says what is wrong
         return poses[:, :-1, :-1], poses[:, :-1, -1]
     if not isinstance(poses, Iterable) or isinstance(poses, (str, bytes)):
         raise InvalidArrayError(
             f"poses must be a list of poses or an array of matrices, got {shown(poses)}", ("poses",)
         )
     made = [as_pose(each, dimension, "poses", number) for number, each in enumerate(poses)]
+    for number, each in enumerate(made):
+        if each.dimension != dimension:
+            raise WrongDimensionError(
+                f"poses[{number}] has dimension {each.dimension}, the bodies have {dimension}", ("poses", number)
+            )
     turns = np.array([each.rotation for each in made]).reshape(-1, dimension, dimension)
     return turns, np.array([each.translation for each in made]).reshape(-1, dimension)

@@ -41,6 +41,7 @@ def test_every_public_name_stands_in_the_reference(site: Path) -> None:
 def test_reading_it_asks_no_other_host(site: Path) -> None:
     pages = list(site.rglob("*.html"))
     assert len(pages) > 20
+    assert (site / "gallery.html").read_text("utf-8").count("canvas") > 2 * len(SCRIPTS)  # the code beside pictures
     assert [path.name for path in pages if ELSEWHERE.search(path.read_text("utf-8"))] == []
 
 

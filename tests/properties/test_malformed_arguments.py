@@ -215,7 +215,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "Polyhedron": {"vertices": VERTICES, "faces": FACES},
     "Pose": {"rotation": np.eye(3), "translation": [0, 0, 0], "tolerance": 1e-12},
     "Pose.identity": {"dimension": 3},
-    "Pose.from_quaternion": {"quaternion": [1, 0, 0, 0], "translation": [0, 0, 0]},
+    "Pose.from_quaternion": {"wxyz": [1, 0, 0, 0], "translation": [0, 0, 0], "xyzw": None},
     "Pose.from_matrix": {"matrix": np.eye(4), "tolerance": 1e-12},
     "Scene": {"solids": [BOX], "poses": [None]},
     "Scene.moved": {"self": SCENE, "poses": {0: POSE}},

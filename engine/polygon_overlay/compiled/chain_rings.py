@@ -85,9 +85,10 @@ def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) 
 def join_regions(
     chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: FlagArray
 ) -> None:
-    """Join faces of one region, and fill ``fan``; ``state`` is filled.
+    """Unite faces that no boundary chain separates into regions; fill ``faces.fan`` with the boundary half-chains that
+    leave each node that is not simple. ``faces.state`` is what `mark_boundary` wrote.
 
-    is_named: join faces outside the result too. sizes: the numbers of chains, simple nodes and nodes.
+    is_named: unite faces outside the result too. sizes: the numbers of chains, simple nodes and nodes.
     """
     n_chains, n_simple, n_nodes = sizes
     cycle, state = faces.cycle, faces.state

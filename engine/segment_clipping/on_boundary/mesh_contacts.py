@@ -286,7 +286,8 @@ def _append_triangles(
 def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts with the triangles of n queued blocks; see `append_contacts`. shear: of `shear_of`."""
+    """Append the contacts of a segment with the triangles of the first n queued leaf blocks; return the new number of
+    contacts, or NO_ROOM. shear: `shear_of` the segment; the rest as in `append_contacts`."""
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):

@@ -278,7 +278,7 @@ def test_refusals() -> None:
         overlay(square, Sphere((0, 0), 1))
     assert caught.value.where == ("clip",)
     with pytest.raises(UnsupportedSolidError) as caught:
-        overlay_batch([square, [(0, 0)]], [square, square])  # type: ignore[list-item]
+        overlay_batch([square, 7], [square, square])  # type: ignore[list-item]
     assert caught.value.where == ("subjects", 1)
     with pytest.raises(InvalidOperationError, match="intersection, union"):
         overlay(square, square, "xor")  # type: ignore[call-overload]

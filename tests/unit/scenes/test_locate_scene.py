@@ -143,7 +143,7 @@ def test_nothing_and_errors() -> None:
     box = Aabb([0, 0], [1, 1])
     assert locate_scene([], [box]).offsets.tolist() == [0]
     assert locate_scene([[0, 0]], []).offsets.tolist() == [0, 0]
-    with pytest.raises(engine.InvalidArrayError) as failure:
+    with pytest.raises(engine.UnsupportedSolidError) as failure:
         locate_scene([[0, 0]], [box, "box"])  # type: ignore[list-item]
     assert failure.value.where == ("solids", 1)
     with pytest.raises(engine.WrongDimensionError):

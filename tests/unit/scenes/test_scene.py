@@ -135,7 +135,7 @@ def test_says_which_body_is_wrong() -> None:
         scene.moved({2: STEP})
     with pytest.raises(WrongDimensionError, match=r"poses\[1\] has dimension 2"):
         scene.moved({1: Pose.identity(2)})
-    with pytest.raises(InvalidArrayError, match=r"poses\[1\] must be a Pose or None, got int"):
+    with pytest.raises(InvalidArrayError, match=r"poses\[1\] must be a Pose, a matrix"):
         scene.moved({1: 3})  # type: ignore[dict-item]
     with pytest.raises(InvalidArrayError, match="poses must be a dict"):
         scene.moved([STEP])  # type: ignore[arg-type]

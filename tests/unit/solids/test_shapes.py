@@ -119,7 +119,7 @@ def test_trimesh_itself_is_taken() -> None:
 
 @pytest.mark.parametrize(("held", "kind", "where", "words"), [
     (None, engine.UnsupportedSolidError, ("solid",), "solid must be a solid"),
-    ("nonsense", engine.UnsupportedSolidError, ("solid",), "got 'nonsense'"),
+    ("nonsense", engine.UnsupportedSolidError, ("solid",), "got str 'nonsense'"),
     ({"type": "sphere"}, engine.UnsupportedSolidError, ("solid",), "solid must be a solid"),
     ({"type": "LineString", "coordinates": [[0, 0], [1, 1]]}, engine.UnsupportedSolidError, ("solid", "type"),
      "clip_lines"),
