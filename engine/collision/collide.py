@@ -98,7 +98,7 @@ def posed(given: object, solid: Solid, *where: str | int) -> Pose | None:
     """Return a pose of the solid's dimension, or None; a matrix or a pair (rotation, translation) is read."""
     if given is None:
         return None
-    pose = as_pose(given, solid.dimension, *where)
+    pose = given if type(given) is Pose else as_pose(given, solid.dimension, *where)
     if pose.dimension != solid.dimension:
         raise WrongDimensionError(
             f"{spell(where)} has dimension {pose.dimension}, the {solid.type} it moves has {solid.dimension}", where

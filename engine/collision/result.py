@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
+from engine.solids.columns import ByValue
 from engine.solids.pose import Pose
 from engine.solids.registry import row_of
 from engine.types import FloatArray, Rcc8, Relation
@@ -188,7 +189,7 @@ class Feature(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Clearance:
+class Clearance(ByValue):
     """How far apart two bodies are.
 
     Attributes

@@ -26,7 +26,9 @@ _SOUPS: Final = ("stl",)
 _BY_TRIMESH: Final = ("ply", "glb")
 _STL_HEAD: Final = 84
 _STL_TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-_STL_VERTEX: Final = re.compile(rb"^[ \t]*vertex\b([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
+_STL_NAME: Final = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.MULTILINE | re.IGNORECASE)
+_STL_VERTEX: Final = re.compile(rb"\bvertex\s+([^\s_]+)\s+([^\s_]+)\s+([^\s_]+)", re.IGNORECASE)
+_STL_END: Final = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 M = TypeVar("M", bound=Mesh)
 _ELEMENT: Final = re.compile(rb"^[ \t]*([vf])(?=\s|\Z)([^\n#]*)", re.MULTILINE)
 """The lines of an OBJ file that define vertices and faces."""
@@ -135,6 +137,8 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
             octets = path.read_bytes()
         except OSError as error:
             raise InvalidInputError(f"{path}: {error.strerror or error}", ("file",)) from None
+        except ValueError as error:  # NUL, a lone surrogate
+            raise InvalidInputError(f"{shown(str(file))} is no path: {error}", ("file",)) from None
         suffix = path.suffix.lower().removeprefix(".")
         return read_mesh(octets, suffix if file_format is None and suffix in FORMATS else file_format)
     if isinstance(file, (bytes, bytearray, memoryview)):
@@ -142,7 +146,14 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
     if not callable(getattr(file, "read", None)):
         raise InvalidInputError(f"file must be a path, open for reading bytes, or bytes, got {shown(file)}", ("file",))
     if file_format is None:
-        octets = file.read()
+        try:
+            octets = file.read()
+        except Exception as error:  # whatever a caller's object raises
+            raise InvalidInputError(
+                f"the file cannot be read: {type(error).__name__}: {error!s:.200}", ("file",)
+            ) from error
+        if not isinstance(octets, bytes):
+            raise InvalidInputError(f"file must be open for reading bytes, it gives {type(octets).__name__}", ("file",))
         return read_mesh(octets, _format_of(octets))
     if not isinstance(file_format, str) or file_format not in FORMATS:
         raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {shown(file_format)}", ("format",))
@@ -176,15 +187,16 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
 
 def _format_of(octets: bytes) -> str:
     """Return the format that the first bytes of a file tell, obj for a text that is none of the others."""
+    octets = octets.removeprefix(b"\xef\xbb\xbf")
     head = octets[:512].lstrip()
     if octets[:4] == b"glTF":
         return "glb"
     if head[:3] == b"ply":
         return "ply"
-    if re.match(rb"(\s*#[^\n]*\n)*\s*C?OFF\b", octets[:512]):
+    if re.match(rb"(\s*#[^\n]*\n)*\s*C?OFF\b", octets):
         return "off"
     is_text = b"\0" not in octets[:512]
-    return "stl" if head[:5] == b"solid" or not is_text else "obj"
+    return "stl" if head[:5].lower() == b"solid" or not is_text else "obj"
 
 
 def _read_stl(file: IO[bytes]) -> tuple[FloatArray, IntArray]:
@@ -197,12 +209,14 @@ def _read_stl(file: IO[bytes]) -> tuple[FloatArray, IntArray]:
     if len(octets) == _STL_HEAD + n * _STL_TRIANGLE.itemsize:
         vertices = np.frombuffer(octets, _STL_TRIANGLE, n, _STL_HEAD)["corners"].reshape(-1, 3).astype(np.float64)
     else:
+        octets = octets.removeprefix(b"\xef\xbb\xbf")
         if not octets.lstrip()[:5].lower() == b"solid":
             raise ValueError(f"a binary file of {n} triangles has {_STL_HEAD + 50 * n} bytes, this one {len(octets)}")
-        rows = [row.split() for row in _STL_VERTEX.findall(octets)]
-        if len(rows) % 3 or not all(len(row) == 3 for row in rows):
-            raise ValueError("a triangle has three lines `vertex x y z`")
-        vertices = np.array(rows, np.bytes_).astype(np.float64).reshape(-1, 3)
+        *facets, rest = _STL_END.split(_STL_NAME.sub(b"", re.sub(rb"\r\n?", b"\n", octets)))
+        corners = [_STL_VERTEX.findall(facet) for facet in facets]
+        if rest.strip() or any(len(three) != 3 for three in corners):
+            raise ValueError("a facet has three corners `vertex x y z` and ends with `endfacet`")
+        vertices = np.array([[[*map(float, row)] for row in three] for three in corners]).reshape(-1, 3)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 

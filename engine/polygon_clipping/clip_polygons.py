@@ -61,6 +61,7 @@ class ClippedPolygons(Ragged):
 
     _rows: ClassVar[str] = "polygons"
     _levels: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets", "polygon_offsets")
+    _not_rows: ClassVar[tuple[str, ...]] = ("contours",)
     vertices: FloatArray
     ring_offsets: IntArray
     polygon_offsets: IntArray
@@ -272,7 +273,7 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
     rings: list[FloatArray] = []
     counts: list[int] = []
     for i, polygon in enumerate(polygons):
-        if not isinstance(polygon, (Polygon, list, tuple, np.ndarray)) and geometry_of(polygon) is not None:
+        if not isinstance(polygon, Polygon) and geometry_of(polygon) is not None:  # pieces of overlays are tuples
             polygon = as_solid(polygon, "polygons", i)
         if isinstance(polygon, Polygon):
             if polygon.dimension != dimension:

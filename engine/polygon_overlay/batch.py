@@ -107,6 +107,15 @@ class OverlayBatch(Ragged):
         check_sources(exact.sources, np.repeat(n_inputs, exact.counts[:, 2]))
         return made
 
+    def __eq__(self, other: object) -> bool:
+        is_same = Ragged.__eq__(self, other)  # of the arrays
+        if is_same is not True or not isinstance(other, OverlayBatch):
+            return is_same
+        questions = [(each._operation, tuple(each._subjects), tuple(each._clips)) for each in (self, other)]
+        return questions[0] == questions[1]  # what `batch[k]` may ask again
+
+    __hash__ = Ragged.__hash__
+
     def __len__(self) -> int:
         return len(self.status)
 

@@ -18,6 +18,7 @@ from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.running.budget import Budget
 from engine.running.parallel import Options
 from engine.solids.checks import as_nested_offsets
+from engine.solids.columns import ByValue
 from engine.solids.ragged import as_geojson
 from engine.types import FloatArray, IntArray
 
@@ -55,8 +56,8 @@ class OverlayPiece(NamedTuple):
         return {"type": "Polygon", "coordinates": rings}
 
 
-@dataclass(frozen=True, slots=True)
-class Collapse:
+@dataclass(frozen=True, slots=True, eq=False)
+class Collapse(ByValue):
     """A part of the exact result that the rounded output no longer has as a part of its own.
 
     Attributes
@@ -137,8 +138,8 @@ def nearest(value: Fraction) -> float:
     return nearest_quotient(*value.as_integer_ratio())
 
 
-@dataclass(frozen=True, repr=False)
-class Overlay:
+@dataclass(frozen=True, repr=False, eq=False)
+class Overlay(ByValue):
     """The result of a Boolean operation on polygons.
 
     Attributes

@@ -55,6 +55,7 @@ class SceneLocations(Ragged):
     """
 
     _levels: ClassVar[tuple[str, ...]] = ("indices", "offsets")
+    _not_rows: ClassVar[tuple[str, ...]] = ("indices", "on_boundary")
     _rows: ClassVar[str] = "points"
     offsets: IntArray
     """``(n_points + 1,)`` int64."""

@@ -378,13 +378,16 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
     """Return solids of one dimension and a pose or None for each; other shapes are read (`engine.solids.shapes`)."""
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
-    solids = tuple(as_solid(each, "solids", index) for index, each in enumerate(solids))
+    solids = list(solids)
     for index, solid in enumerate(solids):
+        if not isinstance(solid, Solid):
+            solid = solids[index] = as_solid(solid, "solids", index)
         if solid.dimension != solids[0].dimension:
             raise WrongDimensionError(
                 f"solids[{index}] is {solid.dimension}D, solids[0] {solids[0].dimension}D; use one dimension",
                 ("solids", index),
             )
+    solids = tuple(solids)
     if poses is None:
         return solids, (None,) * len(solids)
     if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.compiling.jit import entry_of, inline, kernel
+from engine.errors import EngineError
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.clip_segments import plan_for
@@ -148,7 +149,10 @@ def clip_lines(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     region = as_solid(region, "region")
     plan = plan_for(region)
-    held = lines_in(lines)
+    try:
+        held = lines_in(lines)
+    except EngineError as error:
+        raise error.at("lines") from None
     vertices, offsets = as_lines(lines if held is None else held, region.dimension)
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, region.dimension))

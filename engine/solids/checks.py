@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from engine.errors import EmptyGeometryError, InvalidArrayError, NotFiniteError, WrongDimensionError
+from engine.errors import EmptyGeometryError, EngineError, InvalidArrayError, NotFiniteError, WrongDimensionError
 from engine.running.budget import poll, polled
 from engine.solids.geometries import positions_in
 from engine.types import BoolArray, FloatArray, IntArray, read_only
@@ -258,8 +258,12 @@ def as_points(
     or 3, or None for either (no points: 2). must_be_finite: as in `as_floats`. Raises: InvalidArrayError,
     WrongDimensionError, NotFiniteError.
     """
-    if not isinstance(points, np.ndarray) and (held := positions_in(points)) is not None:
-        points = held
+    if not isinstance(points, np.ndarray):
+        try:
+            held = positions_in(points)
+        except EngineError as error:
+            raise error.at(*where) from None
+        points = points if held is None else held
     array = as_floats(points, 2, where, must_be_finite)
     if array.size == 0 and array.shape[0] == 0 and array.shape[1] in (0, dimension or 0):
         return array.reshape((0, dimension or 2))

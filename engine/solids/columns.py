@@ -8,19 +8,10 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 
-class Columns:
-    """Base of dataclasses whose fields are arrays, or None: what a batch of questions is answered with."""
+class ByValue:
+    """Base of frozen dataclasses that may hold arrays: equal where their public fields are."""
 
     __slots__ = ()
-
-    _rows: ClassVar[str] = "rows"
-    """What `len` counts."""
-
-    def __len__(self) -> int:
-        return len(next(iter(self._columns().values())))
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {len(self):,} {self._rows if len(self) != 1 else self._rows[:-1]}>"
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
@@ -34,6 +25,23 @@ class Columns:
         """Return the public fields by name."""
         names = (each.name for each in fields(cast(Any, self)))
         return {name: getattr(self, name) for name in names if not name.startswith("_")}
+
+
+class Columns(ByValue):
+    """Base of dataclasses whose fields are arrays, or None: what a batch of questions is answered with."""
+
+    __slots__ = ()
+
+    _rows: ClassVar[str] = "rows"
+    """What `len` counts."""
+    _not_rows: ClassVar[tuple[str, ...]] = ()
+    """Fields that are not by row, whatever their lengths."""
+
+    def __len__(self) -> int:
+        return len(next(iter(self._columns().values())))
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self):,} {self._rows if len(self) != 1 else self._rows[:-1]}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the columns as lists, by name.
@@ -58,6 +66,8 @@ class Columns:
 
         columns: dict[str, Any] = {}
         for name, value in self._columns().items():
+            if name in self._not_rows or name in getattr(self, "_levels", ()):
+                continue
             if isinstance(value, np.ndarray) and value.ndim == 2 and len(value) == len(self):
                 columns |= {f"{name}_{k}": value[:, k] for k in range(value.shape[1])}
             elif value is not None and len(value) == len(self):
@@ -67,11 +77,25 @@ class Columns:
 
 def are_equal(first: Any, second: Any) -> bool:
     """Compare two fields, of which arrays are equal where their shapes and all values are."""
-    if isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
-        return np.array_equal(first, second)
-    return type(first) is type(second) and bool(first == second)
+    if first is second:
+        return True
+    if type(first) is not type(second):
+        return False
+    if isinstance(first, np.ndarray):
+        return first.dtype == second.dtype and np.array_equal(first, second)
+    if isinstance(first, (tuple, list)):
+        return len(first) == len(second) and all(map(are_equal, first, second))
+    return bool(first == second)
 
 
 def key_of(value: Any) -> Any:
     """Return what equal fields hash alike by."""
-    return value.tobytes() if isinstance(value, np.ndarray) else value
+    if isinstance(value, np.ndarray):
+        return (value + 0.0 if value.dtype.kind == "f" else value).tobytes()  # of -0.0: 0.0
+    if isinstance(value, (tuple, list)):
+        return tuple(map(key_of, value))
+    try:
+        hash(value)
+    except TypeError:  # of a class that compares, but does not hash
+        return type(value).__name__
+    return value

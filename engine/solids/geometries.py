@@ -5,47 +5,73 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from engine.errors import InvalidArrayError, InvalidInputError
+import numpy as np
+
+from engine.errors import EngineError, InvalidArrayError, InvalidInputError
 
 _PLAIN: Final = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon")
 _MEMBERS: Final = {"GeometryCollection": "geometries", "Feature": "geometry", "FeatureCollection": "features"}
 """Where collections have what they are made of."""
 _DEEPEST: Final = 32
+_NEVER: Final = frozenset({list, tuple, float, int, str, np.ndarray})
 
 
 def geometry_of(value: Any) -> Mapping[str, Any] | None:
     """Return the GeoJSON object that a value is or has, None if there is none."""
-    if not isinstance(value, Mapping):
-        value = getattr(value, "__geo_interface__", None)
-    kind = value.get("type") if isinstance(value, Mapping) else None
+    if type(value) in _NEVER:
+        return None
+    try:
+        if not isinstance(value, Mapping):
+            value = getattr(value, "__geo_interface__", None)
+        kind = value.get("type") if isinstance(value, Mapping) else None
+    except EngineError:
+        raise
+    except Exception as error:  # whatever a caller's property raises
+        raise InvalidInputError(
+            f"a {type(value).__name__} does not give its GeoJSON: {type(error).__name__}"
+        ) from error
     return value if isinstance(kind, str) and (kind in _PLAIN or kind in _MEMBERS) else None
 
 
-def geometries_in(value: Mapping[str, Any], depth: int = _DEEPEST) -> Iterator[Mapping[str, Any]]:
-    """Yield the plain geometries of a GeoJSON object, those within collections and features too, null left out."""
+Path = tuple[str | int, ...]
+
+
+def geometries_in(value: Mapping[str, Any], where: Path = (), depth: int = _DEEPEST) -> Iterator[tuple[Path, Any]]:
+    """Yield the plain geometries of a GeoJSON object with their paths, those within collections and features too, and
+    None for each that is null."""
     kind = value.get("type")
-    if not isinstance(kind, str) or kind not in (*_PLAIN, *_MEMBERS) or not depth:
-        raise InvalidInputError(f"{kind!r:.60} is no geometry of GeoJSON that is accepted here", ("type",))
-    if kind in _PLAIN:
-        yield value
+    if isinstance(kind, str) and kind in _PLAIN:
+        yield where, value
         return
+    if depth == 0 or not isinstance(kind, str) or kind not in _MEMBERS:
+        what = repr(kind[:60]) if isinstance(kind, str) else f"a {type(kind).__name__}"
+        raise InvalidInputError(f"type is {what}: no geometry of GeoJSON that is taken here", (*where, "type"))
     member = _MEMBERS[kind]
-    inner = value.get(member)
-    for each in [inner] if kind == "Feature" else inner if isinstance(inner, (list, tuple)) else [value]:
-        if each is not None:
-            if not isinstance(each, Mapping) or each is value:
-                raise InvalidInputError(f"{member} of a {kind} must be GeoJSON, got {type(inner).__name__}", (member,))
-            yield from geometries_in(each, depth - 1)
-
-
-def coordinates_of(geometry: Mapping[str, Any]) -> Any:
-    """Return the coordinates of a plain geometry. Raises: InvalidArrayError where they are no list."""
-    at = geometry.get("coordinates")
-    if not hasattr(at, "__len__") or isinstance(at, (str, bytes, Mapping)):
-        raise InvalidArrayError(
-            f"coordinates must be nested lists of positions, got {type(at).__name__}", ("coordinates",)
+    inner: Any = value.get(member)
+    if kind != "Feature" and not isinstance(inner, (list, tuple)):
+        raise InvalidInputError(
+            f"{member} of a {kind} must be GeoJSON, a list, got {type(inner).__name__}", (*where, member)
         )
-    return at
+    for number, each in enumerate([inner] if kind == "Feature" else inner):
+        place = (*where, member) if kind == "Feature" else (*where, member, number)
+        if each is None:
+            yield place, None
+        elif isinstance(each, Mapping):
+            yield from geometries_in(each, place, depth - 1)
+        else:
+            raise InvalidInputError(f"{member} of a {kind} must be GeoJSON, got {type(each).__name__}", place)
+
+
+def coordinates_of(geometry: Mapping[str, Any], where: Path = ()) -> Any:
+    """Return the coordinates of a plain geometry. Raises: InvalidArrayError where they are no list."""
+    return as_list(geometry.get("coordinates"), (*where, "coordinates"))
+
+
+def as_list(value: Any, where: Path) -> Any:
+    """Return a list, tuple or array of one axis or more. Raises: InvalidArrayError for anything else."""
+    if not isinstance(value, (list, tuple)) and not (isinstance(value, np.ndarray) and value.ndim):
+        raise InvalidArrayError(f"coordinates must be nested lists of positions, got {type(value).__name__}", where)
+    return value
 
 
 def positions_in(value: Any) -> list[Any] | None:
@@ -59,15 +85,24 @@ def lines_in(value: Any) -> list[Any] | None:
 
 
 def _gathered(value: Any, one: str, many: str) -> list[Any] | None:
-    if isinstance(value, (list, tuple)) and len(value) and geometry_of(value[0]) is not None:
-        value = {"type": "GeometryCollection", "geometries": [geometry_of(each) or {} for each in value]}
-    geometry = geometry_of(value)
-    if geometry is None:
+    listed = type(value) is list or type(value) is tuple
+    if listed and (not value or type(value[0]) in _NEVER):
         return None
+    if listed and geometry_of(value[0]) is not None:
+        found: Iterator[tuple[Path, Any]] = (
+            inner for k, each in enumerate(value) for inner in geometries_in(geometry_of(each) or {}, (k,))
+        )
+    else:
+        geometry = geometry_of(value)
+        if geometry is None:
+            return None
+        found = geometries_in(geometry)
     gathered: list[Any] = []
-    for each in geometries_in(geometry):
+    for place, each in found:
+        if each is None:
+            raise InvalidInputError(f"a geometry is null where {one}s are expected; leave its row out", place)
         if each["type"] not in (one, many):
-            raise InvalidInputError(f"a {each['type']} is given where {one}s are expected", ("type",))
-        at = coordinates_of(each)
+            raise InvalidInputError(f"a {each['type']} is given where {one}s are expected", (*place, "type"))
+        at = coordinates_of(each, place)
         gathered += [at] if each["type"] == one else list(at)
     return gathered

@@ -15,15 +15,15 @@ constructor of `engine.solids` refuses is refused here with the same error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from engine.errors import EngineError, InvalidArrayError, UnsupportedSolidError, WrongDimensionError
+from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
-from engine.solids.checks import as_points, shown, spell
-from engine.solids.geometries import coordinates_of, geometries_in, geometry_of
+from engine.solids.checks import Where, as_points, shown, spell
+from engine.solids.geometries import as_list, coordinates_of, geometries_in, geometry_of
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
@@ -47,9 +47,12 @@ def as_solid(value: object, *where: str | int) -> Solid:
         solid = _from_geojson(value) or _from_mesh(value) or _from_arrays(value)
     except EngineError as error:
         raise error.at(*where) from None
-    except Exception as error:  # whatever the parts of an object raise that is none of those above
-        raise InvalidArrayError(
-            f"{spell(where)} cannot be read as a solid: {type(error).__name__}: {error!s:.100}", where
+    except (MemoryError, KeyboardInterrupt):
+        raise
+    except Exception as error:  # whatever the attributes and items of a caller's object raise
+        raise InvalidInputError(
+            f"{spell(where)}: a {type(value).__name__} that cannot be read: {type(error).__name__}: {error!s:.100}",
+            where,
         ) from error
     if solid is None:
         got = f"{type(value).__name__} {shown(value)}"
@@ -65,19 +68,14 @@ def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
     """
     if not isinstance(values, (list, tuple)):
         geometry = geometry_of(values) or {}
-        members = geometry.get("features", geometry.get("geometries"))
+        name = {"FeatureCollection": "features", "GeometryCollection": "geometries"}.get(geometry.get("type", ""), "")
+        members = geometry.get(name)
         if not isinstance(members, (list, tuple)):
             raise InvalidArrayError(f"{spell(where)} must be a list of polygons, got {type(values).__name__}", where)
-        values = [Polygon([]) if _has_no_geometry(each) else each for each in members]
+        values = [Polygon([]) if each is None else each for each in members]  # a null geometry of a Feature: the same
     if all(isinstance(each, Solid) for each in values):
         return values
     return [as_solid(each, *where, number) for number, each in enumerate(values)]
-
-
-def _has_no_geometry(member: Any) -> bool:
-    """Return whether a member of a collection is null, or a Feature whose geometry is."""
-    is_feature = isinstance(member, Mapping) and member.get("type") == "Feature"
-    return member is None or (is_feature and member.get("geometry") is None)
 
 
 def _from_geojson(value: Any) -> Polygon | None:
@@ -85,23 +83,31 @@ def _from_geojson(value: Any) -> Polygon | None:
     geometry = geometry_of(value)
     if geometry is None:
         return None
-    parts: list[Any] = []
-    for each in geometries_in(geometry):
+    plane: list[Any] = []
+    for place, each in geometries_in(geometry):
+        if each is None:
+            continue
         kind = each["type"]
         if kind not in ("Polygon", "MultiPolygon"):
             uses = "clip_lines takes lines" if "Line" in kind else "locate takes points"
-            raise UnsupportedSolidError(f"a {kind} is no solid: {uses}", ("type",))
-        coordinates = coordinates_of(each)
-        parts += [coordinates] if kind == "Polygon" and len(coordinates) else coordinates
-    plane = [[_plane(ring) for ring in part] for part in parts]
+            raise UnsupportedSolidError(f"a {kind} is no solid: {uses}", (*place, "type"))
+        coordinates, path = coordinates_of(each, place), (*place, "coordinates")
+        for k, part in enumerate([coordinates] if kind == "Polygon" and len(coordinates) else coordinates):
+            at = path if kind == "Polygon" else (*path, k)
+            plane.append([_plane(ring, (*at, j)) for j, ring in enumerate(as_list(part, at))])
     read, _ = Polygon.geojson
     return read({"type": "MultiPolygon", "coordinates": plane})
 
 
-def _plane(positions: Any) -> FloatArray:
+def _plane(positions: Any, where: Where) -> FloatArray:
     """Return positions (n, 2), of three numbers each (longitude, latitude, altitude) the first two."""
-    is_tall = len(positions) and all(hasattr(each, "__len__") and len(each) == 3 for each in positions)
-    return as_points([each[:2] for each in positions] if is_tall else positions, 2, ("coordinates",))
+    rows = as_list(positions, where)
+    if isinstance(rows, np.ndarray):
+        is_tall = rows.ndim == 2 and rows.shape[1] == 3
+    else:
+        is_tall = bool(rows) and all(isinstance(each, (list, tuple, np.ndarray)) and len(each) == 3 for each in rows)
+    points = as_points(rows, 3 if is_tall else 2, where)
+    return points[:, :2] if is_tall else points
 
 
 def _from_mesh(value: Any) -> Polyhedron | None:
@@ -120,11 +126,16 @@ def _from_mesh(value: Any) -> Polyhedron | None:
 
 
 def _polyhedron(vertices: Any, faces: Any) -> Polyhedron:
-    return Polyhedron(vertices, faces if isinstance(faces, (list, tuple)) else np.asarray(faces))
+    corners = vertices if isinstance(vertices, np.ndarray) else np.asarray(vertices)
+    return Polyhedron(corners, faces if isinstance(faces, (list, np.ndarray)) else np.asarray(faces))
 
 
 def _unpadded(flat: Any) -> list[list[int]]:
     """Return the faces of a flat list in which each stands behind its number of corners."""
+    if flat.ndim != 1 or flat.dtype.kind not in "iu":
+        raise InvalidArrayError(
+            f"faces must be one row of whole numbers, got dtype {flat.dtype} and shape {flat.shape}", ("faces",)
+        )
     faces, at = [], 0
     while at < len(flat):  # bound: each turn goes on by 1 or more
         n = int(flat[at])
@@ -143,7 +154,7 @@ def _faces_in(block: Any) -> list[list[int]]:
         raise UnsupportedSolidError(
             f"cells of type {block.type!r} are no faces; give the surface of the mesh", ("cells",)
         )
-    return [list(map(int, face)) for face in block.data] if block.type not in ("vertex", "line") else []
+    return np.asarray(block.data).tolist() if block.type not in ("vertex", "line") else []
 
 
 def _from_arrays(value: Any) -> Solid | None:
@@ -187,15 +198,18 @@ def as_pose(value: object, dimension: int, *where: str | int) -> Pose:
     given: Any = value
     try:
         if hasattr(given, "as_matrix"):
-            return Pose(given.as_matrix(), np.zeros(dimension))
+            matrix = np.asarray(given.as_matrix())
+            return Pose.from_matrix(matrix) if matrix.shape == (4, 4) else Pose(matrix, np.zeros(len(matrix)))
         if isinstance(given, (list, tuple)) and len(given) == 2 and _axes(given[0]) == 2:
             return Pose(*given)
-        if _axes(given) == 2 and np.shape(given) == (dimension + 1, dimension + 1):
+        if _axes(given) == 2 and len(given) == dimension + 1:
             return Pose.from_matrix(given)
     except EngineError as error:
         raise error.at(*where) from None
-    except (TypeError, ValueError):  # rows of different lengths, junk
-        pass
+    except Exception as error:  # a caller's as_matrix
+        raise InvalidArrayError(
+            f"{spell(where)} gives no matrix: {type(error).__name__}: {error!s:.100}", where
+        ) from error
     raise InvalidArrayError(
         f"{spell(where)} must be a Pose, a matrix ({dimension + 1}, {dimension + 1}) or (rotation, translation), "
         f"got {shown(value)}",
@@ -208,17 +222,23 @@ def as_pose_arrays(poses: Any, dimension: int) -> tuple[FloatArray, FloatArray]:
     if isinstance(poses, np.ndarray) and poses.ndim == 3 and poses.shape[1:] == (dimension + 1, dimension + 1):
         last = np.append(np.zeros(dimension), 1.0)
         if len(odd := np.flatnonzero((poses[:, -1] != last).any(axis=1))):
-            as_pose(poses[odd[0]], dimension, "poses", int(odd[0]))  # the error says what is wrong
+            as_pose(poses[odd[0]], dimension, "poses", int(odd[0]))  # says what is wrong
         return poses[:, :-1, :-1], poses[:, :-1, -1]
     if not isinstance(poses, Iterable) or isinstance(poses, (str, bytes)):
         raise InvalidArrayError(
             f"poses must be a list of poses or an array of matrices, got {shown(poses)}", ("poses",)
         )
-    made = [as_pose(each, dimension, "poses", number) for number, each in enumerate(poses)]
+    try:
+        items = list(poses)
+    except Exception as error:  # a single rotation of scipy, a caller's generator
+        raise InvalidArrayError(
+            f"poses cannot be listed: {type(error).__name__}: {error!s:.100}", ("poses",)
+        ) from error
+    made = [as_pose(each, dimension, "poses", number) for number, each in enumerate(items)]
     for number, each in enumerate(made):
         if each.dimension != dimension:
             raise WrongDimensionError(
-                f"poses[{number}] has dimension {each.dimension}, the bodies have {dimension}", ("poses", number)
+                f"poses[{number}] has dimension {each.dimension}, the solid it moves has {dimension}", ("poses", number)
             )
     turns = np.array([each.rotation for each in made]).reshape(-1, dimension, dimension)
     return turns, np.array([each.translation for each in made]).reshape(-1, dimension)
