@@ -54,9 +54,11 @@ LARGEST_ERROR = 2.0**250
 def relate_convex(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool, may_be_equal: bool
 ) -> int:
-    """Return the relation of two convex bodies, or UNSETTLED.
+    """Return the relation of two placed convex bodies where floats prove it, else UNSETTLED (contacts always).
 
-    is_boolean: every intersecting pair is OVERLAPPING. may_be_equal: equal balls are OVERLAPPING.
+    is_boolean: of bodies other than two balls, proven common interior is OVERLAPPING, whether or not one contains the
+    other. may_be_equal: the caller does not ask whether bodies are equal, so two balls of one radius that overlap are
+    OVERLAPPING even about one centre; else that is UNSETTLED.
     """
     error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:

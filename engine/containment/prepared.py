@@ -152,7 +152,7 @@ def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArr
 
 
 def edges_of(solid: Polygon | Triangle) -> Rings:
-    """Return the edges of a polygon in one slab, built once."""
+    """Return all edges of a polygon as `Rings` of a single slab without a grid, for rays to the right, cached."""
 
     def build() -> Rings:
         xs, ys, runs, box = closed_rings(solid.vertices, solid.ring_offsets)

@@ -35,7 +35,10 @@ from engine.types import FlagArray, Float32Array, FloatArray
 
 @inline
 def load_lane(view: View, at: int, fixed: Float32Array) -> None:
-    """Write box and disc of a lane, or of the whole tree, to the first column of `fixed`."""
+    """Write box (6 rows) and disc (8 rows, lanes/boxes.py) of one child to the first column of `fixed`.
+
+    at: 8 * node + lane, or ROOT: then a box and a disc around the whole tree.
+    """
     if at == ROOT:
         for row in range(FIXED_ROWS):
             fixed[row, 0] = 4.0 if row > 11 else (2.0 if 3 <= row < 6 else (1.0 if row == 9 else 0.0))

@@ -27,7 +27,7 @@ Near contact this leaves a fraction of what boxes leave, and the more so the fin
 **margin.** Numbers are below 5 in the own tree. In units of 2^-24, with the other scale `ratio` times the own and the
 shift T of `frames`: n . (c_b - c_a) is off by less than 80 ratio + 16 |T| + 30 (corners, products and sums), the right
 side by less than 70 ratio + 40 (g is off by 13, either n by 10); twice the margin of a frame is 128 + 224 ratio + 64
-|T| (frames.py). Under the root g^2 is off by less than 30: `ROUND` is 64. `fill_discs` enlarges by 16, which is more
+|T| (placement.py). Under the root g^2 is off by less than 30: `ROUND` is 64. `fill_discs` enlarges by 16, which is more
 than what its own rounding and that of the corners come to. What is no number separates nothing.
 """
 

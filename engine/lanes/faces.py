@@ -10,7 +10,7 @@ locally parallel, and the planes of their triangles separate them.
 
 **margin.** A direction w, however it was rounded, separates two triangles where the numbers w . x of their corners do;
 so only the corners and the products have errors. In the tree of w a corner is off by at most a quarter of `margin`
-(frames.py: the sums there are those of `boxes.meeting`, with room to spare), a product w . x by 2^-22 |w|_1 |x|,
+(placement.py: the sums there are those of `boxes.meeting`, with room to spare), a product w . x by 2^-22 |w|_1 |x|,
 which is below a quarter of margin |w|_1; both bodies together: `margin` |w|_1. What underflows is below `_TINY`.
 Normals are taken from a tree's own coordinates, at most 2, so nothing overflows where the other tree is large.
 

@@ -250,9 +250,11 @@ class Batch(NamedTuple):
 
 
 def as_contours(polygons: Any, dimension: int) -> Contours:
-    """Return all rings, possibly none; an array is borrowed.
+    """Return the rings of all polygons of a call: an array (one ring a polygon), a list of polygons or of lists of
+    rings, or GeoJSON. An array is not copied.
 
-    Raises: InvalidArrayError, WrongDimensionError, NotFiniteError, EmptyGeometryError, each naming the element.
+    No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring without vertices;
+    InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element.
     """
     if isinstance(polygons, np.ndarray):
         array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)

@@ -260,7 +260,11 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
 def insert_sorted(
     faces: Any, their_faces: Any, pairs: Any, kinds: Any, i: int, j: int, kind: int
 ) -> tuple[int, int, int]:
-    """Insert a pair into the last N_NAMED rows, which are sorted; return the pair that drops out, -1 for none."""
+    """Insert a pair of faces (i, j) of a kind into the last N_NAMED rows, sorted by the callers' faces, then by index
+    (`_precedes`), empty rows (-1) last.
+
+    Return the pair and kind that has no place there: the last in order, maybe the given one; i is -1 if a row was free.
+    """
     n = kinds.shape[0]
     for place in range(n - N_NAMED if _precedes(faces, their_faces, i, j, pairs, n - 1) else n, n):
         if _precedes(faces, their_faces, i, j, pairs, place):

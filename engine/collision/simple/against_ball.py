@@ -235,7 +235,10 @@ def _is_ball_clear_of_box(body: Solid, center: list[float], radius: float) -> bo
 
 
 def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> Collision | None:
-    """Return the relation of a mesh and a ball about a point, with its error as fourth number, if floats prove it."""
+    """Return the relation of a mesh (first) and a ball with its witness, None if floats do not prove it.
+
+    center: x, y, z in the mesh's coordinates, and a bound on the error of each.
+    """
     mesh, results = mesh_body_of(body), np.empty((1, 2), np.int64)
     entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, results, work.budget.flag)
     work.budget.check()

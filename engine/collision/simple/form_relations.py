@@ -269,7 +269,9 @@ def _are_safe(a: Placed) -> bool:
 
 @inline
 def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
-    """Set e to the excess of the centre of a ball beyond a form on one side of an axis; return its length."""
+    """Set the expansion e to how far the centre of a ball lies beyond a placed box (or the centre of a placed ball)
+    along an axis, negative if it does not; return its number of components. side: 0 beyond the low bound, 1 beyond the high.
+    """
     factor = 1.0 if side == 0 else -1.0
     n = _grow_coordinate(e, 0, a, axis, side, factor)
     return _grow_coordinate(e, n, ball, axis, 0, -factor)
