@@ -270,7 +270,9 @@ def _are_safe(a: Placed) -> bool:
 @inline
 def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
     """Set the expansion e to how far the centre of a ball lies beyond a placed box (or the centre of a placed ball)
-    along an axis, negative if it does not; return its number of components. side: 0 beyond the low bound, 1 beyond the high.
+    along an axis, negative if it does not; return its number of components.
+
+    side: 0 beyond the low bound, 1 beyond the high one.
     """
     factor = 1.0 if side == 0 else -1.0
     n = _grow_coordinate(e, 0, a, axis, side, factor)
