@@ -340,9 +340,8 @@ def polygon_of(geometry: Any) -> Polygon:
     feature, limits = {"type": "Feature", "geometry": geometry}, Limits(None, None)
     side = collection_of({"type": "FeatureCollection", "features": [feature]}, ("geometry",), limits)
     polygon = polygons_of(side, limits).arrays.polygon(0)
-    (read,) = side.features
-    has_parts = read["geometry"]["type"] == "MultiPolygon" and len(read["geometry"]["coordinates"]) > 1
-    return Polygon(union_all([polygon]).rings) if has_parts else polygon  # without the walls that parts share
+    parts = geometry["coordinates"] if isinstance(geometry, dict) and geometry["type"] == "MultiPolygon" else ()
+    return Polygon(union_all([polygon]).rings) if len(parts) > 1 else polygon  # without the walls that parts share
 
 
 Polygon.geojson = polygon_of, lambda polygon: union_all([polygon]).__geo_interface__
