@@ -28,7 +28,7 @@ from engine.solids.base import Solid
 from engine.solids.pose import Pose, motions_of
 from engine.solids.primitives import Aabb
 from engine.solids.registry import own_box
-from engine.solids.shapes import as_pose, as_solid
+from engine.solids.shapes import as_solid
 from engine.types import BoolArray, FloatArray, Int8Array, IntArray
 
 _LEAST_POSES: Final = 32
@@ -190,14 +190,15 @@ def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):
             raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))
-    bodies = [as_solid(each, "solids", index) for index, each in enumerate(solids)]
+    bodies = list(solids)
+    if not all(issubclass(kind, Solid) for kind in set(map(type, bodies))):
+        bodies = [as_solid(each, "solids", index) for index, each in enumerate(bodies)]
     given: list[Any] = [None] * len(bodies) if poses is None else list(poses)
     if len(given) != len(bodies):
         raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(given)}", ("poses",))
     kinds = check_collidable(bodies)
-    for index, each in enumerate(given):
-        if each is not None:
-            given[index] = as_pose(each, bodies[index].dimension, "poses", index)
+    if set(map(type, given)) - {Pose, type(None)}:
+        given = [posed(each, bodies[index], "poses", index) for index, each in enumerate(given)]
     return bodies_of(bodies, given, *kinds)
 
 

@@ -393,6 +393,9 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
     if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):
         given = f"{len(poses)}" if isinstance(poses, (list, tuple)) else type(poses).__name__
         raise InvalidArrayError(f"poses must be a list of {len(solids)}, one for each solid, got {given}", ("poses",))
+    is_plain = not set(map(type, poses)) - {Pose, type(None)}
+    if is_plain and all(each is None or len(each.translation) == solids[0].dimension for each in poses):
+        return solids, tuple(poses)
     return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(zip(poses, solids)))
 
 
