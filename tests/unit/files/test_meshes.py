@@ -144,6 +144,21 @@ def test_these_formats_need_no_other_package(ending: str, tmp_path: Path, monkey
         engine.read_mesh(b"ply\n")
 
 
+def test_no_facet_of_a_text_file_is_lost() -> None:
+    """Facets may stand on one line, in capitals, behind a byte order mark; what has not three corners is refused."""
+    facet = "facet normal 0 0 1 outer loop vertex {} vertex {} vertex {} endloop endfacet"
+    corners = ("0 0 0", "1 0 0", "0 1 0", "0 0 1")
+    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    lines = [facet.format(*(corners[k] for k in face)) for face in faces]
+    for text in ("\n".join(lines), " ".join(lines), "\n".join(lines).upper(), "\r".join(lines)):
+        octets = f"solid x\n{text}\nendsolid x\n".encode()
+        for given in (octets, b"\xef\xbb\xbf" + octets):
+            assert engine.read_mesh(given, "stl").solid().n_faces == 4
+    for bad in (lines[0].replace("vertex 1 0 0", "", 1), lines[0].replace("0 1 0", "0 1_0 0"), lines[0][:-9]):
+        with pytest.raises(engine.InvalidInputError):
+            engine.read_mesh(f"solid x\n{bad}\n".encode(), "stl")
+
+
 def test_damaged_stl_files_are_refused() -> None:
     octets = binary(ball(8))
     for damaged in (octets[:-1], octets + b"\0", octets[:50], b"solid x\n vertex 1 2\n", b"solid x\n vertex 1 2 3\n"):

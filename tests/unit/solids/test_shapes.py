@@ -197,3 +197,40 @@ def test_wrong_poses_are_named(many: Any, words: str) -> None:
     cube = engine.Aabb((0, 0, 0), (1, 1, 1))
     with pytest.raises(engine.EngineError, match=words):
         engine.collide_poses(cube, cube, many)
+
+
+def box_ring(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
+    return [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]]
+
+
+def test_parts_that_share_an_edge_become_one() -> None:
+    """The wall between two parts stayed, unless a third part overlapped one of them."""
+    beside = [box_ring(0, 0, 2, 2), box_ring(2, 0, 4, 2)]
+    for rings in (beside, [*beside, box_ring(3, 1, 5, 3)]):
+        parts = {"type": "MultiPolygon", "coordinates": [[ring] for ring in rings]}
+        assert engine.locate([(2, 1), (2, 0), (0, 1)], parts).tolist() == [1, 0, 0]
+        inner = engine.Aabb((1.5, 0.5), (2.5, 1.5))
+        assert engine.collide(inner, parts).relation == engine.Relation.FIRST_INSIDE_SECOND
+
+
+def test_a_point_without_coordinates_shifts_no_row() -> None:
+    points = {"type": "FeatureCollection", "features": [
+        feature({"type": "Point", "coordinates": [1, 1]}), feature(None)]}  # fmt: skip
+    with pytest.raises(engine.EngineError) as error:
+        engine.locate(points, POLYGON)
+    assert error.value.where == ("points", "features", 1, "geometry")
+
+
+@pytest.mark.parametrize(
+    "vertices", [CORNERS + 0.5j, CORNERS > 0, np.ma.masked_equal(CORNERS, 1.0), CORNERS.astype(str)]
+)
+def test_meshes_pass_the_checks_of_their_constructor(vertices: Any) -> None:
+    with pytest.raises(engine.InvalidArrayError):
+        shapes.as_solid(SimpleNamespace(vertices=vertices, faces=TRIANGLES), "solid")
+
+
+def test_a_path_leads_to_the_position_at_fault() -> None:
+    bad = {"type": "Polygon", "coordinates": [SQUARE, [[0.5, 0.5], [0.5, 1.5], [float("nan"), 1], [0.5, 0.5]]]}
+    with pytest.raises(engine.NotFiniteError) as error:
+        shapes.as_solid({"type": "FeatureCollection", "features": [feature(POLYGON), feature(bad)]}, "solid")
+    assert error.value.where == ("solid", "features", 1, "geometry", "coordinates", 1, 2, 0)
