@@ -26,12 +26,12 @@ from engine.errors import (
 from engine.layers.json_text import NotJsonError, Path, key_of, text_of
 from engine.layers.rows import NONE, Layer, Limits, layer_of
 from engine.polygon_overlay.overlay import union_all
-from engine.polygon_overlay.pair_arrays import arrays_of
+from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
 from engine.running.budget import polled
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
-from engine.types import FloatArray, IntArray
+from engine.types import BoolArray, FloatArray, IntArray
 
 _NAME_BYTES: Final = 200
 """Bytes of a name and its entries in sets."""
@@ -239,7 +239,12 @@ def refused(
 
 
 def polygons_of(side: Collection, limits: Limits) -> Layer:
-    """Return the polygons of a collection."""
+    """Return the polygons of a collection, overlapping parts of a feature united."""
+    return layer_of(*_parts_of(side, limits), limits)
+
+
+def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray, BoolArray]:
+    """Return the parts of all features as polygons, the offsets of each feature's, and which have no geometry."""
     rings: list[Any] = []
     part_sizes: list[int] = []
     there = [k for k, feature in enumerate(side.features) if feature.get("geometry") is not None]
@@ -264,7 +269,7 @@ def polygons_of(side: Collection, limits: Limits) -> Layer:
         except (EngineError, TypeError, ValueError, KeyError):
             check_each(there, side, _check_rings)
             raise
-    return layer_of(arrays, summed(counts), is_missing, limits)
+    return arrays, summed(counts), is_missing
 
 
 def _positions(rings: list[Any]) -> FloatArray:
@@ -306,7 +311,7 @@ def check_each(there: list[int], side: Collection, check: Callable[[dict[str, An
 
 
 def polygon_of(geometry: Any) -> Polygon:
-    """Return a GeoJSON Polygon or MultiPolygon as one polygon, parts that overlap united.
+    """Return a GeoJSON Polygon or MultiPolygon as one polygon, its parts united.
 
     Parameters
     ----------
@@ -325,7 +330,8 @@ def polygon_of(geometry: Any) -> Polygon:
 
     Notes
     -----
-    Boundary, accuracy: parts are united exactly, as by `engine.union_all`, where their boxes overlap.
+    Boundary, accuracy: several parts are united as by `engine.union_all`, whose crossings are rounded; walls that parts
+    share vanish.
 
     References
     ----------
@@ -339,9 +345,9 @@ def polygon_of(geometry: Any) -> Polygon:
     """
     feature, limits = {"type": "Feature", "geometry": geometry}, Limits(None, None)
     side = collection_of({"type": "FeatureCollection", "features": [feature]}, ("geometry",), limits)
-    polygon = polygons_of(side, limits).arrays.polygon(0)
-    parts = geometry["coordinates"] if isinstance(geometry, dict) and geometry["type"] == "MultiPolygon" else ()
-    return Polygon(union_all([polygon]).rings) if len(parts) > 1 else polygon  # without the walls that parts share
+    parts, offsets, _ = _parts_of(side, limits)
+    polygons = [parts.polygon(k) for k in range(int(offsets[-1]))]
+    return polygons[0] if len(polygons) == 1 else Polygon(union_all(polygons).rings)
 
 
 Polygon.geojson = polygon_of, lambda polygon: union_all([polygon]).__geo_interface__

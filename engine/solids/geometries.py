@@ -10,7 +10,7 @@ import numpy as np
 from engine.errors import EngineError, InvalidArrayError, InvalidInputError
 
 _PLAIN: Final = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon")
-_MEMBERS: Final = {"GeometryCollection": "geometries", "Feature": "geometry", "FeatureCollection": "features"}
+MEMBERS: Final = {"GeometryCollection": "geometries", "Feature": "geometry", "FeatureCollection": "features"}
 """Where collections have what they are made of."""
 _DEEPEST: Final = 32
 _NEVER: Final = frozenset({list, tuple, float, int, str, np.ndarray})
@@ -30,7 +30,7 @@ def geometry_of(value: Any) -> Mapping[str, Any] | None:
         raise InvalidInputError(
             f"a {type(value).__name__} does not give its GeoJSON: {type(error).__name__}"
         ) from error
-    return value if isinstance(kind, str) and (kind in _PLAIN or kind in _MEMBERS) else None
+    return value if isinstance(kind, str) and (kind in _PLAIN or kind in MEMBERS) else None
 
 
 Path = tuple[str | int, ...]
@@ -43,10 +43,10 @@ def geometries_in(value: Mapping[str, Any], where: Path = (), depth: int = _DEEP
     if isinstance(kind, str) and kind in _PLAIN:
         yield where, value
         return
-    if depth == 0 or not isinstance(kind, str) or kind not in _MEMBERS:
+    if depth == 0 or not isinstance(kind, str) or kind not in MEMBERS:
         what = repr(kind[:60]) if isinstance(kind, str) else f"a {type(kind).__name__}"
         raise InvalidInputError(f"type is {what}: no geometry of GeoJSON that is taken here", (*where, "type"))
-    member = _MEMBERS[kind]
+    member = MEMBERS[kind]
     inner: Any = value.get(member)
     if kind != "Feature" and not isinstance(inner, (list, tuple)):
         raise InvalidInputError(
@@ -89,16 +89,16 @@ def _gathered(value: Any, one: str, many: str) -> list[Any] | None:
     if listed and (not value or type(value[0]) in _NEVER):
         return None
     if listed and geometry_of(value[0]) is not None:
-        found: Iterator[tuple[Path, Any]] = (
+        geometries: Iterator[tuple[Path, Any]] = (
             inner for k, each in enumerate(value) for inner in geometries_in(geometry_of(each) or {}, (k,))
         )
     else:
         geometry = geometry_of(value)
         if geometry is None:
             return None
-        found = geometries_in(geometry)
+        geometries = geometries_in(geometry)
     gathered: list[Any] = []
-    for place, each in found:
+    for place, each in geometries:
         if each is None:
             raise InvalidInputError(f"a geometry is null where {one}s are expected; leave its row out", place)
         if each["type"] not in (one, many):

@@ -23,7 +23,7 @@ import numpy as np
 from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError, WrongDimensionError
 from engine.solids.base import Solid
 from engine.solids.checks import Where, as_points, shown, spell
-from engine.solids.geometries import as_list, coordinates_of, geometries_in, geometry_of
+from engine.solids.geometries import MEMBERS, as_list, coordinates_of, geometries_in, geometry_of
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
@@ -68,9 +68,9 @@ def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
     """
     if not isinstance(values, (list, tuple)):
         geometry = geometry_of(values) or {}
-        name = {"FeatureCollection": "features", "GeometryCollection": "geometries"}.get(geometry.get("type", ""), "")
-        members = geometry.get(name)
-        if not isinstance(members, (list, tuple)):
+        kind = geometry.get("type", "")
+        members = geometry.get(MEMBERS.get(kind, ""))
+        if kind == "Feature" or not isinstance(members, (list, tuple)):
             raise InvalidArrayError(f"{spell(where)} must be a list of polygons, got {type(values).__name__}", where)
         values = [Polygon([]) if each is None else each for each in members]  # a null geometry of a Feature: the same
     if all(isinstance(each, Solid) for each in values):
