@@ -32,13 +32,13 @@ from engine.solids.shapes import as_solid
 from engine.types import BoolArray, FloatArray, Int8Array, IntArray
 
 _LEAST_POSES: Final = 32
-"""Number of poses from which a batch saves the time that its preparation takes."""
+"""Smallest number of poses for which a batch saves more time than its preparation takes."""
 _FEW: Final = 64
-"""Up to this many distinct solids, all are prepared for a query about some of them."""
+"""Largest number of distinct solids that are all prepared for a query about some of them."""
 
 
 class PairBatches:
-    """Distinct solids of one dimension prepared for the batch kernels, on first use."""
+    """Distinct solids of one dimension, prepared for the batch kernels at first use."""
 
     def __init__(self, distinct: Sequence[Solid]) -> None:
         self.distinct, self.is_planar = distinct, len(distinct) > 0 and distinct[0].dimension == 2
@@ -46,7 +46,9 @@ class PairBatches:
         self.cached_pool: tuple[Any, IntArray] | None = None
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
-        """Return the outlines or convex bodies in one pool, and the index of each solid in it, -1 for others."""
+        """Return the outlines or convex bodies in one pool, and the index of each solid in it, -1 for a solid not in
+        it.
+        """
         if self.cached_pool is None:
             self.cached_pool = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
         return self.cached_pool
@@ -55,10 +57,8 @@ class PairBatches:
         self, kinds: IntArray, poses: PoseArrays, pairs: IntArray, relations: Int8Array, boolean: bool, detail: bool,
         budget: Budget,
     ) -> Callable[[int, int], None]:  # fmt: skip
-        """Return a task that writes the relations of a range of pairs (n, 2) of rows, UNSETTLED where a kernel cannot
-        decide.
-
-        kinds: the solid of each row. poses: the pose of each row; row 0 is the identity, of any kind.
+        """Return a task that fills relations[start:stop] for pairs (n, 2) of rows, UNSETTLED where a kernel cannot
+        decide. kinds: the solid of each row. poses: the pose of each row; row 0 is the identity, of any kind.
         """
         (pool, places), flag = self.pool(budget), budget.flag
         kernel = entry_of(relate_outline_pairs if self.is_planar else relate_convex_pairs)
@@ -72,6 +72,7 @@ class PairBatches:
 
 
 def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray]:
+    """Return the convex bodies among some solids in one pool, and the index of each solid in it, -1 for others."""
     places, convex = np.full(len(solids), -1, np.int64), list[ConvexBody]()
     for kind, solid in enumerate(solids):
         budget.check()
@@ -83,7 +84,7 @@ def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray
 
 
 class SceneBatches:
-    """Bodies of a scene with the arrays that the batch kernels read."""
+    """Bodies of a scene with the arrays that batch kernels read."""
 
     __slots__ = ("_is_box", "bodies", "pairs")
 
@@ -92,7 +93,7 @@ class SceneBatches:
         self._is_box = self.pairs.are_boxes[bodies.kinds] & ~bodies.is_posed
 
     def under(self, names: IntArray, poses: list[Pose | None]) -> SceneBatches:
-        """Return the batches of the bodies `names` under checked poses."""
+        """Return the batches of bodies `names` under other, checked poses."""
         bodies = self.bodies
         if len(bodies.distinct) > _FEW and self.pairs.cached_pool is None:
             return SceneBatches(scene_bodies([bodies.solids[body] for body in names.tolist()], poses))
@@ -111,7 +112,8 @@ class SceneBatches:
     def related(
         self, kinds: IntArray, rotations: FloatArray, translations: FloatArray, n: int, boolean: bool, budget: Budget
     ) -> Int8Array:
-        """Return the relations of n pairs of consecutive rows, the first pair being rows 1 and 2."""
+        """Return the relations of n pairs of consecutive rows, the first pair being rows 1 and 2; UNSETTLED where open.
+        """
         relations = np.full(n, UNSETTLED, np.int8)
         if n and (self.pairs.cached_pool is not None or len(self.bodies.distinct) <= _FEW):
             pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)
@@ -129,8 +131,9 @@ class SceneBatches:
 def posed_batch(
     first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, boolean: bool, detail: bool, budget: Budget
 ) -> Callable[[int, int], None] | None:
-    """Return a task that writes the relations of a range of poses, UNSETTLED where open; None if it would be no
-    faster."""
+    """Return a task that fills relations[start:stop] for these poses, UNSETTLED where open; None if it would be no
+    faster.
+    """
     n, table = len(relations), PairBatches([first, second])
     if n < _LEAST_POSES or (not table.is_planar and None in (convex_body_of(first), convex_body_of(second))):
         return None
@@ -146,10 +149,10 @@ class SceneBodies:
 
     | field | shape | meaning |
     |---|---|---|
-    | solids, poses | n | of each body |
+    | solids, poses | n | solid and pose of each body |
     | distinct | | each solid object once |
     | kinds | (n,) | index of each body's solid in distinct |
-    | is_posed | (n,) | |
+    | is_posed | (n,) | whether a pose was given |
     | rotations, translations | (n + 1, d, d), (n + 1, d) | row 0 the identity, then one row a body |
     | low, high | (n, d) | boxes of the posed bodies; exact for an aabb without pose |
     | own | | unposed boxes of the distinct solids |
@@ -168,17 +171,17 @@ class SceneBodies:
 
     @property
     def dimension(self) -> int:
-        """2 or 3."""
+        """Dimension of the bodies, 2 or 3."""
         return self.translations.shape[1]
 
     def under(self, names: IntArray, poses: Sequence[Pose | None]) -> SceneBodies:
-        """Return some bodies under checked poses, with the same distinct solids."""
+        """Return bodies `names` under other, checked poses, sharing the distinct solids."""
         solids = [self.solids[body] for body in names.tolist()]
         return _place_bodies(solids, poses, self.distinct, self.kinds[names], self.own)
 
 
 class OwnBoxes(NamedTuple):
-    """Boxes of distinct solids without poses, as `place_boxes` takes them."""
+    """Unposed boxes (n, 2, d) of distinct solids, reaches and radii, as `place_boxes` takes them."""
 
     boxes: FloatArray
     reaches: FloatArray
@@ -186,7 +189,7 @@ class OwnBoxes(NamedTuple):
 
 
 def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> SceneBodies:
-    """Return the bodies as arrays. Raises with the index of the wrong body."""
+    """Return checked bodies as arrays. Raises with the index of the wrong body."""
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):
             raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))
@@ -206,7 +209,9 @@ def bodies_of(
     solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: list[Solid], kinds: IntArray,
     check: Callable[[], object] | None = None,
 ) -> SceneBodies:  # fmt: skip
-    """Return bodies of any type as arrays; check: as for `Solid.prepared`."""
+    """Return bodies of any type as arrays; kinds: index of each body's solid in distinct; check: as for
+    `Solid.prepared`.
+    """
     own = [own_box(solid, check) for solid in distinct]
     boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
@@ -216,7 +221,7 @@ def bodies_of(
 def _place_bodies(
     solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: Sequence[Solid], kinds: IntArray, own: OwnBoxes
 ) -> SceneBodies:
-    """Return the bodies with the boxes of their poses."""
+    """Return the bodies as arrays, with boxes around them under their poses; own: boxes of the distinct solids."""
     n, dimension = len(kinds), own.boxes.shape[2]
     try:
         rotations, translations = motions_of([None, *poses], dimension)
@@ -232,8 +237,9 @@ def _place_bodies(
 
 
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
-    """Return the distinct solids and the index of each body's; raise unless `collide` takes all and they share a
-    dimension."""
+    """Return the distinct solids and the index of each body's solid; raise unless `collide` takes all, in one
+    dimension.
+    """
     distinct, kinds = distinct_of(bodies)
     for body in distinct:
         try:
@@ -257,6 +263,7 @@ def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
 
 
 def _first(solid: Solid, bodies: Sequence[Solid]) -> int:
+    """Return the index of the first body with a given solid."""
     return next(index for index, body in enumerate(bodies) if body is solid)
 
 

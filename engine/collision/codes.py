@@ -16,6 +16,6 @@
 from __future__ import annotations
 
 UNSETTLED = -1
-"""In place of a relation: weak contacts, undecided signs, or components of which only some are inside."""
+"""Code in place of a relation that is undecided: weak contacts, undecided signs, or only some components inside."""
 
 DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)  # as in engine.types.Relation

@@ -51,6 +51,9 @@ PAIRS: dict[tuple[int, str, str], _Functions] = {
     },
     **{(d, body, "sphere"): (collide_body_sphere, body_sphere_parts) for d, body in result.BODIES},
 }
+"""Functions of each pair of kinds of solids: relation, and parts outside the other of two that overlap. Key: dimension
+and the kinds of both solids (`Row.meets`), in one order or both.
+"""
 for _d, (_function, _parts) in _BODIES.items():
     PAIRS[_d, "box", "box"] = forms.closed_form_or(_function), _parts
     PAIRS[_d, "box", "sphere"] = forms.closed_form_or(forms.collide_form_sphere), body_sphere_parts
@@ -61,7 +64,7 @@ for _d, (_function, _parts) in _BODIES.items():
 lie to each other, and of two that overlap what lies outside the other."""
 
 _BY_TYPE: dict[tuple[int, str, int, str], tuple[result.PairFunction, result.PartsFunction, bool]] = {}
-"""Cached rows of `PAIRS` by types."""
+"""Rows of `PAIRS` cached by types, with whether to swap the bodies."""
 
 
 def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, result.PartsFunction, bool]:
@@ -267,12 +270,12 @@ PlacedPair = tuple[Solid, Solid, result.Poses]
 
 @dataclass(slots=True, eq=False)
 class Answers:
-    """Answers to many pairs, by the number of the pair.
+    """Answers to many pairs, by index of the pair.
 
     | field | meaning |
     |---|---|
-    | relations | (n,) int8, UNSETTLED where not known yet |
-    | witnesses, details | if requested, else None; details: (n,) int8, NO_DETAIL where not known yet |
+    | relations | (n,) int8, UNSETTLED where still to be decided |
+    | witnesses, details | if requested, else None; details: (n,) int8, NO_DETAIL where still to be decided |
     | works | counts of the pairs settled one by one |
     """
 
@@ -284,7 +287,7 @@ class Answers:
     works: list[result.Work] = field(default_factory=list)
 
     def left(self, start: int = 0, stop: int | None = None) -> IntArray:
-        """Return the pairs of a range still to be settled: those that are open, or lack a requested witness."""
+        """Return the pairs of a range still to be settled: undecided ones, or ones that lack a requested witness."""
         relations = self.relations[start:stop]
         is_left = relations == UNSETTLED
         if self.witnesses is not None:
@@ -293,7 +296,7 @@ class Answers:
         return left
 
     def settle(self, items: IntArray, pair_of: Callable[[int], PlacedPair]) -> None:
-        """Fill the answers of some pairs by `collide_pair`; threads may settle different pairs."""
+        """Fill the answers of pairs `items` by `collide_pair`; threads may settle different pairs."""
         work = result.Work(self.budget, witness=self.witnesses is not None, boolean=self.boolean)
         self.works.append(work)
         for item in items.tolist():
@@ -315,7 +318,7 @@ def accuracy_of(n_pairs: int, n_open: int, works: list[result.Work], method: str
 
 
 NO_DETAIL = -1
-"""In place of a code of `Rcc8`: a body without interior."""
+"""Code in place of an `Rcc8` value: a body has no interior, or the pair is still to be decided."""
 
 UNLESS_OVERLAPPING = {
     Relation.DISJOINT: Rcc8.DC,
@@ -327,7 +330,7 @@ _WHERE_PROVEN = np.array([UNLESS_OVERLAPPING.get(relation, Rcc8.PO) for relation
 
 
 def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boolean: bool) -> None:
-    """Raise if a body, given with its path in the call, can have no interior by its type."""
+    """Raise if a body, given with its path in the call, has a type without interior, or if `boolean` is set."""
     if boolean:
         raise InvalidInputError("detail needs the relation, which boolean leaves open; ask for one", ("detail",))
     for where, solid in named:
@@ -340,13 +343,14 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
-    """Return the `Rcc8` codes of pairs that a batch decided by crossings or by points outside the other: overlapping is
-    PO."""
+    """Return the `Rcc8` codes for relations that a batch decided; overlapping is PO, by a crossing or points outside
+    both.
+    """
     return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 
 def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: Int8Array) -> Int8Array:
-    """Return the codes for pairs (n, 2) of boxes (n_boxes, d) that are not flat."""
+    """Return the `Rcc8` codes for pairs (n, 2) of boxes (n_boxes, d) with interiors, given their relations."""
     i, j = pairs.T
     i_sticks_out = ((low[i] < low[j]) | (high[j] < high[i])).any(axis=1)
     j_sticks_out = ((low[j] < low[i]) | (high[i] < high[j])).any(axis=1)
@@ -374,7 +378,7 @@ def detail_of(first: Solid, second: Solid, poses: result.Poses, relation: Relati
 
 
 def has_interior(solid: Solid, budget: Budget) -> bool:
-    """Return whether a solid contains an open set; cached with the solid."""
+    """Return whether a solid contains an open set; cached."""
     return solid.prepared("has_interior", lambda: _has_interior(solid, budget), budget.check)
 
 

@@ -152,7 +152,8 @@ _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
 
 
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
-    """Return the answer to one pose; for two meshes no `Pose` is made, as that would take as long as the decision."""
+    """Return the relation under one pose. Two meshes need no `Pose`, whose construction takes as long as the decision.
+    """
     if first.type == "aabb" or first.type == second.type == "sphere":
         motion = poses.rotations[0], poses.translations[0]
         closed_form = relation_closed_form(first, second, motion_of(None, first.dimension), motion, work)
@@ -200,7 +201,8 @@ _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 def batch_of(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None] | None:
-    """Return a task by which kernels answer a range of poses, UNSETTLED where they cannot; None if there is none."""
+    """Return a task by which kernels fill answers[start:stop], UNSETTLED where they cannot; None if there is no batch.
+    """
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
@@ -241,13 +243,13 @@ def batch_of(
 
 
 _SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in RELATIONS), UNSETTLED], np.int8)
-"""Relation of the two bodies in the other order, by relation; UNSETTLED is the last."""
+"""Relation of the two bodies in the other order, by relation; the last entry is UNSETTLED."""
 
 
 def _ball_batch(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None]:
-    """Return the kernel task for a ball and a mesh over a range of poses; UNSETTLED where floats prove nothing."""
+    """Return the kernel task for a ball and a mesh under a range of poses; UNSETTLED where floats prove nothing."""
     is_swapped = isinstance(first, Sphere)
     body, ball = (second, first) if is_swapped else (first, second)
     assert isinstance(ball, Sphere)

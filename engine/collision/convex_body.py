@@ -23,7 +23,7 @@ from engine.solids.primitives import Aabb, Sphere
 from engine.types import FloatArray, IntArray, Point3
 
 MOST_FACES = 1 << 16
-"""Polyhedra with more triangles are not tested for convexity: it takes milliseconds and mostly fails."""
+"""Most triangles of a polyhedron that is tested for convexity: the test takes milliseconds and mostly fails."""
 
 CENTER, ASIDE = 0, 3
 RADIUS, REACH, ROUND = 6, 7, 8
@@ -39,14 +39,15 @@ N_NUMBERS = 9
 """
 
 WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
-"""Weights by which the second interior point is pulled to the farthest vertices on the diagonals, different on each
-axis."""
+"""Weights by which the second interior point is moved toward the farthest vertex in each octant, different on each
+axis.
+"""
 
 _NO_CLAIM = np.inf
 
 
 ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers")
-"""Several convex bodies, concatenated; few arrays, because kernels count references to each.
+"""Convex bodies, concatenated into few arrays, because kernels count references to each.
 
 | field | shape | meaning |
 |---|---|---|
@@ -54,7 +55,7 @@ ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers
 | normals | (4, n_faces) | about unit, outward; row 3: relative error |
 | anchors | (n_faces,) | a vertex of each face |
 | firsts | (2, n_bodies + 1) | offsets of vertices and faces |
-| numbers | (n_bodies, N_NUMBERS) | |
+| numbers | (n_bodies, N_NUMBERS) | columns above |
 """
 
 
@@ -69,11 +70,12 @@ class ConvexBody:
 
 
 def convex_body_of(solid: Solid) -> ConvexBody | None:
-    """Return the convex body of a solid of space; None if it is not convex, or not provably."""
+    """Return the convex body of a solid of space; None if it is not provably convex. Cached."""
     return solid.prepared("convex_body", lambda: _build_body(solid))
 
 
 def _build_body(solid: Solid) -> ConvexBody | None:
+    """Build the convex body of a solid of space; None if it is not provably convex."""
     if isinstance(solid, Sphere) and solid.dimension == 3 and solid.radius > 0.0:
         return _ball(solid)
     if isinstance(solid, Aabb) and solid.dimension == 3 and bool((solid.min < solid.max).all()):
@@ -91,6 +93,7 @@ def _build_body(solid: Solid) -> ConvexBody | None:
 
 
 def _ball(ball: Sphere) -> ConvexBody:
+    """Build the body of a ball: one vertex, and a radius."""
     numbers = np.zeros(N_NUMBERS)
     numbers[CENTER:ASIDE] = numbers[ASIDE:RADIUS] = ball.center
     with np.errstate(over="ignore"):
@@ -101,7 +104,7 @@ def _ball(ball: Sphere) -> ConvexBody:
 
 
 def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> ConvexBody:
-    """Return the body of checked arrays: every vertex is used, triangles face outward."""
+    """Build the body of a convex hull; caller guarantees that every vertex is used and triangles face outward."""
     normals, numbers = np.empty((4, len(triangles))), np.zeros(N_NUMBERS)
     numbers[CENTER:ASIDE] = center
     points, triangles = np.ascontiguousarray(vertices.T), np.ascontiguousarray(triangles)
@@ -112,13 +115,13 @@ def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> Conv
 
 @merged
 def point_of(points: FloatArray, point: int) -> Point3:
-    """Load a vertex of points (3, n)."""
+    """Return vertex ``point`` of points (3, n)."""
     return Point3(points[0, point], points[1, point], points[2, point])
 
 
 @kernel
 def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, numbers: FloatArray) -> None:
-    """Fill all arrays but points and the centre.
+    """Fill normals, and all numbers but CENTER, of a hull.
 
     error of a normal: rounded differences and products are off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v|
     |w| also covers the scaling to unit length, as long as it is small against the length.
@@ -160,7 +163,7 @@ def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, n
 
 
 def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
-    """Return several bodies concatenated into the arrays that kernels take."""
+    """Concatenate bodies into the arrays that kernels take."""
     first_point = _offsets([body.points.shape[1] for body in bodies])
     first_face = _offsets([len(body.anchors) for body in bodies])
     return ConvexArrays(
@@ -173,4 +176,5 @@ def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
 
 
 def _offsets(counts: list[int]) -> IntArray:
+    """Return the offsets of parts with the given sizes, the end last."""
     return np.append(np.int64(0), np.cumsum(np.array(counts, np.int64)))

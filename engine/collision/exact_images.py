@@ -17,7 +17,7 @@ from engine.solids.primitives import HalfSpace
 Vector = tuple[Fraction, ...]
 Point = Iterable[float | Fraction]
 HalfSpaceImage = tuple[Vector, Fraction]
-"""Normal and offset."""
+"""Normal n and offset d of the half-space n . x + d >= 0."""
 
 
 def as_vector(numbers: Point) -> Vector:
@@ -26,13 +26,13 @@ def as_vector(numbers: Point) -> Vector:
 
 
 def image_point(point: Point, pose: Pose | None) -> Vector:
-    """Return the exact image of a point."""
+    """Return the exact image of a point under a pose."""
     p = as_vector(point)
     return p if pose is None else tuple(to_world_frame(p, pose))
 
 
 def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage:
-    """Return normal and offset of the exact image of a half-space, up to a positive factor."""
+    """Return normal and offset of the exact image of a half-space under a pose, up to a positive factor."""
     n, d = as_vector(half_space.normal), Fraction(half_space.offset)
     if pose is None:
         return n, d
@@ -42,12 +42,12 @@ def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage
 
 
 def value_at(half_space: HalfSpaceImage, point: Vector) -> Fraction:
-    """Return n . p + d."""
+    """Return n . p + d for a half-space: positive inside."""
     return dot(half_space[0], point) + half_space[1]
 
 
 def rounded(value: Fraction) -> float:
-    """Return the nearest double, an infinity beyond the largest: rounding that keeps the order, for boxes."""
+    """Return the nearest double, an infinity beyond the largest: monotone, so it serves for boxes."""
     return rounded_quotient(value.numerator, value.denominator)
 
 

@@ -37,7 +37,7 @@ _CHECK_EVERY = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """Edges of one planar body.
+    """Exact edges of one planar body under its pose.
 
     | field | shape | meaning |
     |---|---|---|
@@ -57,11 +57,11 @@ class Outline:
 
     @property
     def n_edges(self) -> int:
-        """Number of edges, those of zero length counted."""
+        """Number of edges, including those of zero length."""
         return len(self.ends)
 
     def edge(self, number: int) -> tuple[Point, Point]:
-        """Return the two ends of an edge."""
+        """Return the exact positions of both ends of an edge."""
         start, end = self.ends[number].tolist()
         return self.points[start], self.points[end]
 
@@ -84,7 +84,7 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
 
 
 def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangement, list[list[int]]]:
-    """Return the arrangement of all edges (bit k of a mask: outline k), and the nodes of each outline's vertices."""
+    """Return the arrangement of all edges (bit k of a mask: outline k), and by outline the node of each vertex."""
     nodes, numbers = _nodes_of(outlines, budget)
     segments: list[tuple[int, int]] = []
     masks: list[int] = []
@@ -95,6 +95,7 @@ def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangeme
 
 
 def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
+    """Return the table of distinct points of all outlines, and by outline the node of each vertex."""
     if any(outline.is_posed for outline in outlines):
         points, down = [point for outline in outlines for point in outline.points], _scale_divisor(outlines)
         nodes, flat = rational_nodes(points if down == 1 else [(x / down, y / down) for x, y in points], budget)
@@ -108,12 +109,13 @@ def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[
 
 
 def _scale_divisor(outlines: list[Outline]) -> int:
-    """Return a divisor that brings posed coordinates, below four times the largest double, into range."""
+    """Return 4 if a posed coordinate exceeds the range of doubles, else 1: divided by it, all are in range."""
     return 1 if all(np.isfinite(outline.floats).all() for outline in outlines) else 4
 
 
 def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
-    """Return the pieces of edges that even-odd does not cancel: those with the open interior on exactly one side."""
+    """Return the exact ends of the parts of edges that even-odd does not cancel: the interior is on exactly one side.
+    """
     arrangement, _ = arrange_outlines([outline], budget)
     live, down = [edge for edge, mask in enumerate(arrangement.masks) if mask], _scale_divisor([outline])
 
@@ -124,7 +126,7 @@ def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
 
 
 def is_clean(outline: Outline, number: int) -> bool:
-    """Return whether edge `number` has a length and no other edge overlaps it: then none of it cancels."""
+    """Return whether edge `number` has a length and no other edge overlaps it, so that no part of it cancels."""
     a, b = outline.edge(number)
     if a == b:
         return False
@@ -152,7 +154,9 @@ def single_points(outline: Outline) -> list[int]:
 
 
 def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
-    """Return the result of `relate_placed`; UNSETTLED for large bodies, and for intersecting ones not simple."""
+    """Return as `relate_placed`; UNSETTLED for large bodies, and for intersecting bodies with boundaries that are not
+    simple.
+    """
     one, other = batch.outline_arrays(first), batch.outline_arrays(second)
     if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
         return UNSETTLED, 0, -1, -1, batch.APART
@@ -166,8 +170,7 @@ def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int
 
 
 def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the relation of two planar bodies; the exact `collide_outline_outline` decides what the kernel leaves
-    open."""
+    """Return the relation of two planar bodies, by the kernel or, where that is undecided, by the exact arrangement."""
     relation, _, i, j, kind = _related(first, second, poses)
     if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
         return collide_outline_outline(first, second, poses, work)
@@ -179,7 +182,7 @@ def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: res
 
 
 def outline_parts(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return which of two overlapping bodies has a part outside the other."""
+    """Return which of two overlapping planar bodies has a part outside the other."""
     relation, bits, _, _, kind = _related(first, second, poses)
     if relation == UNSETTLED:
         return parts_by_arrangement(first, second, poses, work)
@@ -190,10 +193,9 @@ FIRST, SECOND, BOTH = 1, 2, 3
 
 
 def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the exact relation of two bodies of the plane, each a polygon, a triangle or a box.
-
-    Bodies are closed sets under even-odd; an edge that cancels is still boundary, without interior next to it. A body
-    without interior (zero area, doubled rings) never overlaps.
+    """Return the exact relation of two planar bodies by their arrangement. Bodies are closed sets under even-odd; an
+    edge that cancels is still boundary, without interior next to it. A body without interior (zero area, doubled rings)
+    never overlaps.
     """
     a, b = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
@@ -215,7 +217,9 @@ def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, wo
 
 
 class _MutualLocations(NamedTuple):
-    """Labels of faces; whether boundaries meet; for each body, the pieces and points in the other's open interior."""
+    """Labels of faces (FIRST | SECOND); whether boundaries meet; for each body, by edge and isolated point, whether it
+    lies in the other's open interior.
+    """
 
     labels: list[int]
     meet: bool
@@ -226,6 +230,7 @@ class _MutualLocations(NamedTuple):
 def _mutual_locations(
     a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: result.Poses, budget: Budget
 ) -> _MutualLocations:
+    """Locate two outlines in each other by their arrangement."""
     arrangement, _ = arrange_outlines([a, b], budget)
     subdivision = subdivide(arrangement)
     labels, meet = label_faces(subdivision), _boundaries_meet(arrangement)
@@ -241,14 +246,14 @@ def _mutual_locations(
 
 
 def parts_by_arrangement(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return which of two overlapping bodies has a part outside the other; exact."""
+    """Return which of two overlapping planar bodies has a part outside the other, by their exact arrangement."""
     outlines = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     labels, meet, _, _ = _mutual_locations(*outlines, (first, second), poses, work.budget)
     return result.Parts(FIRST in labels, SECOND in labels, meet)
 
 
 def _boundaries_meet(arrangement: Arrangement) -> bool:
-    """Return whether some edge belongs to both bodies, or some node has edges of both."""
+    """Return whether an edge of the arrangement belongs to both bodies, or a node has edges of both."""
     if BOTH in arrangement.cover:
         return True
     at_node = [0] * len(arrangement.nodes.points)
@@ -259,7 +264,7 @@ def _boundaries_meet(arrangement: Arrangement) -> bool:
 
 
 def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Budget) -> result.Witness:
-    """Return the first pair of edges, by number, that meet; a containment if no two edges do."""
+    """Return the first two edges that meet, by number, as witness; containment if no edges meet."""
     for i in range(a.n_edges):
         budget.check()
         near = (b.low <= a.high[i]).all(axis=1) & (b.high >= a.low[i]).all(axis=1)
@@ -271,7 +276,7 @@ def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Bud
 
 
 def _meeting(p: Point, q: Point, r: Point, s: Point) -> result.Kind | None:
-    """Return the kind of the contact of the closed segments p q and r s, None if they are disjoint."""
+    """Return the kind of contact of the closed segments p q and r s, None if they are disjoint; exact."""
     if p in (r, s) or q in (r, s):
         return "vertex_vertex"
     if _is_on(r, p, q) or _is_on(s, p, q) or _is_on(p, r, s) or _is_on(q, r, s):

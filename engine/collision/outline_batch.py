@@ -32,37 +32,38 @@ from engine.solids.ragged import next_in_rings
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, Point2, read_only
 
 MOST_EDGES = 1024
-"""Above this number of edges, testing all pairs of edges takes too long."""
+"""Most edges of a body: for more, testing all pairs of edges takes too long."""
 
 _NONE = np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int8)
 APART, CROSSING, UNSURE, _VERTEX_EDGE, _VERTEX_VERTEX = range(5)
-"""Classes of a pair of edges; CROSSING is strict, the last two are contacts."""
+"""Classes of a pair of edges: no common point, a strict crossing, undecided, and two kinds of contacts."""
 KINDS: dict[int, Kind] = {CROSSING: "edge_edge", _VERTEX_EDGE: "vertex_edge", _VERTEX_VERTEX: "vertex_vertex"}
 ON_EDGE = 3
-"""Location of a point on an edge; others: 1 inside, 0 outside."""
+"""Location of a point on an edge, besides 1 inside and 0 outside."""
 _IN, _OUT, _MAYBE = 1, 2, 4
-"""Bits: some rings of a body are inside another, some outside, some undecided."""
+"""Bits of the rings of a body: _IN, some are inside the other body; _OUT, some are outside; _MAYBE, some are undecided.
+"""
 _SMALLEST, _LARGEST = 2.0**-480, 2.0**480
-"""Range of nonzero coordinates for which orient2d always decides."""
+"""Range of nonzero coordinates (_SMALLEST, _LARGEST) in which orient2d is never UNDECIDED."""
 BLOCK: Final = 8
-"""Number of consecutive edges in one box: what misses the box misses them."""
+"""Consecutive edges around which one box lies."""
 _POLL_EVERY = 64
 
 
 OutlineArrays = namedtuple("OutlineArrays", "vertices following sides firsts")
-"""Several bodies, concatenated.
+"""Planar bodies, concatenated.
 
 | field | shape | meaning |
 |---|---|---|
-| vertices | (n, 2) | |
+| vertices | (n, 2) | vertices, ring after ring |
 | following | (n,) | the vertex at the end of each edge, counted within its body |
-| sides | (n,) | of `find_sides` |
+| sides | (n,) | `find_sides` of each edge |
 | firsts | (n_bodies + 1,) | offset of each body |
 """
 
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
-    """Return the bodies as arrays, and the index of each there, -1 for one that the batches do not take."""
+    """Return bodies as arrays, and the index of each there, -1 for a body that the batch kernels do not take."""
     outlines = [outline_arrays(body) if has_faces(body) else _NONE for body in bodies]
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _, _ in outlines]))
     vertices, following, sides = map(np.concatenate, zip(_NONE, *outlines))
@@ -74,6 +75,7 @@ def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
 
 
 def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
+    """Return vertices (n, 2) and ring offsets of a polygon, triangle or box of the plane."""
     if isinstance(body, Polygon):
         body.check_not_empty()
     if isinstance(body, Aabb):
@@ -83,11 +85,12 @@ def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
 
 
 def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray, Int8Array]:
-    """Return the vertices (n, 2) of a polygon, triangle or box, for each edge the vertex at its end, and its side."""
+    """Return of a polygon, triangle or box its vertices (n, 2), by edge the vertex at its end, and its side; cached."""
     return solid.prepared("outline", lambda: _arrays(*rings_of(solid)))
 
 
 def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArray, Int8Array]:
+    """Build the arrays of `outline_arrays` from rings."""
     vertices, following = read_only(vertices), read_only(next_in_rings(offsets))
     sides = np.zeros(len(vertices), np.int8)
     if len(vertices) <= MOST_EDGES:
@@ -97,11 +100,9 @@ def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArr
 
 @kernel
 def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> None:
-    """Fill sides (n,) int8 of edges that meet only in vertices: 1 interior on the left, -1 on the right, 0 out of
-    range.
-
-    At the lowest of the leftmost vertices of a ring the outside of that ring is on the left; each enclosing ring flips
-    it.
+    """Fill sides (n,) int8: 1 if the interior is left of an edge, -1 right, 0 if coordinates are out of range. Caller
+    guarantees edges that meet only in vertices. At the lexicographically smallest vertex of a ring the outside of that
+    ring is on the left; each enclosing ring flips the side.
     """
     for vertex in range(len(vertices)):
         for k in range(2):
@@ -131,7 +132,9 @@ def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> N
 
 @inline
 def _classify_edges(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
-    """Return CROSSING if two open edges provably cross in one point, APART, a contact, or UNSURE."""
+    """Return CROSSING if open edges ab and cd provably cross in one point, APART, the kind of contact, or UNSURE.
+    error: of each coordinate.
+    """
     slack = 2.0 * error
     if max(a.x, b.x) + slack < min(c.x, d.x) or max(c.x, d.x) + slack < min(a.x, b.x):
         return APART
@@ -156,7 +159,7 @@ def _classify_edges(a: Point2, b: Point2, c: Point2, d: Point2, error: float) ->
 
 @kernel
 def has_simple_edges(vertices: FloatArray, following: IntArray) -> bool:
-    """Return whether the edges of these rings meet only in the vertices between them, and none has length 0."""
+    """Return whether edges meet only in the vertices between consecutive ones, and none has length 0."""
     for i in range(len(vertices)):
         a, b = as_point2(vertices, i), as_point2(vertices, following[i])
         c = as_point2(vertices, following[following[i]])
@@ -175,7 +178,7 @@ def has_simple_edges(vertices: FloatArray, following: IntArray) -> bool:
 
 @inline
 def _place(vertices: FloatArray, turn: FloatArray, move: FloatArray, placed: FloatArray) -> float:
-    """Write the rounded posed vertices of a body; return an error bound of each coordinate (`placement.py`)."""
+    """Write the posed vertices of a body, rounded, to `placed`; return a bound on their error (`placement.py`)."""
     reach, is_exact = 0.0, True
     for axis in range(2):  # a turn by the lattice
         x, y = turn[axis, 0], turn[axis, 1]
@@ -194,13 +197,13 @@ def _place(vertices: FloatArray, turn: FloatArray, move: FloatArray, placed: Flo
 
 @inline
 def n_blocks(n_edges: int) -> int:
-    """Return the number of blocks of n_edges edges."""
+    """Return the number of blocks of `BLOCK` edges."""
     return (n_edges + BLOCK - 1) // BLOCK
 
 
 @inline
 def box_blocks(points: FloatArray, following: IntArray, boxes: FloatArray) -> None:
-    """Write the box of each block of edges: low x, low y, high x, high y."""
+    """Write the box of each block of edges to `boxes` (n_blocks, 4): low x, low y, high x, high y."""
     for edge in range(len(following)):
         a, b, block = as_point2(points, edge), as_point2(points, following[edge]), edge // BLOCK
         x, y, right, top = min(a.x, b.x), min(a.y, b.y), max(a.x, b.x), max(a.y, b.y)
@@ -212,7 +215,7 @@ def box_blocks(points: FloatArray, following: IntArray, boxes: FloatArray) -> No
 
 @inline
 def _is_clear_of_block(boxes: FloatArray, block: int, a: Point2, b: Point2, slack: float) -> bool:
-    """Return whether an edge a b is farther than a slack from the box of a block."""
+    """Return whether edge ab is more than `slack` from the box of a block, along an axis."""
     if max(a.x, b.x) + slack < boxes[block, 0] or boxes[block, 2] + slack < min(a.x, b.x):
         return True
     return max(a.y, b.y) + slack < boxes[block, 1] or boxes[block, 3] + slack < min(a.y, b.y)
@@ -220,7 +223,7 @@ def _is_clear_of_block(boxes: FloatArray, block: int, a: Point2, b: Point2, slac
 
 @inline
 def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -> int:
-    """Return 1 for a point inside the rings, 0 outside, ON_EDGE, or UNSURE where the bound does not decide."""
+    """Return 1 if p is inside the rings (even-odd), 0 outside, ON_EDGE, or UNSURE. error: of each coordinate."""
     is_inside = 0
     for edge in range(len(following)):
         a, b = as_point2(vertices, edge), as_point2(vertices, following[edge])
@@ -242,7 +245,9 @@ def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -
 
 @inline
 def _rings_inside(points: FloatArray, following: IntArray, vertices: FloatArray, theirs: IntArray, error: float) -> int:
-    """Return the locations of the rings of a body that do not meet another one, as bits; other rings add no bit."""
+    """Return the locations of one body's rings in another body as bits _IN, _OUT, _MAYBE. Rings that meet an edge of
+    the other body add no bit.
+    """
     bits = 0
     for vertex in range(len(following)):
         if following[vertex] > vertex:  # not the last of its ring
@@ -258,11 +263,9 @@ def relate_placed(
     points: FloatArray, following: IntArray, sides: Any, vertices: FloatArray, theirs: IntArray, their_sides: Any,
     boxes: FloatArray, error: float,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1;
-    their class.
-
-    For bodies that are not simple the relation only says whether they meet. sides: empty if that suffices. boxes: of
-    the second's blocks. error: of each coordinate.
+    """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1; and
+    their class. For bodies that are not simple the relation only says whether they meet. sides: empty if that suffices.
+    boxes: of the second body's blocks. error: of each coordinate.
     """
     is_unsure, bits, first, second, kind = False, 0, -1, -1, APART
     for edge in range(len(following)):
@@ -308,10 +311,8 @@ def relate_outline_pairs(
     pool: OutlineArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, has_detail: bool, relations: Int8Array,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows.
-
-    bodies: body of each row, or -1. has_detail: overlaps other than PO stay UNSETTLED. Returns early when the flag is
-    set.
+    """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows; returns early when the flag is set.
+    bodies: body of each row, or -1. has_detail: overlaps other than PO stay UNSETTLED.
     """
     placed, others = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2))
     boxes = np.empty((n_blocks(MOST_EDGES), 4))
@@ -338,7 +339,7 @@ def relate_two(
     vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
     theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return the result of `relate_placed` for two bodies under poses."""
+    """Return as `relate_placed` for two bodies, each under a rotation and a translation."""
     placed, others, boxes = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
     error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
     box_blocks(others, theirs, boxes)
@@ -346,23 +347,27 @@ def relate_two(
 
 
 def is_simple_body(solid: Solid) -> bool:
+    """Return `has_simple_edges` of a body; cached."""
     return solid.prepared("is_simple", lambda: bool(has_simple_edges(*outline_arrays(solid)[:2])))
 
 
 IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
-"""Bits: the open interiors intersect; a part of the first is outside the second; a part of the second outside the
-first."""
+"""Bits of two bodies: IN_BOTH, the open interiors intersect; OUT_OF_SECOND, a part of the first is outside the second;
+OUT_OF_FIRST, vice versa.
+"""
 
 
 @inline
 def is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
-    """Return whether a point lies in the box of an edge."""
+    """Return whether p lies in the box around segment ab."""
     return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
 
 
 @inline
 def _is_in_sector(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
-    """Return whether the direction from p to x is that to s, or lies strictly between s and e, counter-clockwise."""
+    """Return whether the direction from p to x lies in the half-open sector from s (included) counter-clockwise to e
+    (excluded).
+    """
     by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
     if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
         if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
@@ -374,13 +379,15 @@ def _is_in_sector(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
 
 @called
 def _sectors_intersect(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
-    """Return whether the open sectors about p from s to e, and from t to f, counter-clockwise, intersect."""
+    """Return whether two open sectors at p intersect: from s to e, and from t to f, counter-clockwise."""
     return _is_in_sector(p, s, e, t) or _is_in_sector(p, t, f, s)
 
 
 @inline
 def _sector_bits(p: Point2, before: Point2, after: Point2, side: int, c: Point2, d: Point2, their_side: int) -> int:
-    """Return the bits at a vertex of one boundary on another; c, d: before and after it on that."""
+    """Return the bits IN_BOTH, ... at a point p of two boundaries. before, after: neighbours of p on one boundary; c,
+    d: on the other. side: 1 if the interior is on the left.
+    """
     s, e = (after, before) if side > 0 else (before, after)
     t, f = (d, c) if their_side > 0 else (c, d)
     bits = IN_BOTH if _sectors_intersect(p, s, e, t, f) else 0
@@ -393,7 +400,7 @@ def contact_bits(
     points: FloatArray, following: IntArray, edge: int, side: int, vertices: FloatArray, theirs: IntArray, other: int,
     their_side: int,
 ) -> int:  # fmt: skip
-    """Return the bits where two edges meet; the start of an edge counts with the edge before it."""
+    """Return the bits IN_BOTH, ... at the points where two edges meet, without those at the start of either edge."""
     a, b = as_point2(points, edge), as_point2(points, following[edge])
     c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
     bits = 0

@@ -25,7 +25,7 @@ contact. Edges are those of the triangles that a face was cut into; `surface` wh
 
 
 Poses = tuple[Pose | None, Pose | None]
-"""Of two bodies, None for one that stands where it is."""
+"""Poses of two bodies, None for the identity."""
 Containing = Literal["", "first", "second"]
 
 _SWAPPED: dict[Containing, Containing] = {"": "", "first": "second", "second": "first"}
@@ -100,35 +100,33 @@ class Collision:
 
 
 FACES = {3: ("mesh", "box"), 2: ("outline", "box")}
-"""Kinds of `Row.meets` with faces or edges, by dimension."""
+"""Kinds of `Row.meets` that have faces, or in the plane edges, by dimension."""
 BODIES = [(d, kind) for d, kinds in FACES.items() for kind in kinds]
 
 
 def meets_as(solid: Solid) -> str:
-    """Return the kind by which a solid is looked up in the table of pairs, empty if it is not supported."""
+    """Return the kind by which a solid is looked up in the table of pairs, "" if collision does not support it."""
     return row_of(solid).meets.get(solid.dimension, "")
 
 
 def has_faces(solid: Solid) -> bool:
-    """Return whether contacts name a face of the solid, or an edge in the plane."""
+    """Return whether witnesses name a face of the solid (in the plane, an edge)."""
     return meets_as(solid) in FACES[solid.dimension]
 
 
 RELATIONS = tuple(Relation)
 UNNAMED = tuple(map(Collision, RELATIONS))
-"""By code: the relation, and the answer without a witness."""
+"""By relation, the answer without a witness."""
 NO_CONTACT = UNNAMED[Relation.DISJOINT]
 FIRST_WITHIN = Collision(Relation.FIRST_INSIDE_SECOND, Witness("containment", containing="second"))
 SECOND_WITHIN = Collision(Relation.SECOND_INSIDE_FIRST, Witness("containment", containing="first"))
 OVERLAP, TOUCH = Collision(Relation.OVERLAPPING, Witness("surface")), Collision(Relation.TOUCHING, Witness("surface"))
-"""Answers for bodies without faces."""
+"""Answers for pairs of bodies without faces."""
 
 
 class Parts(NamedTuple):
-    """Which of two bodies with intersecting open interiors has a part outside the other.
-
-    first, second: whether a part of that body's open interior lies outside the other. meet: whether the boundaries
-    meet.
+    """Which of two overlapping bodies has a part outside the other. first, second: whether that body's open interior
+    has points outside the other. meet: whether the boundaries meet.
     """
 
     first: bool
@@ -136,7 +134,7 @@ class Parts(NamedTuple):
     meet: bool
 
     def swapped(self) -> Parts:
-        """Return the same for the two bodies in the other order."""
+        """Return the parts for the two bodies in the other order."""
         return Parts(self.second, self.first, self.meet)
 
 
@@ -160,7 +158,7 @@ class Work:
 
 
 UNCOUNTED = {(named, boolean): Work(UNLIMITED, named, boolean) for named in (False, True) for boolean in (False, True)}
-"""By `witness` and `boolean`: work of calls without deadline and report, whose counts nobody reads."""
+"""Work of calls without deadline and report, by `witness` and `boolean`; nobody reads its counts."""
 
 PairFunction = Callable[[Any, Any, Poses, Work], Collision]
 PartsFunction = Callable[[Any, Any, Poses, Work], Parts]

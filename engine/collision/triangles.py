@@ -34,19 +34,19 @@ from engine.types import UNDECIDED, Accuracy, FloatArray, Int8Array, Point2, Rel
 
 @inline
 def as_facet2(t: FloatArray) -> Facet:
-    """Load a triangle (3, 2)."""
+    """Return the triangle of an array (3, 2)."""
     return Facet(as_point2(t, 0), as_point2(t, 1), as_point2(t, 2))
 
 
 @inline
 def are_apart_on_axis(p: float, q: float, r: float, s: float, t: float, u: float) -> bool:
-    """Return whether the intervals around three numbers each are disjoint."""
+    """Return whether the interval around p, q, r and that around s, t, u are disjoint."""
     return max(p, q, r) < min(s, t, u) or max(s, t, u) < min(p, q, r)
 
 
 @inline
 def are_boxes_apart(t: Facet, u: Facet) -> bool:
-    """Return whether the boxes around two triangles are disjoint on the first two axes."""
+    """Return whether the boxes around two triangles are disjoint along x or y."""
     if are_apart_on_axis(t.p.x, t.q.x, t.r.x, u.p.x, u.q.x, u.r.x):
         return True
     return are_apart_on_axis(t.p.y, t.q.y, t.r.y, u.p.y, u.q.y, u.r.y)
@@ -54,8 +54,9 @@ def are_boxes_apart(t: Facet, u: Facet) -> bool:
 
 @merged
 def against_edge(p: Point2, q: Point2, u: Facet) -> int:
-    """Return the relation of u to the left of the line p q: apart from it, inside, touching it from the right, or
-    overlapping."""
+    """Return the relation of triangle u to the closed half-plane left of the line p q. DISJOINT: u is strictly right;
+    SECOND_INSIDE_FIRST: strictly left; TOUCHING: right and on it; OVERLAPPING; UNSETTLED.
+    """
     a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
     if max(a, b, c) == UNDECIDED:
         return UNSETTLED
@@ -68,8 +69,9 @@ def against_edge(p: Point2, q: Point2, u: Facet) -> int:
 
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
-    """Return the relation of u to the edges of t; DISJOINT and SECOND_INSIDE_FIRST are final, TOUCHING: interiors
-    apart."""
+    """Return the relation of triangle u to t by the lines of t's edges alone, or UNSETTLED. DISJOINT and
+    SECOND_INSIDE_FIRST are final; TOUCHING: the interiors are disjoint; OVERLAPPING: no edge of t separates.
+    """
     first = against_edge(t.p, t.q, u)
     if first in (UNSETTLED, DISJOINT):
         return first
@@ -86,7 +88,7 @@ def against_edges(t: Facet, u: Facet) -> int:
 
 @inline
 def relation_of_triangles(t: Facet, u: Facet) -> int:
-    """Return the relation of two closed triangles of the plane, degenerate ones included, or UNSETTLED."""
+    """Return the relation of two closed planar triangles, with or without area, or UNSETTLED."""
     if are_boxes_apart(t, u):
         return DISJOINT
     t_turn, u_turn = orient2d(t.p, t.q, t.r), orient2d(u.p, u.q, u.r)
@@ -110,14 +112,14 @@ def relation_of_triangles(t: Facet, u: Facet) -> int:
 
 @kernel
 def relate_triangles_2d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
-    """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 2) float64 arrays."""
+    """Fill relations (n,) int8 for rows i of two arrays (n, 3, 2) float64."""
     for item in range(relations.shape[0]):
         relations[item] = relation_of_triangles(as_facet2(first[item]), as_facet2(second[item]))
 
 
 @allocating_kernel
 def relate_triangles_3d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
-    """Fill relations (n,) int8 for the pairs of rows of two (n, 3, 3) float64 arrays, degenerate ones UNSETTLED."""
+    """Fill relations (n,) int8 for rows i of two arrays (n, 3, 3) float64; UNSETTLED for triangles without area."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
         t, u = facet_at(first[item], 0, 1, 2), facet_at(second[item], 0, 1, 2)
@@ -216,7 +218,7 @@ def collide_triangles(
 
 
 def _relate_exactly(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
-    """Return the relation of one pair by integer or rational arithmetic."""
+    """Return the relation of two triangles by integer or rational arithmetic."""
     if t.shape[1] == 2:
         return collide_outline_outline(Triangle(t), Triangle(u), (None, None), Work(budget, witness=False)).relation
     numbers = scaled_integers([*t.ravel().tolist(), *u.ravel().tolist()])

@@ -156,13 +156,15 @@ def checked_distance(value: float, name: str = "at_least") -> float:
 
 
 def do_meet(first: Solid, second: Solid, poses: Poses, budget: Budget) -> bool:
-    """Return whether two bodies have a common point."""
+    """Return whether two bodies under poses have a common point."""
     work = Work(budget, witness=False, boolean=True)
     return collide_pair(first, second, poses, work).relation != Relation.DISJOINT
 
 
 def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
-    """Return the clearance of two bodies, or whether it is at least `least`: by closed forms, planes, or a search."""
+    """Return the clearance of two bodies or, given `least`, whether it is at least that: by closed forms, planes, or a
+    search.
+    """
     if least == 0.0:
         return True
     planes = has_plane(first, second)
@@ -267,7 +269,7 @@ def clearance_poses(
 
 
 class _Batch:
-    """One pair of bodies and all poses of the second."""
+    """One pair of bodies and all poses of the second body."""
 
     def __init__(self, first: Solid, second: Solid, poses: PoseArrays, budget: Budget) -> None:
         self.first, self.second, self.poses, self.budget = first, second, poses, budget
@@ -279,7 +281,9 @@ class _Batch:
         self.n_exact = 0
 
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
-        """Answer the poses of a range as `SpreadPair.fill`; threads may answer different ranges."""
+        """Fill answers[start:stop], NaN on entry, with the distances under these poses; threads may fill different
+        ranges. least: then 0.0 for nearer bodies, infinity for others, instead of distances.
+        """
         if self.relate is not None and not self.is_small:
             self.relate(start, stop)
         if self.is_small:
@@ -305,4 +309,5 @@ class _Batch:
             self.n_exact += pair.n_exact
 
     def _poses(self, item: int) -> Poses:
+        """Return the poses of both bodies for pose ``item``: none for the first."""
         return None, Pose.of_checked(self.poses.rotations[item], self.poses.translations[item])

@@ -33,14 +33,14 @@ from engine.types import FloatArray
 
 
 class Wide(NamedTuple):
-    """A double-double."""
+    """A double-double: the number h + low."""
 
     h: float
     low: float
 
 
 class Wide3(NamedTuple):
-    """A point."""
+    """A point or vector of space in double-doubles."""
 
     x: Wide
     y: Wide
@@ -49,38 +49,37 @@ class Wide3(NamedTuple):
 
 @inline
 def plus(a: Wide, b: Wide) -> Wide:
-    """Return a + b."""
+    """Return a + b in double-double."""
     return Wide(*dd_add(a.h, a.low, b.h, b.low))
 
 
 @inline
 def less(a: Wide, b: Wide) -> Wide:
-    """Return a - b."""
+    """Return a - b in double-double."""
     return Wide(*dd_sub(a.h, a.low, b.h, b.low))
 
 
 @inline
 def times(a: Wide, b: Wide) -> Wide:
-    """Return a b."""
+    """Return the product a b in double-double."""
     return Wide(*dd_mul(a.h, a.low, b.h, b.low))
 
 
 @inline
 def over(a: Wide, b: Wide) -> Wide:
-    """Return a / b; b is not zero."""
+    """Return a / b in double-double; b is not zero."""
     return Wide(*dd_div(a.h, a.low, b.h, b.low))
 
 
 @inline
 def product(a: float, b: float) -> Wide:
-    """Return a b of two doubles, exactly."""
+    """Return the exact product of two doubles as a double-double."""
     return Wide(*two_prod(a, b))
 
 
 @inline
 def root(a: Wide) -> Wide:
-    """Return the root of a positive number, within 4 u^2 of itself plus half the relative error of a.
-
+    """Return the square root of a positive double-double, within 4 u^2 of itself plus half the relative error of a.
     With h the rounded root, sqrt(a) = h + (a - h^2) / 2h + O((u h)^2 / 2h); a - h^2 is < 2.1 u h^2, rounded twice.
     """
     h = np.sqrt(a.h)
@@ -90,38 +89,37 @@ def root(a: Wide) -> Wide:
 
 @inline
 def less3(a: Wide3, b: Wide3) -> Wide3:
-    """Return a - b."""
+    """Return the vector a - b in double-double."""
     return Wide3(less(a.x, b.x), less(a.y, b.y), less(a.z, b.z))
 
 
 @called
 def dot3(a: Wide3, b: Wide3) -> Wide:
-    """Return a . b."""
+    """Return the scalar product of a and b in double-double."""
     return plus(plus(times(a.x, b.x), times(a.y, b.y)), times(a.z, b.z))
 
 
 @inline
 def along3(a: Wide3, t: Wide, u: Wide3) -> Wide3:
-    """Return a + t u."""
+    """Return the point a + t u in double-double."""
     return Wide3(plus(a.x, times(t, u.x)), plus(a.y, times(t, u.y)), plus(a.z, times(t, u.z)))
 
 
 UNSURE: Final = -1.0
-"""In place of a distance that is not proven."""
+"""Returned in place of a distance if floats prove none."""
 _LARGEST: Final = 2.0**1021
 _TINY: Final = 2.0**-1060
 _PLANE_TINY: Final = 2.0**-600
 _EDGES: Final = (2, 1, 3, 0, 0, 0)
-"""Edges of a box of the plane in the order of its outline, as 2 axis + side; faces in space are numbered so."""
+"""Edges of a box of the plane, in the order of its outline, as 2 axis + side (0 low, 1 high)."""
 _GAPS, _ROOM = 24, 30
 
 
 @inline
 def _nearest_sides(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
-    """Return the sides of an axis on which each of two boxes has nearest points, bits low 1, high 2.
-
-    up, down: signs of the second's low less the first's high, and vice versa; lows, highs: signs of the differences of
-    bounds.
+    """Return for each of two boxes the sides of one axis on which it has nearest points, as bits: low 1, high 2. up:
+    sign of the second's low bound less the first's high one, down: vice versa; lows, highs: signs of the first's bound
+    less the second's.
     """
     if up > 0:
         return 2, 1
@@ -132,10 +130,11 @@ def _nearest_sides(up: int, down: int, lows: int, highs: int) -> tuple[int, int]
 
 @inline
 def _choose_shared_ends(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
-    """Return the faces of two boxes that the chosen nearest points lie on: a bit each, 2 axis + side.
+    """Select one pair of nearest points of two boxes where many are equally near; return the faces that they lie on.
 
-    faces, theirs: those with nearest points; free: the axes with several. Order of choice: the smallest face of the
-    first, then the smallest remaining of the second, then the end nearest to the start of the first's face.
+    A face is bit 2 axis + side. faces, theirs: all with nearest points; free: bits of the axes with several. Order of
+    choice: the smallest face of the first, then the smallest remaining of the second, then the end nearest to the start
+    of the first's face.
     """
     is_high = False
     for turn in range(2):
@@ -157,7 +156,7 @@ def _choose_shared_ends(faces: int, theirs: int, free: int, d: int) -> tuple[int
 
 @inline
 def _sign(x: Wide, error: float) -> int:
-    """Return the sign of a number known within an error, 2 if unproven."""
+    """Return the sign of a number known to +- error, 2 if that does not prove it."""
     if error > 0.0 and abs(x.h) <= error:
         return 2
     return (1 if x.h > 0.0 else 0) - (1 if x.h < 0.0 else 0)
@@ -165,15 +164,15 @@ def _sign(x: Wide, error: float) -> int:
 
 @inline
 def _wide(w: Any, at: int) -> Wide:
+    """Return the double-double stored in w[at] and w[at + 1]."""
     return Wide(w[at], w[at + 1])
 
 
 @inline
 def _place(form: FloatArray, turn: FloatArray, move: FloatArray, w: Any, first: int) -> float:
-    """Write the bounds of a placed form to w, low and high of each axis; return their error bound, infinite for a
-    rotated box and out of range.
-
-    A rotated coordinate takes three exact products and three sums, each off by 4 u^2 of all terms.
+    """Write low and high bound of each axis of a posed box or ball centre to w[first:]; return a bound on their error.
+    Infinite for a rotated box and out of range. A rotated coordinate is three exact products and three sums, each off
+    by 4 u^2 of all terms.
     """
     d, is_turned, size = move.shape[0], False, 0.0
     for k in range(d):
@@ -201,10 +200,9 @@ def gap_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, w: Any,
 ) -> tuple[float, int, int, Wide, float]:  # fmt: skip
-    """Return the distance (0.0 if they provably meet, or UNSURE), the faces with nearest points, the root, and the
-    error.
-
-    w (30,): work space for the bounds of both forms, then the gap on each axis.
+    """Return the distance of two posed boxes or balls, the faces of both with nearest points, distance of the boxes or
+    centres alone as a double-double, and its error bound. Distance: 0.0 if they provably meet, or UNSURE. Faces: bits 2
+    axis + side. w (30,): receives the bounds of both bodies, then the gap on each axis.
     """
     d, error = move.shape[0], _place(form, turn, move, w, 0) + _place(other, their_turn, their_move, w, 12)
     faces = theirs = free = n_apart = 0
@@ -252,7 +250,9 @@ def nearest_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, points: FloatArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Return the result of `gap_of_forms` and fill points (2, d); -1 in place of the faces if the points are UNSURE."""
+    """Return distance and faces as `gap_of_forms`, and fill points (2, d) with nearest points; faces -1: points not
+    proven.
+    """
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:
@@ -282,12 +282,12 @@ def nearest_of_forms(
 
 @kernel
 def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> tuple[float, int, int]:
-    """Return the distance of a form from the half-space row (d + 1,), a status, and the faces of the form's nearest
-    point.
+    """Return the distance of a posed box or ball from the half-space row (d + 1,), a status, and the faces of the
+    body's nearest point.
 
-    Distance: 0.0 if they meet, or UNSURE. Status: 0, or -1 if the points (2, d) are not proven. Of several faces the
-    low ones. With v = dot(n, x) + d at the form's extreme point, off by `slack`, distance = -v / |n| - radius, and foot
-    = x - v n / dot(n, n). Eight operations of at most 16 u^2 each are below 128 u^2.
+    Distance: 0.0 if they meet, or UNSURE. Status: 0, or -1 if the points (2, d) are not proven. Faces: bits 2 axis +
+    side, the low ones of several. With v = dot(n, x) + d at the body's extreme point, off by `slack`, distance = -v /
+    |n| - radius, and foot = x - v n / dot(n, n). Eight operations of at most 16 u^2 each are below 128 u^2.
     """
     w, d = workspace(_ROOM), move.shape[0]
     error = _place(form, turn, move, w, 0)

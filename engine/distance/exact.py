@@ -25,14 +25,14 @@ _SMALLEST: Final = 5e-324
 
 
 class Rational(NamedTuple):
-    """A point: integers over one positive denominator."""
+    """A point: numerators over one positive denominator."""
 
     numerators: Vector
     denominator: int
 
 
 class Gap(NamedTuple):
-    """Two points, the features they lie on, and their squared distance top / bottom."""
+    """Points p, q of two bodies, the codes of the features they lie on, and their squared distance top / bottom."""
 
     p: Rational
     q: Rational
@@ -42,19 +42,19 @@ class Gap(NamedTuple):
     bottom: int
 
     def is_less(self, other: Gap) -> bool:
-        """Return whether this gap is shorter."""
+        """Return whether this gap is shorter than the other."""
         return self.top * other.bottom < other.top * self.bottom
 
 
 class ScaledGap(NamedTuple):
-    """A gap between disjoint bodies, and the radii about its ends, all times `scale`."""
+    """A gap between disjoint bodies, and the radii of balls about its ends; all lengths times `scale`."""
 
     gap: Gap
     radii: tuple[int, int]
     scale: int
 
     def clearance(self, features: tuple[Feature, Feature], dimension: int) -> Clearance:
-        """Return distance, points and features, with `dimension` coordinates."""
+        """Return distance, nearest points with `dimension` coordinates, and the given features."""
         p, q, distance = self.gap.p, self.gap.q, self.distance()
         try:
             ends = self._toward(p, q, self.radii[0]), self._toward(q, p, self.radii[1])
@@ -67,10 +67,9 @@ class ScaledGap(NamedTuple):
         return Clearance(distance, points, features)
 
     def distance(self) -> float:
-        """Return the double nearest to the distance, the smallest denormal where that would be 0.
-
-        Times scale the distance is sqrt(top / bottom) - radii = (sqrt(top bottom) - radii bottom) / bottom.
-        Raises: NotRepresentableError beyond the largest double.
+        """Return the double nearest to the distance; the smallest denormal instead of 0. Times scale the distance is
+        sqrt(top / bottom) - radii = (sqrt(top bottom) - radii bottom) / bottom. Raises: NotRepresentableError beyond
+        the largest double.
         """
         top, bottom = self.gap.top, self.gap.bottom
         try:
@@ -86,7 +85,9 @@ class ScaledGap(NamedTuple):
         return self.gap.top * least.denominator**2 >= reach * reach * self.gap.bottom
 
     def _toward(self, p: Rational, q: Rational, radius: int) -> list[float]:
-        """Return p + radius (q - p) / |q - p|; with n, q - p times both denominators, that is radius n / sqrt(top)."""
+        """Return the doubles nearest to the point at distance `radius` from p toward q: p + radius (q - p) / |q - p|.
+        With n, q - p times both denominators, that is p + radius n / sqrt(top).
+        """
         if not radius:
             return [nearest(x, p.denominator * self.scale) for x in p.numerators]
         n = (y * p.denominator - x * q.denominator for x, y in zip(p.numerators, q.numerators))
@@ -95,7 +96,7 @@ class ScaledGap(NamedTuple):
 
 
 def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap:
-    """Return the gap between two disjoint triangles; first, second: the features that are probably nearest."""
+    """Return the gap between two disjoint triangles; first, second: codes of the features that are probably nearest."""
     suggested = _gap(s, t, first, second)
     if suggested is not None:
         wall, other = walls(suggested)
@@ -112,24 +113,24 @@ def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap
 
 _ALL: Final = [(i, j) for i in range(7) for j in range(7) if (i < 6 and j < 6) or i < 3 or j < 3]
 _PAIRS: Final = sorted(_ALL, key=lambda pair: max(pair[0] // 3, pair[1] // 3))
-"""Of features, those of vertices first."""
+"""Pairs of feature codes that can be nearest, pairs of vertices first."""
 
 
 def walls(gap: Gap) -> tuple[Wall, Wall]:
-    """Return the planes across a gap at its ends: (n, at, size), beyond it is x with n . x size <= at, away from it."""
+    """Return the planes across a gap at its ends, p first: (n, at, size), beyond which lie x with n . x size <= at."""
     (p, p_size), (q, q_size) = gap.p, gap.q
     n = tuple(y * p_size - x * q_size for x, y in zip(p, q))
     return (n, dot(n, p), p_size), (tuple(-x for x in n), -dot(n, q), q_size)
 
 
 def is_beyond(wall: Wall, point: Vector) -> bool:
-    """Return whether a point lies on or beyond a plane across a gap."""
+    """Return whether a point lies on a plane of `walls` or beyond it, seen from the gap."""
     n, at, size = wall
     return dot(n, point) * size <= at
 
 
 def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:
-    """Return the gap of two features, None if the nearest points of their lines or planes lie off them."""
+    """Return the gap of two features, None if the nearest points of their lines or planes lie outside them."""
     if first < 3:
         foot = _project(s[first], t, second)
         return None if foot is None else _between(Rational(s[first], 1), foot[0], first, foot[1])
@@ -140,13 +141,15 @@ def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:
 
 
 def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
-    """Return the gap of two points on given features."""
+    """Return the gap with ends p and q on features of the given codes."""
     n = tuple(y * p.denominator - x * q.denominator for x, y in zip(p.numerators, q.numerators))
     return Gap(p, q, first, second, squared_length(n), (p.denominator * q.denominator) ** 2)
 
 
 def _project(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
-    """Return the foot of a point on a feature of a triangle, and the feature it lies on; None if it is off."""
+    """Return the foot of a point on a feature of a triangle, and the code of the feature that it lies on; None if
+    outside.
+    """
     if feature < 3:
         return Rational(t[feature], 1), feature
     if feature < FACE:
@@ -169,7 +172,7 @@ def _project(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | 
 
 
 def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] | None:
-    """Return the point at part / whole of an edge, and the feature it lies on; None if it is beyond the ends."""
+    """Return the point at part / whole of edge k, and the code of the feature it lies on; None if beyond an end."""
     a, b = t[k], t[(k + 1) % 3]
     if part == 0 or part == whole:
         return Rational(b if part else a, 1), ((k + 1) % 3 if part else k)
@@ -179,7 +182,9 @@ def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] 
 
 
 def _edges(s: Corners, i: int, t: Corners, j: int) -> Gap | None:
-    """Return the gap of two edges across both, None if parallel: then the gap of an end is as small."""
+    """Return the gap across edge i of s and edge j of t, None if its ends lie outside them. None also for parallel
+    edges: then the gap at an end of one is as small.
+    """
     u, v, w = minus(s[(i + 1) % 3], s[i]), minus(t[(j + 1) % 3], t[j]), minus(s[i], t[j])
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     size = uu * vv - uv * uv

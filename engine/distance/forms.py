@@ -30,15 +30,17 @@ from engine.solids.primitives import HalfSpace, Sphere
 from engine.types import FloatArray
 
 _MOST_PAIRS: Final = 1 << 18
-"""Number of pairs of edges of two outlines up to which all are tested: some milliseconds if no boxes separate them."""
+"""Largest number of pairs of edges of two outlines of which all are tested: some milliseconds if no boxes separate
+them.
+"""
 _NONE: Final = np.empty(0)
 PLANE: Final = Feature("plane")
 MEETING: Final = Clearance(0.0)
-"""The answer for bodies with a common point."""
+"""The clearance of bodies with a common point."""
 
 
 def _feature(faces: int, d: int) -> Feature:
-    """Return the feature of a box that lies on all of some faces, a bit each, 2 axis + side."""
+    """Return the feature of a box common to some of its faces, given as bits 2 axis + side (0 low, 1 high)."""
     numbers = [0]
     for axis in range(d):
         is_within = not faces >> 2 * axis & 3
@@ -50,18 +52,22 @@ def _feature(faces: int, d: int) -> Feature:
 
 
 FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 3)}
-"""By dimension and faces."""
+"""Features of a box by dimension, then by its faces as bits."""
 
 
 def _gap_from_closed_form(distance: float, least: float | None) -> Clearance | bool | None:
-    """Return the answer if the rounded distance decides it, else None."""
+    """Return the answer if a rounded distance decides it, else None. With `least`: whether the distance is at least
+    that; else MEETING for distance 0.
+    """
     if least is not None and distance not in (UNSURE, least):
         return bool(distance > least)
     return MEETING if distance == 0.0 else None
 
 
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of two forms or small planar bodies, or whether it is at least `least`; None if unproven."""
+    """Return the clearance of two boxes, balls or small planar bodies; given `least`, whether it is at least that; None
+    if unproven.
+    """
     d, (pose, their_pose) = first.dimension, poses
     if first.type in FORMS and second.type in FORMS:
         form, other = form_of(first), form_of(second)
@@ -90,7 +96,7 @@ def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None
 
 
 def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the result of `between_forms` where one of the two is an unposed half-space; None if unproven."""
+    """Return as `between_forms` for a box or ball and an unposed half-space, in either order; None if unproven."""
     is_second = isinstance(second, HalfSpace)
     plane, body = (second, first) if is_second else (first, second)
     form = form_of(body)
@@ -107,15 +113,14 @@ def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: flo
 
 
 STILL2: Final = tuple(array[None] for array in motion_of(None, 2))
-"""Rotation and translation of an unposed body of the plane, as one of many poses."""
+"""Rotations and translations of an unposed planar body, as arrays of one pose."""
 
 
 def distances_under_poses(
     first: Solid, second: Solid, motions: Sequence[FloatArray], least: Fraction | None, budget: Budget
 ) -> FloatArray:
-    """Return the distances under poses, NaN if unproven; with `least`, 0.0 for nearer bodies and infinity for others.
-
-    motions: rotations and translations of each body, read-only.
+    """Return the distances of two small planar bodies under poses, NaN if unproven. least: then 0.0 for nearer bodies
+    and infinity for others. motions: rotations and translations of each body, read-only.
     """
     turns, moves, their_turns, their_moves = motions
     distances = np.empty(len(their_turns))
@@ -132,23 +137,25 @@ def distances_under_poses(
 
 
 def are_small(first: Solid, second: Solid) -> bool:
-    """Return whether two bodies are planar outlines that `nearest_under_poses` takes."""
+    """Return whether two bodies are planar, with few enough pairs of edges for `distances_under_poses`."""
     if first.dimension == 3:
         return False
     return len(outline_of(first)[0]) * len(outline_of(second)[0]) <= _MOST_PAIRS
 
 
 def _answer(distance: float, points: FloatArray, first: Feature, second: Feature) -> Clearance:
+    """Return the clearance with nearest points (2, d) and the features that they lie on."""
     points.setflags(write=False)
     return Clearance(distance, points, (first, second))
 
 
 def _named(solid: Solid, faces: int) -> Feature:
+    """Return the feature of a ball or box; faces: of a box, as bits."""
     return BALL if isinstance(solid, Sphere) else FEATURES[solid.dimension][faces]
 
 
 def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
-    """Return the gap between two points with radii about them."""
+    """Return the gap between points p and q of fractions, with balls of the given radii about them."""
     numbers = [*p, *q, *map(Fraction, radii)]
     scale = lcm(*(x.denominator for x in numbers))
     whole = [int(x * scale) for x in numbers]
@@ -159,7 +166,7 @@ def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
 
 
 def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tuple[ScaledGap, tuple[Feature, Feature]]:
-    """Return the gap of two disjoint bodies, one or both a half-space, and the features at its ends."""
+    """Return the gap of two disjoint bodies, at least one a half-space, and the features at its ends; exact."""
     if isinstance(one, HalfSpace) and isinstance(other, HalfSpace):
         # their planes are parallel; of all lines across, that through the origin
         planes = image_half_space(one, poses[0]), image_half_space(other, poses[1])
@@ -174,7 +181,7 @@ def gap_of_planes(one: Solid, other: Solid, poses: Poses, budget: Budget) -> tup
 
 
 def _foot_and_vertex(space: HalfSpace, body: Solid, poses: Poses, budget: Budget) -> tuple[Vector, Vector, Feature]:
-    """Return the nearest points of a plane and a body, and the vertex that the latter is."""
+    """Return the nearest points of a half-space's plane and a body, and the body's vertex there as a feature; exact."""
     mesh, d = spread_of(body), body.dimension
     plane = image_half_space(space, poses[0])
     best: tuple[Fraction, Vector, Feature] | None = None

@@ -22,17 +22,18 @@ from engine.predicates.vectors import as_point2
 from engine.types import FlagArray, FloatArray, IntArray, Point2
 
 MOST_NEAR: Final = 64
-"""Number of candidate pairs of vertex and edge; a tie of more is not settled here."""
+"""Most candidate pairs of a vertex and an edge; if more are tied, the pair of bodies is left to the search."""
 ROOM: Final = 4 * MOST_NEAR
 _LEAST_SQUARE: Final = 2.0**-1000
-"""Squared length below which an edge is replaced by its start."""
+"""Squared length below which an edge is replaced by its first vertex."""
 _LEAST_FACTOR: Final = 2.0**-300
-"""Least coordinate whose differences are factors of exact products."""
+"""Smallest coordinate whose differences may be factors of exact products."""
 
 
 class Look(NamedTuple):
-    """Candidate pairs of vertex and edge in doubles: number of rows of `near`, the least square among them, the largest
-    one retained, and the error of distances."""
+    """State of a scan for candidates in doubles: rows in `near`, least squared distance, largest squared distance of a
+    candidate, and error bound of distances.
+    """
 
     n: int
     least: float
@@ -41,7 +42,7 @@ class Look(NamedTuple):
 
 
 class Line(NamedTuple):
-    """An edge prepared for distances: start, direction, and inverse squared length, 0.0 if it has none."""
+    """An edge prepared for distances: start a, direction u, inverse squared length (0.0 for a point)."""
 
     a: Point2
     u: Point2
@@ -50,6 +51,7 @@ class Line(NamedTuple):
 
 @inline
 def line_of(other: Placed, edge: int) -> Line:
+    """Return edge `edge` of an outline, prepared."""
     a, b = as_point2(other.points, edge), as_point2(other.points, other.following[edge])
     u = Point2(b.x - a.x, b.y - a.y)
     square = u.x * u.x + u.y * u.y
@@ -58,11 +60,9 @@ def line_of(other: Placed, edge: int) -> Line:
 
 @inline
 def way_to(p: Point2, line: Line) -> Point2:
-    """Return about the vector to a point from its nearest point on an edge.
-
-    error: less than 2^-47 of all coordinates. The foot is a point of the edge, displaced along it by 2^-50 of all
-    coordinates over the length times the distance, or by at most the length; the lesser displacement is below the
-    bound.
+    """Return p minus the nearest point of an edge, in doubles. error: less than 2^-47 of all coordinates. The foot is a
+    point of the edge, displaced along it by 2^-50 of all coordinates over the length times the distance, or by at most
+    the length; the lesser displacement is below the bound.
     """
     wx, wy = p.x - line.a.x, p.y - line.a.y
     share = min(max((line.u.x * wx + line.u.y * wy) * line.share, 0.0), 1.0)
@@ -71,9 +71,8 @@ def way_to(p: Point2, line: Line) -> Point2:
 
 @inline
 def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bool, near: Any, look: Look) -> Look:
-    """Write the candidate pairs of the vertices of a block and the edges of another body's block to near.
-
-    Row: about the squared distance, whether the vertex is the first body's, the vertex, the edge.
+    """Append to `near` the candidates among the vertices of blocks[0] of one body and the edges of blocks[1] of
+    another. Row: squared distance, whether the vertex is the first body's, the vertex, the edge. Returns the new state.
     """
     n, least, most, slack = look
     for edge in range(BLOCK * blocks[1], min(BLOCK * (blocks[1] + 1), len(other.following))):
@@ -95,13 +94,13 @@ def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bo
 
 @inline
 def row_of(near: Any, row: int) -> tuple[bool, int, int]:
-    """Return the last three numbers of a row."""
+    """Return of a row of `near` whether the vertex is the first body's, the vertex, and the edge."""
     return near[4 * row + 1] != 0.0, int(near[4 * row + 2]), int(near[4 * row + 3])
 
 
 @inline
 def _retain_near(near: Any, n: int, most: float) -> int:
-    """Move the rows of at most a squared distance to the front; return their number."""
+    """Move the rows of `near` with squared distance at most `most` to the front; return their number."""
     n_retained = 0
     for row in range(n):
         if near[4 * row] <= most:
@@ -113,7 +112,7 @@ def _retain_near(near: Any, n: int, most: float) -> int:
 
 @inline
 def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float:
-    """Return about the squared distance of two boxes."""
+    """Return the squared distance of two boxes in doubles, rounded."""
     x = max(boxes[block, 0] - others[other, 2], others[other, 0] - boxes[block, 2], 0.0)
     y = max(boxes[block, 1] - others[other, 3], others[other, 1] - boxes[block, 3], 0.0)
     return float(x * x + y * y)
@@ -121,7 +120,8 @@ def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float
 
 @inline
 def look_for(a: Placed, b: Placed, near: Any) -> Look:
-    """Return the candidates, scanning the nearest blocks first. A number of rows beyond the room means too many."""
+    """Write the candidate pairs of vertex and edge to `near`, nearest blocks first; more than MOST_NEAR rows: too many.
+    """
     least, first, second = np.inf, 0, 0
     for i in range(len(a.boxes)):
         for j in range(len(b.boxes)):
@@ -143,7 +143,7 @@ def look_for(a: Placed, b: Placed, near: Any) -> Look:
 
 @inline
 def _least_face(following: IntArray, vertex: int) -> int:
-    """Return the lesser edge at a vertex."""
+    """Return the lower-numbered of the two edges at a vertex; following: the end vertex of each edge."""
     for edge in range(vertex):
         if following[edge] == vertex:
             return edge
@@ -152,7 +152,9 @@ def _least_face(following: IntArray, vertex: int) -> int:
 
 @inline
 def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tuple[VertexEdge, bool]:
-    """Return the distance of a vertex of `a` from an edge of `b`, and whether the position of its foot is proven."""
+    """Return the distance of a vertex of `a` from an edge of `b`, and whether the position of the foot is proven.
+    is_first: whether `a` is the first body.
+    """
     end = b.following[edge]
     p, c, d = point(a.points, vertex), point(b.points, edge), point(b.points, end)
     distance, bound, where = measure(p, c, d, a.error + b.error)
@@ -167,15 +169,15 @@ def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) 
 
 @inline
 def _offset_between(a: Placed, b: Placed, pair: VertexEdge) -> Wide2:
+    """Return the vector between the two vertices that a pair names."""
     return minus2(point(a.points, pair.first), point(b.points, pair.second))
 
 
 @called
 def _are_tied(a: Placed, b: Placed, one: VertexEdge, two: VertexEdge) -> bool:
-    """Return whether two feet are provably at equal distances from their vertices.
-
-    True if all are vertices with equal offsets on each axis; or both are feet within one edge, of vertices on a
-    parallel of it; or within two parallel edges that end in the vertices.
+    """Return whether two pairs of vertex and edge are provably at equal distances. True if all four ends are vertices,
+    with equal offsets on each axis; or both feet lie within one edge, their vertices on a parallel of it; or within two
+    parallel edges that end in the vertices.
     """
     n, m = len(a.following), len(b.following)
     if a.error + b.error > 0.0:
@@ -205,12 +207,15 @@ def _are_tied(a: Placed, b: Placed, one: VertexEdge, two: VertexEdge) -> bool:
 
 @inline
 def _rank(pair: VertexEdge) -> tuple[int, int, int, int]:
+    """Return the key by which ties are ordered: both faces, then both features."""
     return pair.face, pair.their_face, pair.first, pair.second
 
 
 @inline
 def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, bool]:
-    """Return the nearest of n pairs, ties by the least faces; its error; and whether it is unique."""
+    """Return the nearest of the n candidates, ties by the lowest faces; a bound on how much nearer another may be; and
+    whether it is proven unique.
+    """
     none, is_proven = Wide(np.inf, 0.0), True
     best, rival = VertexEdge(none, 0.0, True, -1, -1, 0, 0), none
     for row in range(n):
@@ -244,14 +249,13 @@ def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, 
 
 
 _SMALLEST: Final = 2.0**-140
-"""Least distance for which the bounds are valid."""
+"""Smallest distance for which the bounds are valid."""
 _POLL_EVERY: Final = 16
 
 
 @inline
 def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
-    """Return whether the line across the connection of a vertex and an edge provably separates the bodies.
-
+    """Return whether the line perpendicular to the connection of a vertex and an edge provably separates two bodies.
     error: for a direction n a product dot(n, x) is off by less than 8 u |n| of the largest coordinate.
     """
     way, low, high = way_to(as_point2(own.points, vertex), line_of(other, edge)), np.inf, -np.inf
@@ -264,6 +268,7 @@ def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> 
 
 @called
 def _related(a: Placed, b: Placed, error: float) -> int:
+    """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven; error: of rounded coordinates."""
     own, their, none = a.following, b.following, a.following[:0]
     relation, _, _, _, _ = relate_placed(a.points, own, none, b.points, their, none, b.boxes, error)
     return -1 if relation == UNSETTLED else (1 if relation == DISJOINT else 0)
@@ -271,7 +276,7 @@ def _related(a: Placed, b: Placed, error: float) -> int:
 
 @inline
 def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
-    """Return 1 for disjoint bodies, 0 for others, -1 if unproven or distances may be."""
+    """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven or out of range."""
     error = 2.0**-51 * max(a.reach if a.error > 0.0 else 0.0, b.reach if b.error > 0.0 else 0.0)
     error += 2.0**-1000 if error > 0.0 else 0.0
     if not (a.reach + b.reach < np.inf and look.least < np.inf):
@@ -293,9 +298,8 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
 def _write_offset_point(
     at: Wide2, error: float, errors: float, pair: VertexEdge, way: Wide2, radius: float, points: FloatArray, end: int
 ) -> bool:
-    """Offset a point by radius toward the other end of a connection; return whether the result is correctly rounded.
-
-    error, errors: of that point, and of both ends of the connection together.
+    """Write at + radius way / |way| to points[end]; return whether both coordinates are correctly rounded. error: of
+    the point `at`; errors: of both ends of the connection together. way: toward the other end.
     """
     is_proven = True
     for k in range(2):
@@ -310,8 +314,7 @@ def _write_offset_point(
 
 @inline
 def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray) -> tuple[float, int, int]:
-    """Return the distance of two bodies and the features of their nearest points, which are written to points (2, 2).
-
+    """Return the distance of two bodies with radii, and the features of their nearest points, which fill points (2, 2).
     Distance: 0.0 if they provably meet, or UNSURE. Feature: the vertex, or the number of vertices + the edge; -1 if
     unproven. A ball is one vertex and a radius.
     """
@@ -354,10 +357,8 @@ def nearest_under_poses(
     their_following: IntArray, their_radius: float, their_turns: FloatArray, their_moves: FloatArray,
     distances: FloatArray, points: FloatArray, flag: FlagArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Fill distances with the distance under each pose, unless empty; return `_nearest` of the last pose with its
-    points.
-
-    The first body has as many poses as the second, or one. Stops early when the flag is set.
+    """Fill distances with the distance under each pose of the second body, unless empty; return `_nearest` of the last
+    pose. The first body has as many poses as the second, or one. Stops early when the flag is set.
     """
     n, m, k = len(following), len(their_following), _n_rows(following)
     room = np.empty((k + _n_rows(their_following), 4))

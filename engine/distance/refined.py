@@ -46,11 +46,11 @@ from engine.predicates.error_free import is_correctly_rounded, two_diff
 from engine.types import FloatArray, Point3
 
 ROOT: Final = -1
-"""In place of a lane: the whole tree."""
+"""Stands for the box of a whole tree, where a child is given as 8 node + lane."""
 
 
 class View(NamedTuple):
-    """A body in a search: its mesh, its placement, and the power of two that scales its numbers."""
+    """A body in a search: its mesh, its placement, and the power of two by which its numbers are scaled."""
 
     mesh: MeshArrays
     place: Placement
@@ -58,10 +58,14 @@ class View(NamedTuple):
 
 
 Heap = namedtuple("Heap", "bounds lanes")
-"""Priority queue of pairs of boxes, least bound first: bounds (room,), lanes (room, 2) int64, eight a node, or ROOT."""
+"""Priority queue of pairs of boxes, least bound first: bounds (room,), and lanes (room, 2) int64, 8 node + lane or
+ROOT.
+"""
 
 Candidates = namedtuple("Candidates", "pairs bounds")
-"""Pairs of triangles: pairs (room, 4) int64, two triangles and two features; bounds (room,) float64, lower bounds."""
+"""Candidate pairs of triangles: pairs (room, 4) int64, two triangles and a feature code of each; bounds (room,)
+float64, lower bounds on their distances.
+"""
 
 Room = namedtuple("Room", "heap candidates limits points frames work fixed")
 """Work space of searches, one at a time.
@@ -71,7 +75,7 @@ limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, wor
 
 
 def new_room(room: int) -> Room:
-    """Return work space for `room` pairs."""
+    """Allocate work space for `room` pairs."""
     heap, pairs = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
         heap, Candidates(pairs, np.empty(room)), np.empty(2),
@@ -81,7 +85,7 @@ def new_room(room: int) -> Room:
 
 
 class Search(NamedTuple):
-    """One query: both bodies, a rounding bound of points of both together, and work space."""
+    """One query: both bodies, a bound on the rounding of points of both together, and work space."""
 
     a: View
     b: View
@@ -91,13 +95,13 @@ class Search(NamedTuple):
 
 @merged
 def scaled(p: Point3, unit: float) -> Point3:
-    """Return a point times the unit; before any product, which would lose denormal coordinates."""
+    """Return a point times the unit, applied before any product, which would lose denormal coordinates."""
     return Point3(p.x * unit, p.y * unit, p.z * unit)
 
 
 @inline
 def retain_below(candidates: Candidates, n: int, most: float) -> int:
-    """Remove the candidates above the bound; return the number of others."""
+    """Remove the candidates of n whose bound is above `most`; return the number of the others."""
     n_left = 0
     for item in range(n):
         if candidates.bounds[item] <= most:
@@ -113,7 +117,7 @@ ROUNDING: Final = 2.0**-94
 
 @inline
 def _clamped_quotient(top: Wide, bottom: Wide) -> Wide:
-    """Return top / bottom, clamped to [0, 1]."""
+    """Return top / bottom in double-double, clamped to [0, 1]."""
     if not (bottom.h > 0.0 and top.h > 0.0):
         return Wide(0.0, 0.0)
     share = over(top, bottom)
@@ -122,18 +126,20 @@ def _clamped_quotient(top: Wide, bottom: Wide) -> Wide:
 
 @inline
 def _row(a: Point3, p: Point3, shift: Wide) -> Wide:
-    """Return dot(a, p) + shift."""
+    """Return dot(a, p) + shift in double-double."""
     return plus(plus(plus(shift, product(a.x, p.x)), product(a.y, p.y)), product(a.z, p.z))
 
 
 @called
 def corner_of(place: Placement, p: Point3, shift: Wide3) -> Wide3:
-    """Return a placed point, with `shift` in place of the translation."""
+    """Return the rotated point p plus `shift`, in double-doubles."""
     return Wide3(_row(place.x, p, shift.x), _row(place.y, p, shift.y), _row(place.z, p, shift.z))
 
 
 @inline
 def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
+    """Return the corners of a triangle under its placement in double-doubles, with `shift` in place of the translation.
+    """
     t = triangle_of(view.mesh, triangle)
     p, q = corner_of(view.place, scaled(t.p, view.unit), shift), corner_of(view.place, scaled(t.q, view.unit), shift)
     return Facet(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
@@ -141,22 +147,21 @@ def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
 
 @inline
 def _edge(t: Facet, k: int) -> tuple[Wide3, Wide3]:
-    """Return the start of an edge and the vector to its end."""
+    """Return the start of edge k of a triangle, and the vector to its end."""
     a = corner(t, k)
     return a, less3(corner(t, k + 1), a)
 
 
 @inline
 def _reach(u: Wide3) -> float:
+    """Return the largest magnitude of a coordinate."""
     return max(abs(u.x.h), abs(u.y.h), abs(u.z.h))
 
 
 @called
 def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
-    """Return the closest point of a vertex, edge or triangle to a point, with the margin of its weights and an error
-    amplification.
-
-    If the foot is off the feature, some other point of it. Margin: of the weights times their denominator above 0.
+    """Return the point of a feature of t (vertex, edge, FACE) closest to a point, a margin and an error amplification.
+    If the foot lies outside the feature, some other point of it. Margin: weights times their denominator, the smallest.
     Amplification: lengths of the edges over the denominator. Both in the units of the module's table.
     """
     if feature < 3:
@@ -182,8 +187,8 @@ def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, fl
 
 @called
 def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
-    """Return the closest points of two features, or other points of them, with margin and amplification as in
-    `_closest_on_feature`."""
+    """Return the closest points of a feature of s and one of t, margin and amplification as of `_closest_on_feature`.
+    """
     if second < 3:
         q = corner(t, second)
         p, inside, steepness = _closest_on_feature(q, s, first)
@@ -204,13 +209,14 @@ def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, 
 
 @inline
 def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
-    """Return n . (p - base)."""
+    """Return n . (p - base) in double-double."""
     return dot3(n, less3(p, base))
 
 
 @called
 def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
-    """Return the distance of two nearly nearest points, and the most by which the triangles may be nearer."""
+    """Return the distance of the closest points of two features, and a bound on how much nearer the triangles may be.
+    """
     p, q, _, _ = ends_of(s, t, first, second)
     n = less3(q, p)
     square = dot3(n, n)
@@ -225,7 +231,7 @@ def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
 
 @inline
 def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
-    """Return the vertices of a feature, of an edge the smaller first, -1 for none."""
+    """Return the vertices of a feature of a triangle, -1 for none; of an edge the smaller vertex first."""
     t, k = view.mesh.triangles, feature % 3
     i, j = t[triangle, k], t[triangle, (k + 1) % 3]
     if feature < 3:
@@ -235,7 +241,7 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
 
 @inline
 def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
-    """Return the difference of the translations, second less first, times the unit."""
+    """Return the second translation less the first, times the unit, in double-doubles."""
     unit = s.a.unit
     x, y = Wide(*two_diff(other[0] * unit, start[0] * unit)), Wide(*two_diff(other[1] * unit, start[1] * unit))
     return Wide3(x, y, Wide(*two_diff(other[2] * unit, start[2] * unit)))
@@ -243,10 +249,9 @@ def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
 
 @called
 def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int) -> tuple[float, int]:
-    """Bound n candidates in double-doubles and remove non-candidates; return the rounded distance, -1.0 if unproven,
-    and n.
-
-    start, other: the translations of both bodies (3,). radii: about either, times the unit.
+    """Bound n candidates in double-doubles and remove those that cannot be nearest; return the distance and the new n.
+    Distance: the nearest double, -1.0 if unproven. start, other: the translations of both bodies (3,). radii: of the
+    balls about their triangles, times the unit.
     """
     candidates, unit = s.room.candidates, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
@@ -273,7 +278,8 @@ _SLACK: Final = 2.0**-86
 @inline
 def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3,
                slack: float) -> bool:  # fmt: skip
-    """Return whether the corners of a triangle outside a feature lie strictly beyond the plane across n."""
+    """Return whether all corners of a triangle but those `known` lie strictly behind the plane through base across n.
+    """
     for k in range(3):
         if view.mesh.triangles[triangle, k] in known:
             continue
@@ -287,8 +293,9 @@ def _write_offset_point(
     view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, error: float,
     point: FloatArray,
 ) -> bool:  # fmt: skip
-    """Offset p by radius along n, relative to the origin of space, and write it to point (d,); return whether it is
-    correctly rounded."""
+    """Write p + start, moved by radius along n, to point (d,); return whether it is correctly rounded. known: the
+    vertices of the feature that p lies on. error: of p.
+    """
     size, is_proven, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
     is_given = radius == 0.0 and not view.place.is_posed
@@ -309,10 +316,8 @@ def _write_offset_point(
 def certify(
     s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int, points: FloatArray
 ) -> bool:
-    """Fill points (2, d) with the nearest points of two bodies and put their candidate first, ties by the smallest
-    faces.
-
-    Returns False if n candidates leave the points open. Other arguments as for `refine`.
+    """Fill points (2, d) with the nearest points of two bodies, and move their candidate to row 0, ties by the lowest
+    faces. Returns False if the n candidates do not prove the points. Other arguments as of `refine`.
     """
     pairs, best = s.room.candidates.pairs, 0
     faces, their_faces = s.a.mesh.faces, s.b.mesh.faces

@@ -46,7 +46,7 @@ _rooms = threading.local()
 
 
 def _room() -> Room:
-    """Return the cached work space of this thread."""
+    """Return this thread's work space, cached."""
     room: Room | None = getattr(_rooms, "room", None)
     if room is None or len(room.heap.bounds) != _ROOM:
         room = _rooms.room = new_room(_ROOM)
@@ -54,7 +54,7 @@ def _room() -> Room:
 
 
 class SpreadPair:
-    """Two bodies, the second under one of many poses, the first under one or as many; one thread at a time."""
+    """Two bodies, the second under many poses, the first under one or as many; used by one thread at a time."""
 
     def __init__(self, first: Solid, second: Solid, own: PoseArrays, second_poses: PoseArrays, budget: Budget) -> None:
         self.solids = first, second
@@ -68,7 +68,7 @@ class SpreadPair:
         self._reach = 4.0 * (a.arrays.extent.reach + b.arrays.extent.reach) + sum(self._radii)
 
     def clearance(self, item: int) -> Clearance:
-        """Return distance, points and features of disjoint bodies under pose `item`."""
+        """Return distance, nearest points and features of two disjoint bodies under pose `item`."""
         query, answers = Query(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
         how, _, pairs = next(self._unanswered(item, item + 1, answers, query))
         d = self.solids[0].dimension
@@ -81,13 +81,13 @@ class SpreadPair:
         return Clearance(float(answers[item]), points, self._features((i, j), codes))
 
     def _features(self, triangles: Sequence[int], codes: Sequence[int]) -> tuple[Feature, Feature]:
+        """Return the caller's features for two triangles and a feature code of each."""
         first, second = map(feature_of, self.solids, self.meshes, triangles, codes)
         return first, second
 
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
-        """Fill the NaN answers of a range of poses with the distances of the triangles, which have no common point.
-
-        With `least`: 0.0 if nearer, else infinity.
+        """Fill the NaN entries of answers[start:stop] with the distances under these poses; the triangles do not meet.
+        least: then 0.0 for nearer bodies, infinity for others.
         """
         limits = (np.inf, -1.0) if least is None else _around(least + sum(map(Fraction, self._radii)))
         for _, item, pairs in self._unanswered(start, stop, answers, Query(*limits, *self._radii, self._reach, False)):
@@ -97,10 +97,8 @@ class SpreadPair:
     def _unanswered(
         self, start: int, stop: int, answers: FloatArray, query: Query
     ) -> Iterator[tuple[int, int, Iterable[Sequence[int]]]]:
-        """Yield outcome, pose and candidates (two triangles and two features each) of each pose that the search leaves
-        open.
-
-        The consumer fills the answer.
+        """Yield (outcome, pose, candidates) for each pose that the search in floats does not answer; the consumer fills
+        the answer. Candidates: rows of two triangles and a feature code of each.
         """
         (a, b), (own, poses) = self.meshes, self.poses
         while True:  # bound: an answer is filled, or the room doubles
@@ -119,14 +117,16 @@ class SpreadPair:
                 self._room = new_room(2 * len(self._room.candidates.bounds))
 
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
-        """Return the least gap of the candidates, ties by the smallest faces, and its triangles."""
+        """Return the smallest gap of the candidates of pose `item`, ties by the lowest faces, and its two triangles;
+        exact.
+        """
         self.n_exact += 1
         (a, b), (own, poses) = self.meshes, self.poses
         placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
         exact = _ExactPair(a, b, placed, self._radii)
 
         def rank(i: int, j: int) -> tuple[Any, ...]:
-            """Rank by faces, then by corners, not by the order of the tree."""
+            """Return the key of ties: faces, then corners, independent of the order of the tree."""
             corners = (body.arrays.vertices[body.arrays.triangles[k]].ravel().tolist() for body, k in ((a, i), (b, j)))
             return int(a.faces[i]), int(b.faces[j]), *corners
 
@@ -150,7 +150,7 @@ class SpreadPair:
 
 
 class _ExactPair:
-    """Two bodies and their radii on one lattice."""
+    """Two bodies and their radii in integers, on one lattice."""
 
     def __init__(self, a: MeshBody, b: MeshBody, poses: Poses, radii: tuple[float, float]) -> None:
         self._bodies = exact_pair(a, b, poses, lattice_shift(np.array(radii)))
@@ -165,7 +165,7 @@ class _ExactPair:
         self._walls, self._beyond = walls(gap), ({}, {})
 
     def are_beyond(self, i: int, j: int) -> bool:
-        """Return whether two triangles are provably no nearer than the reference gap; caches each vertex test."""
+        """Return whether triangles i and j are provably no nearer than the reference gap; vertex tests are cached."""
         for body, wall, known, triangle in zip(self._bodies, self._walls, self._beyond, (i, j)):
             for vertex in body.mesh.arrays.triangles[triangle].tolist():
                 if vertex not in known:
@@ -175,17 +175,18 @@ class _ExactPair:
         return True
 
     def gap(self, i: int, j: int, first: int, second: int) -> ScaledGap:
-        """Return the gap between two triangles."""
+        """Return the gap between triangles i and j; first, second: the probably nearest features."""
         a, b = self._bodies
         return ScaledGap(nearest_of_triangles(a.corners(i), b.corners(j), first, second), self._radii, self._scale)
 
 
 def _pose_at(poses: PoseArrays, item: int) -> Pose | None:
+    """Return pose number `item`, None if the body has no pose."""
     return Pose(poses.rotations[item], poses.translations[item]) if poses.is_posed else None
 
 
 def _around(target: Fraction) -> tuple[float, float]:
-    """Return doubles above and below a positive rational, the upper one infinite beyond the largest double."""
+    """Return a double above and one below a positive rational; the upper is infinite beyond the largest double."""
     try:
         value = target.numerator / target.denominator
     except OverflowError:
@@ -194,24 +195,25 @@ def _around(target: Fraction) -> tuple[float, float]:
 
 
 def spread_pair(first: Solid, second: Solid, poses: Poses, budget: Budget) -> SpreadPair:
-    """Return two bodies, each under one pose or none."""
+    """Return the pair of two bodies, each under one pose or None."""
     own, their = (STILL if at is None else in_space(at.rotation[None], at.translation[None]) for at in poses)
     return SpreadPair(first, second, own, their, budget)
 
 
 BALL: Final = Feature("ball")
 _AROUND: Final = (0, 1, 3, 2)
-"""Corners of a box of the plane in the order of its outline, numbered as those of one in space."""
+"""Corners of a box of the plane in the order of its outline, with the numbers that corners have in space."""
 
 
 def spread_of(solid: Solid) -> MeshBody:
-    """Return the triangles of a body other than a half-space; for a ball its centre."""
+    """Return the triangles of a body other than a half-space: of a ball its centre, of a planar body its edges."""
     if solid.dimension == 3 and not isinstance(solid, Sphere):
         return mesh_body_of(solid)
     return solid.prepared("spread", lambda: _built(solid))
 
 
 def _built(solid: Solid) -> MeshBody:
+    """Build the triangles without area of a planar body's edges, or of a ball's centre."""
     points, following = outline_of(solid)[:2]
     vertices = np.zeros((len(points), 3))
     vertices[:, : solid.dimension] = points
@@ -223,7 +225,9 @@ Outline = tuple[FloatArray, IntArray, float, "_Names"]
 
 
 def outline_of(solid: Solid) -> Outline:
-    """Return vertices (n, d), the end vertex of each edge, the radius, and names of vertices, then edges."""
+    """Return vertices (n, d), the end vertex of each edge, the radius, and the features of vertices, then edges;
+    cached. A ball is one vertex with a radius.
+    """
     cached: Outline | None = solid.cached("outline and names")
     return solid.prepared("outline and names", lambda: _outline(solid)) if cached is None else cached
 
@@ -236,7 +240,7 @@ def _outline(solid: Solid) -> Outline:
 
 
 class _Names(dict[int, Feature]):
-    """Names of the vertices and edges of an outline, created on first use."""
+    """Features of an outline by number: vertices, then edges; made at first use."""
 
     def __init__(self, solid: Solid, following: Sequence[int]) -> None:
         self._is_box, self._following = solid.type == "aabb", following
@@ -252,12 +256,12 @@ class _Names(dict[int, Feature]):
 
 
 def radius_of(solid: Solid) -> float:
-    """Return the radius about the triangles of a body."""
+    """Return the radius of a ball, 0.0 for other bodies: a ball is its centre as a triangle."""
     return float(solid.radius) if isinstance(solid, Sphere) else 0.0
 
 
 def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
-    """Return poses (n, d, d), (n, d) as poses of space; planar rotations are about z."""
+    """Return poses (n, d, d), (n, d) as poses of space, for kernels; planar ones rotate about z."""
     n, d = translations.shape
     if d == 3:
         return PoseArrays(read_only(rotations), read_only(translations), True)
@@ -267,7 +271,7 @@ def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
 
 
 def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Feature:
-    """Return the feature `code` of a triangle (near_triangles.py) in the caller's numbering."""
+    """Return the feature with code `code` of a triangle (near_triangles.py), in the caller's numbering."""
     if isinstance(solid, Sphere):
         return BALL
     face = int(mesh.faces[triangle])
@@ -289,7 +293,7 @@ def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Featur
 
 
 def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
-    """Return the numbers and points of the vertices of a face or edge, in order."""
+    """Return the caller's numbers and the coordinates of the vertices of a face (in the plane: an edge), in order."""
     if isinstance(solid, Mesh):
         indices = solid.face_indices[solid.face_offsets[face] : solid.face_offsets[face + 1]]
         return indices.tolist(), solid.vertices[indices].tolist()
@@ -303,5 +307,5 @@ def _ring(solid: Solid, face: int) -> tuple[list[int], list[list[float]]]:
 
 
 def named(solid: Solid, number: int) -> int:
-    """Return the vertex's number in the caller's numbering: a box of the plane counts its corners as one of space."""
+    """Return the caller's number of a vertex: a box of the plane numbers its corners as a box of space does."""
     return _AROUND[number] if solid.type == "aabb" and solid.dimension == 2 else number

@@ -35,9 +35,8 @@ from engine.types import FlagArray, Float32Array, FloatArray
 
 @inline
 def load_lane(view: View, at: int, fixed: Float32Array) -> None:
-    """Write box (6 rows) and disc (8 rows, lanes/boxes.py) of one child to the first column of `fixed`.
-
-    at: 8 * node + lane, or ROOT: then a box and a disc around the whole tree.
+    """Write box (6 rows) and disc (8 rows) of child at = 8 node + lane to column 0 of `fixed`; ROOT: around the whole
+    tree.
     """
     if at == ROOT:
         for row in range(FIXED_ROWS):
@@ -51,7 +50,7 @@ def load_lane(view: View, at: int, fixed: Float32Array) -> None:
 
 @merged
 def size_of(view: View) -> float:
-    """Return the unit of a body's tree."""
+    """Return the size of a unit of the body's tree coordinates in the scaled coordinates of the search."""
     return float(view.mesh.scale * view.unit)
 
 
@@ -59,24 +58,24 @@ DONE: Final = 0
 FULL: Final = 1
 CLOSER: Final = 2
 INTERRUPTED: Final = 3
-"""Outcomes of a search, in order: all pairs seen; no room for more; two points nearer than queried; the flag was set.
+"""Outcomes of a search: DONE, all pairs seen; FULL, no room for more pairs; CLOSER, two points nearer than the limit;
+INTERRUPTED, the flag was set.
 """
 _ABOVE_ONE: Final = 1.0 + 2.0**-22
 
 
 @merged
 def _triangle(view: View, item: int) -> Facet:
-    """Return a placed triangle, rounded, times the unit."""
+    """Return triangle ``item`` of a body, placed, rounded and scaled by the unit."""
     t, place, unit = triangle_of(view.mesh, item), view.place, view.unit
     return Facet(scaled(placed(t.p, place), unit), scaled(placed(t.q, place), unit), scaled(placed(t.r, place), unit))
 
 
 @inline
 def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, tuple[int, int]]:
-    """Return a lower and an upper bound on the distance of two triangles, and the features of nearly nearest points.
-
-    error: bound on the distance of a point from its rounded one, both bodies together. If the lower bound is above
-    `most` the features are arbitrary.
+    """Return a lower and an upper bound on the distance of two triangles, and the feature codes of nearly nearest
+    points. error: bound on the rounding of points, both bodies together. If the lower bound is above `most`, features
+    are arbitrary.
     """
     origin = s.p
     s, t = relative_to(origin, s), relative_to(origin, t)
@@ -87,9 +86,8 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
 
 @merged
 def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatArray) -> tuple[int, int]:
-    """Append the candidate pairs of triangles of two blocks; return the outcome and the number of candidates.
-
-    limits: as in `find_nearest`; the first falls.
+    """Append the candidate pairs of triangles of leaf blocks i and j; return the outcome and the number of candidates.
+    limits: as of the module; the first falls to the least upper bound.
     """
     frames, work, candidates, per_size = s.room.frames, s.room.work, s.room.candidates, _ABOVE_ONE / size_of(s.a)
     place_triangles(s.b.mesh.blocks, j, frames, work)
@@ -123,15 +121,17 @@ def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatAr
 
 
 BEYOND: Final = 4
-"""Outcome without a search: beyond `_LARGEST` sums of coordinates may overflow."""
+"""Outcome without a search: beyond `_LARGEST`, sums of coordinates may overflow."""
 ANSWERED: Final = 5
-"""Outcome with answer and points known, on the first candidate."""
+"""Outcome: the answer and the points are proven, and candidate 0 names the features."""
 _LARGEST: Final = 1e300
 
 
 class Query(NamedTuple):
-    """Goal of a search: the least distance of triangles up to `most`, or whether some is below `enough`; the radii
-    about the triangles; a bound on sums of their coordinates; whether candidates of proven answers are returned."""
+    """Goal of a search. most: distances of triangles up to it count. enough: a distance below it ends the search.
+    radius, other_radius: of balls about the triangles. reach: bound on sums of coordinates. is_answered: return
+    candidates of proven answers too.
+    """
 
     most: float
     enough: float
@@ -143,6 +143,7 @@ class Query(NamedTuple):
 
 @inline
 def push(heap: Heap, n: int, bound: float, i: int, j: int) -> None:
+    """Insert a pair of boxes (i, j) with its bound into the heap of n entries."""
     bounds, lanes = heap.bounds, heap.lanes
     while n > 0 and bounds[(n - 1) >> 1] > bound:  # bound: the height of the heap
         bounds[n], lanes[n, 0], lanes[n, 1] = bounds[(n - 1) >> 1], lanes[(n - 1) >> 1, 0], lanes[(n - 1) >> 1, 1]
@@ -152,7 +153,7 @@ def push(heap: Heap, n: int, bound: float, i: int, j: int) -> None:
 
 @inline
 def drop_first(heap: Heap, n: int) -> None:
-    """Remove the first of n entries of the heap; the last one moves down from there."""
+    """Remove the first of the heap's n entries."""
     bounds, lanes = heap.bounds, heap.lanes
     last, i, j = bounds[n - 1], lanes[n - 1, 0], lanes[n - 1, 1]
     place = 0
@@ -169,9 +170,9 @@ def drop_first(heap: Heap, n: int) -> None:
 
 @merged
 def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
-    """Push the pairs of one box with the children of a node of the other body; return the size of the heap.
-
-    pair: the node, the lane of the other body, and whether the node is the first body's.
+    """Push the pairs of one box with each child of a node of the other body; return the size of the heap. pair: the
+    node, the child (8 node + lane, or ROOT) of the other body, whether the node is the first body's. most: pairs with a
+    greater bound are dropped.
     """
     node, other, is_first = pair
     view, fixed, own = (s.a, s.b, 0) if is_first else (s.b, s.a, 1)
@@ -191,14 +192,14 @@ def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
 
 @merged
 def _half_of(view: View, at: int) -> float:
-    """Return the largest half width of a box in a lane."""
+    """Return the largest half width of the box of child at = 8 node + lane, in tree coordinates."""
     node, lane, b = at >> 3, at & 7, view.mesh.boxes
     return 2.0 if at == ROOT else float(max(b[node, 3, lane], b[node, 4, lane], b[node, 5, lane]))
 
 
 @inline
 def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
-    """Fill the candidates; return the outcome and their number. See `find_nearest`."""
+    """Fill the candidates by a best-first search; return the outcome and their number. limits: as of the module."""
     first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
     n, n_candidates = 1, 0
     s.room.heap.bounds[0], s.room.heap.lanes[0, 0], s.room.heap.lanes[0, 1] = 0.0, ROOT, ROOT
@@ -228,7 +229,8 @@ def find_nearest(
     first: MeshArrays, first_poses: PoseArrays, second: MeshArrays, second_poses: PoseArrays, span: tuple[int, int],
     query: Query, answers: FloatArray, room: Room, flag: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Fill the NaN entries of answers (n,) for the poses span[0] to span[1] of both bodies, or one of the first.
+    """Fill the NaN entries of answers (n,) for poses span[0] .. span[1] - 1 of both bodies; the first may have one
+    pose.
 
     Returns the first pose left open, the outcome of its search, and the number of candidates in `room.candidates`;
     span[1] if none is left. An answer is the double nearest to the distance; with a limit 0.0 for a pose that is

@@ -25,11 +25,11 @@ from engine.types import FloatArray, IntArray
 LARGEST: Final = 2.0**200
 """Largest coordinate for which the bounds are valid."""
 _SHORTEST: Final = 2.0**-400
-"""Least length of an edge, and least factor of exact products."""
+"""Smallest length of an edge, and smallest factor of exact products."""
 
 
 class Wide2(NamedTuple):
-    """A point or vector of the plane."""
+    """A point or vector of the plane in double-doubles."""
 
     x: Wide
     y: Wide
@@ -48,13 +48,13 @@ Placed = namedtuple("Placed", "points following boxes error reach")
 """
 
 VertexEdge = namedtuple("VertexEdge", "distance bound is_first first second face their_face")
-"""Distance of a vertex and an edge, with its error bound.
+"""Distance of a vertex of one outline and an edge of another, with its error bound.
 
 | field | meaning |
 |---|---|
 | is_first | whether the vertex is the first body's |
 | first, second | vertex, or number of vertices + edge, of both bodies |
-| face, their_face | the least edges that these lie on |
+| face, their_face | the lowest edges that these lie on |
 """
 
 
@@ -62,9 +62,8 @@ VertexEdge = namedtuple("VertexEdge", "distance bound is_first first second face
 def place(
     vertices: FloatArray, following: IntArray, turn: FloatArray, move: FloatArray, points: FloatArray, boxes: FloatArray
 ) -> tuple[float, float]:
-    """Write the points and boxes of an outline under a pose; return the last two fields of `Placed`.
-
-    Each sum of three is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles unchanged.
+    """Write the points and boxes of an outline under a pose; return `error` and `reach` of `Placed`. Each sum of three
+    is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles unchanged.
     """
     reach, is_given = 0.0, True
     for k in range(2):
@@ -86,7 +85,7 @@ def place(
 
 @inline
 def _reach(points: FloatArray, following: IntArray, boxes: FloatArray, reach: float) -> float:
-    """Write the boxes of placed points; return the last field of `Placed`; reach: bound on the terms of coordinates."""
+    """Write the boxes of placed points; return `reach` of `Placed`. reach: bound on the terms of coordinates."""
     box_blocks(points, following, boxes)
     for block in range(len(boxes)):
         for k in range(4):
@@ -101,33 +100,37 @@ def _reach(points: FloatArray, following: IntArray, boxes: FloatArray, reach: fl
 
 @inline
 def point(points: FloatArray, vertex: int) -> Wide2:
+    """Return vertex `vertex` of placed points (n, 4) in double-doubles."""
     return Wide2(Wide(points[vertex, 0], points[vertex, 2]), Wide(points[vertex, 1], points[vertex, 3]))
 
 
 @inline
 def minus2(a: Wide2, b: Wide2) -> Wide2:
+    """Return the vector a - b in double-doubles."""
     return Wide2(less(a.x, b.x), less(a.y, b.y))
 
 
 @inline
 def size2(a: Wide2) -> float:
+    """Return the larger magnitude of two coordinates."""
     return max(abs(a.x.h), abs(a.y.h))
 
 
 @inline
 def _magnitude(a: Wide) -> Wide:
+    """Return the absolute value of a double-double."""
     return a if a.h > 0.0 else Wide(-a.h, -a.low)
 
 
 @inline
 def _is_whole(a: Wide) -> bool:
-    """Return whether a number is a double that can be a factor of an exact product."""
+    """Return whether a double-double is one double that may be a factor of an exact product."""
     return a.low == 0.0 and (a.h == 0.0 or abs(a.h) > _SHORTEST)
 
 
 @inline
 def _cross(u: Wide2, w: Wide2) -> Wide:
-    """Return u.x w.y - u.y w.x; order: the products of the high parts first, which may cancel."""
+    """Return u.x w.y - u.y w.x in double-double. order: the products of the high parts first, which may cancel."""
     total = less(product(u.x.h, w.y.h), product(u.y.h, w.x.h))
     total = plus(total, less(product(u.x.h, w.y.low), product(u.y.h, w.x.low)))
     total = plus(total, less(product(u.x.low, w.y.h), product(u.y.low, w.x.h)))
@@ -136,12 +139,13 @@ def _cross(u: Wide2, w: Wide2) -> Wide:
 
 @inline
 def _dot(u: Wide2, w: Wide2) -> Wide:
+    """Return the scalar product of u and w in double-double."""
     return _cross(u, Wide2(Wide(-w.y.h, -w.y.low), w.x))
 
 
 @inline
 def _along(u: Wide2, w: Wide2, error: float) -> tuple[float, float]:
-    """Return dot(u, w) and a bound on its error, 0.0 if its sign is proven."""
+    """Return dot(u, w) in floats and a bound on its error, 0.0 if its sign is proven; error: of coordinates."""
     reach = max(size2(u), size2(w))
     value, slack = u.x.h * w.x.h + u.y.h * w.y.h, 2.0**-48 * size2(u) * size2(w) + 16.0 * error * reach + 2.0**-1000
     if abs(value) > slack:
@@ -154,22 +158,21 @@ def _along(u: Wide2, w: Wide2, error: float) -> tuple[float, float]:
 
 @inline
 def _along_axis(u: Wide2, w: Wide2) -> float:
-    """Return a number with the sign of dot(u, w), for u along an axis."""
+    """Return a number with the sign of dot(u, w), for a vector u parallel to an axis."""
     x, way = (w.y.h, u.y.h) if u.x.h == 0.0 else (w.x.h, u.x.h)
     return x if way > 0.0 else -x
 
 
 @inline
 def _is_level(u: Wide2, error: float) -> bool:
+    """Return whether u is exact and parallel to an axis."""
     return error == 0.0 and (u.x.h == 0.0 or u.y.h == 0.0)
 
 
 @called
 def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, int]:
-    """Return the first two fields of `VertexEdge`, and the position of p's foot on an edge: start 0, end 1, between 2,
-    unproven -1.
-
-    error: of the coordinates of both bodies together.
+    """Return the distance of p from segment ab, its error bound, and where p's foot lies: 0 at a, 1 at b, 2 between, -1
+    unproven. error: of the coordinates of both bodies together.
     """
     u, w, v = minus2(b, a), minus2(p, a), minus2(b, p)
     is_level = _is_level(u, error)
@@ -195,7 +198,9 @@ def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, in
 
 @inline
 def foot_of(own: Placed, other: Placed, vertex: int, feature: int) -> tuple[Wide2, float]:
-    """Return the point of `other` nearest to a vertex, on a proven feature, and its error."""
+    """Return the point of `other` nearest to a vertex, on a feature known to contain it, and the point's error bound.
+    feature: a vertex, or number of vertices + edge.
+    """
     n, p, error = len(other.following), point(own.points, vertex), own.error + other.error
     if feature < n:
         return point(other.points, feature), other.error

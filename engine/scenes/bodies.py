@@ -37,14 +37,12 @@ from engine.solids.registry import own_box, row_of
 from engine.types import FloatArray, IntArray, read_only
 
 _LISTED: Final = 4
-"""Up to this number of bodies there is no tree: testing all boxes is faster than building one."""
+"""Largest number of bodies without a tree: testing all boxes is faster than building one."""
 
 
 class Bodies(Preparing):
-    """Checked solids with a pose or None each; safe to share between threads.
-
-    whole, owners: the bodies of which these are a subset, which share what does not depend on poses, and the solid of
-    each.
+    """Checked solids with a pose or None each, and their cached structures; safe to share between threads. whole: the
+    bodies of which these are a subset; both share what does not depend on poses. owners: the solid of each.
     """
 
     def __init__(
@@ -55,14 +53,14 @@ class Bodies(Preparing):
         self._lock = threading.RLock()
 
     def arrays(self, budget: Budget) -> SceneBodies:
-        """Return the bodies as arrays, at least one."""
+        """Return the bodies as flat arrays; caller guarantees at least one body."""
         return self.prepared("arrays", lambda: self._as_arrays(budget), budget.check)
 
     def _as_arrays(self, budget: Budget) -> SceneBodies:
         return bodies_of(self.solids, self.poses, *distinct_of(self.solids), budget.check)
 
     def tree(self, budget: Budget) -> BodyTree:
-        """Return the tree over the boxes of the bodies, at least one."""
+        """Return the tree over the boxes of the bodies; caller guarantees at least one body."""
         return self.prepared("tree", lambda: self._as_tree(budget), budget.check)
 
     def _as_tree(self, budget: Budget) -> BodyTree:
@@ -74,7 +72,9 @@ class Bodies(Preparing):
     def _place_odd(
         self, names: IntArray, poses: Sequence[Pose | None], low: FloatArray, high: FloatArray, budget: Budget
     ) -> None:
-        """Set the boxes of each csg among some bodies, combined from its operands' boxes under the pose."""
+        """Set the boxes low, high of the CSG trees among bodies ``names``, combined from their operands' boxes under
+        the poses.
+        """
         arrays = self.arrays(budget)
         odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, Csg)])
         for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
@@ -84,7 +84,9 @@ class Bodies(Preparing):
     def under(
         self, names: IntArray, poses: Sequence[Pose | None], budget: Budget
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return rotations (m, d, d), translations and boxes (low, high) of some bodies under other poses."""
+        """Return rotations (m, d, d), translations (m, d), and low and high of the boxes of bodies ``names`` under
+        other poses.
+        """
         arrays, m, d = self.arrays(budget), len(names), self.solids[0].dimension
         turns, moves = motions_of(poses, d)
         low, high, rows = np.empty((m, d)), np.empty((m, d)), np.arange(m)
@@ -95,7 +97,7 @@ class Bodies(Preparing):
         return turns, moves, low, high
 
     def locator(self, body: int) -> Locator:
-        """Return the point locator of a body."""
+        """Return the point locator of a body under its pose."""
 
         def make() -> Locator:
             try:
@@ -107,7 +109,7 @@ class Bodies(Preparing):
         return self.prepared(f"locator {body}", make)
 
     def solid_tables(self, budget: Budget) -> Tables:
-        """Return the location tables of the solids. Raises: UnsupportedSolidError."""
+        """Return the location tables of the distinct solids. Raises: UnsupportedSolidError."""
 
         def build() -> Tables:
             arrays = self.arrays(budget)
@@ -116,7 +118,7 @@ class Bodies(Preparing):
         return self.prepared("solid_tables", build, budget.check)
 
     def tables(self, budget: Budget) -> LocateTables:
-        """Return the location tables of the bodies, at least one."""
+        """Return the location tables of the bodies under their poses; caller guarantees at least one body."""
         kinds = (self._whole or self).solid_tables(budget)
         owners = self.arrays(budget).kinds if self._whole is None else self._owners
         return self.prepared("tables", lambda: kinds.placed(owners, self.poses), budget.check)
@@ -135,7 +137,7 @@ class Bodies(Preparing):
 
     @property
     def is_exact(self) -> bool:
-        """Whether no callable decides a location."""
+        """False if a caller's function decides whether a point lies in some body."""
 
         def find() -> bool:
             solids = {id(solid): solid for solid in self.solids if isinstance(solid, (Csg, Implicit))}.values()
@@ -144,7 +146,7 @@ class Bodies(Preparing):
         return self.prepared("is_exact", find)
 
     def batches(self, budget: Budget) -> SceneBatches:
-        """Return the batches that relate pairs. Raises: as `collide_scene` for an unsupported body."""
+        """Return the batches that relate pairs of bodies. Raises: as `collide_scene` for an unsupported body."""
 
         def build() -> SceneBatches:
             check_collidable(self.solids)
@@ -158,13 +160,15 @@ class Bodies(Preparing):
         return self.prepared("table", lambda: Table(self.solids, self.poses, like), budget.check)
 
     def words(self, budget: Budget) -> tuple[list[int], Any]:
-        """Return the row of numbers that kernels for segments read of all bodies (`words_of`)."""
+        """Return the integers from which segment kernels read all bodies, and the arrays that their addresses refer to.
+        As of `words_of`.
+        """
         return self.prepared(
             "words", lambda: words_of(self.tree(budget), NOBODY, self.table(budget).rows), budget.check
         )
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
-        """Prepare the kernel inputs named by `wanted` for one body."""
+        """Build the kernel input `wanted` (WANTS_BODY, WANTS_TREE) for one body."""
         table = self.table(budget)
         with self._lock:
             table.prepare(body, wanted)
@@ -175,8 +179,7 @@ class Bodies(Preparing):
 
 
 def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray, FloatArray]:
-    """Return low, high (dim,) around a body; infinite for one that may be unbounded (half-spaces and the like).
-
+    """Return low, high (dim,) of a box around a posed body, rounded outward; infinite if the body may be unbounded.
     check: as for `Solid.prepared`.
     """
     if isinstance(solid, Csg):
@@ -195,7 +198,7 @@ def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray,
 
 
 def _csg_box(operation: str, boxes: list[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """Return the box of a Boolean tree; an empty intersection has an inverted box."""
+    """Return the box of a CSG operation from its operands' boxes; an empty intersection has an inverted box."""
     lows, highs = (np.array(sides) for sides in zip(*(boxes[:1] if operation == "difference" else boxes)))
     if operation == "union":
         return lows.min(axis=0), highs.max(axis=0)
@@ -207,9 +210,8 @@ _AS_GIVEN: Final = read_only(np.arange(_MANY))
 
 
 def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
-    """Return the tree over bodies by their boxes (n, dimension).
-
-    No tree is built for up to most_listed bodies, nor for bodies so near each other that 1 / scale is not finite.
+    """Return the tree over bodies with boxes low, high (n, dimension). Up to most_listed bodies are listed without a
+    tree, and so are bodies so near each other that 1 / scale is not finite.
     """
     n, dimension = low.shape
     every = BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
@@ -235,13 +237,14 @@ _NO_NUMBERS: Final = read_only(np.array([1.0, 0.0, 0.0, 0.0]))
 _ADDRESSES: Final[dict[int, int]] = {
     id(array): array.__array_interface__["data"][0] for array in (NOBODY, _NO_TREE.boxes, _NO_TREE.child, _NO_NUMBERS)
 }
-"""Cached addresses of long-lived arrays, by id: reading the address from an array takes a microsecond."""
+"""Addresses of long-lived arrays, by id: reading an address from an array takes a microsecond."""
 NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.0, NOBODY, NOBODY) for d in (2, 3)}
 
 
 def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[int], Any]:
-    """Return the row of numbers that encodes a `BodyTree` and the rows of a `Table`, and the arrays whose addresses it
-    contains."""
+    """Return a row of integers that encodes a `BodyTree` (columns of near_boxes.py), and the arrays whose addresses it
+    has. names: indices of the bodies in the scene; placed: rows of their `Table`.
+    """
     tree = bodies.tree
     numbers = _NO_NUMBERS if tree is _NO_TREE else np.array([bodies.inverse, *tree.origin.tolist()])
     read = bodies.low, bodies.high, tree.boxes, tree.child, bodies.bounded, bodies.listed, numbers, names, placed
@@ -250,12 +253,14 @@ def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[
 
 
 def _address(array: Any) -> int:
+    """Return the address of an array's data."""
     return int(array.__array_interface__["data"][0])
 
 
 def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
-    """Return an order of segments in which neighbours at t follow each other, if there are many: their data stays in
-    the cache."""
+    """Return an order of segments in which neighbours at parameter t follow each other, for the cache; for few, as
+    given.
+    """
     n = len(segments)
     if n < _MANY:
         return _AS_GIVEN[:n]

@@ -32,38 +32,40 @@ from engine.solids.pose import Pose
 from engine.types import OPEN, UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray, read_only
 
 _BYTES: Final = 400
-"""Memory of a piece: in its part, concatenated and sorted."""
+"""Memory counted for a piece: in its part, concatenated and sorted."""
 _FEW: Final = 1024
-"""Size of a small batch of segments, the first chunk of `run_chunks`."""
+"""Most segments of a small batch, and the size of the first chunk of `run_chunks`."""
 _CACHED_PIECES: Final = 16
 _LEFT: Final = 16
-"""Initial room for open pairs, besides one for each segment."""
+"""Initial room for pairs that kernels leave open, besides one for each segment."""
 _MOST_IN_GROUP: Final = 1 << 13
 """Most segments clipped to one body in one task."""
 
 
 class Counts:
-    """Which segments the kernels left open, and which took rational arithmetic."""
+    """By segment, whether the kernels left it open, and whether rational arithmetic decided it."""
 
     def __init__(self, n: int) -> None:
         self.is_beyond, self.is_rational = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
 
     def take(self, items: IntArray, counts: Counts) -> None:
-        """Add the counts of some segments, all of which a search left open."""
+        """Add the counts of a subset: segments ``items``, all of which a search left open."""
         self.is_beyond[items], self.is_rational[items] = True, counts.is_rational
 
 
 def clip_all(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None
 ) -> ScenePieces:
-    """Return all pieces of segments (n, 2, dim)."""
+    """Return all pieces of segments (n, 2, dim) within the bodies of a scene, sorted."""
     parts = _parts(segments, scene, counts, budget, workers)
     pieces = merge_parts(parts, segments.shape[2])
     return sort_pieces(pieces, len(segments), lambda: _exact_ends(segments, scene, budget), budget)
 
 
 def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exact:
-    """Return a function that gives the exact parameters of a piece; caches the last bodies."""
+    """Return a function that gives the exact parameters of both ends of a piece; it caches the pieces of the last
+    bodies.
+    """
 
     @lru_cache(_CACHED_PIECES)
     def pieces(source: int, body: int) -> list[ExactPiece]:
@@ -75,11 +77,9 @@ def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exac
 
 
 def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces | BoolArray | None:
-    """Fast path of `Scene.clip_segments` for a small batch, not yet checked for NaN; takes half the time of the general
-    path.
-
-    None if the caller must use the general path: nothing of the scene is cached yet, or numbers are out of the kernels'
-    range.
+    """Clip a small batch of segments without the overhead of the general path; return None if the general path must be
+    used. That is: a structure of the scene is still to be built, numbers are out of the kernels' range (NaN is), or
+    `keep` is invalid.
     """
     solids = scene.base.solids
     if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) <= _FEW:
@@ -110,10 +110,8 @@ def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces
 def clip_first(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> ScenePieces:
-    """Return the first piece of each segment that meets a body; of pieces that begin at one point, that of the first
-    body.
-
-    searched: result of `_first_hits`, if known.
+    """Return the first piece of each segment that meets a body; of pieces that begin in one point, that of the lowest
+    body. searched: the result of `_first_hits`, if computed already.
     """
     state, out = searched or _first_hits(segments, scene, False, budget, workers)
     left, sure = np.flatnonzero(state == OPEN), ScenePieces(*out)
@@ -133,7 +131,7 @@ def clip_first(
 def meets_any(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> BoolArray:
-    """Return for each segment whether it meets a body; searched: result of `_first_hits`, if known."""
+    """Return for each segment whether it meets a body. searched: the result of `_first_hits`, if computed already."""
     state, _ = searched or _first_hits(segments, scene, True, budget, workers)
     meets: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)
@@ -147,7 +145,9 @@ def meets_any(
 def _first_hits(
     segments: FloatArray, scene: Placements, is_any: bool, budget: Budget, workers: int | None
 ) -> tuple[FlagArray, Any]:
-    """Return the state of each segment and, unless `is_any`, the first pieces of those that are MET."""
+    """Return the state (MET, OPEN, SETTLED) of each segment and, unless `is_any`, the first pieces of those that are
+    MET.
+    """
     n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget))
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
@@ -167,7 +167,7 @@ def _first_hits(
 
 
 def _firsts_for(n: int, dimension: int) -> Firsts:
-    """Return room for the first piece of n segments."""
+    """Allocate room for the first piece of n segments."""
     ends, pairs = (n, dimension), (n, 2)
     owners, points = (np.empty(n, np.int64), np.empty(n, np.int64)), (np.empty(ends), np.empty(ends))
     return Firsts(*owners, *points, np.empty(pairs), np.empty(pairs, np.int64), np.empty(pairs, np.int64))
@@ -175,13 +175,13 @@ def _firsts_for(n: int, dimension: int) -> Firsts:
 
 _NONE: Final = _firsts_for(0, 3)
 _IN_ROWS: Final = read_only(np.array([0, 0, 0, 0, 0, 1]))
-"""Counters of `find_first` for a small batch."""
+"""Initial counters of `find_first` for a small batch."""
 
 
 def _parts(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None
 ) -> list[LoosePieces]:
-    """Return the pieces of segments within all bodies, unordered."""
+    """Return the pieces of segments within all bodies, unsorted."""
     n, parts, left = len(segments), dict[int, list[LoosePieces]](), dict[int, list[IntArray]]()
     order = order_of(segments, 0.5, scene.where(budget))
 
@@ -201,8 +201,9 @@ def _parts(
 def _cut_near(
     segments: FloatArray, order: IntArray, first: int, last: int, scene: Placements, budget: Budget
 ) -> tuple[list[LoosePieces], list[IntArray], bool]:
-    """Return the pieces of some segments within the bodies near them, the open pairs (k, 2), and whether all numbers
-    are in the kernels' range (NaN is not)."""
+    """Return the pieces of segments order[first:last], the pairs (segment, body) that kernels leave open, and a flag.
+    Flag: all numbers are in the kernels' range (NaN is not).
+    """
     parts, left, n = list[LoosePieces](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
     words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(scene.n_rows)
@@ -227,7 +228,7 @@ def _cut(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, owners: IntArray,
     bodies: IntArray,
 ) -> list[LoosePieces]:  # fmt: skip
-    """Return the pieces of the pairs of a segment and a body that the kernels left open, body by body."""
+    """Return the pieces of open pairs, segment owners[i] and body bodies[i], body by body in exact arithmetic."""
     bodies = scene.names_of(bodies)
     order = np.argsort(bodies, kind="stable")
     owners, bodies = owners[order], bodies[order]
@@ -259,8 +260,10 @@ def _cut(
 
 
 def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
-    """Return the pieces of segments (n, 2, dim) within a placed solid, sorted by source and t, which segments took
-    rational arithmetic (all, if some did and it is unknown which), and whether the others come from boundary_cut.py."""
+    """Return the pieces of segments (n, 2, dim) within one placed solid, sorted by source and t; indices of the
+    segments that took rational arithmetic; and a flag. All indices if it is unknown which. Flag: the other pieces come
+    from boundary_cut.py.
+    """
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)

@@ -37,7 +37,7 @@ from engine.solids.pose import Pose
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
 
 _FEW_PAIRS: Final = 8
-"""Up to this number, deciding pairs one by one is faster than filling arrays."""
+"""Largest number of pairs decided one by one, which is faster than filling arrays for so few."""
 _BYTES: Final = 64
 _BYTES_OF_WITNESS: Final = 150
 """Memory of a colliding pair with witness: in its block, concatenated, and sorted."""
@@ -177,7 +177,7 @@ class PairQuery(NamedTuple):
 def collide_bodies(
     batches: SceneBatches, query: PairQuery, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ScenePairs, Accuracy]:
-    """Return the colliding pairs of a prepared scene."""
+    """Return the colliding pairs of a prepared scene, and the accuracy report."""
     bodies, (skip, only, gap, witnesses, boolean, detail) = batches.bodies, query
     boolean, detail = bool(boolean), bool(detail)  # what is not a bool would compile kernels of its own
     if detail:
@@ -216,7 +216,7 @@ def collide_bodies(
 def _settle(
     bodies: SceneBodies, pairs: IntArray, answers: Answers, workers: int | None, progress: Progress | None
 ) -> None:
-    """Settle the pairs of a block that the batches left open, one by one, in parallel chunks."""
+    """Decide the pairs of a block that the batches left UNSETTLED, one by one, in parallel chunks."""
     left = answers.left()
     if progress is not None and len(left) < len(pairs):
         progress(len(pairs) - len(left))
@@ -234,7 +234,7 @@ def _settle(
 def _measure_gaps(
     batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, workers: int | None
 ) -> FloatArray:
-    """Return the distances of the pairs of a block, 0 if they meet, infinite if not below the gap."""
+    """Return the distance of each pair of a block: 0 if they meet, infinite if not below the gap."""
     distances, disjoint = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
     is_measured = not answers.boolean
     distances[disjoint] = distances_below(batches, pairs[disjoint], gap, is_measured, answers.budget, workers)
@@ -242,7 +242,7 @@ def _measure_gaps(
 
 
 def _select_pairs(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:
-    """Return the pairs of a block that collide or are nearer than the gap."""
+    """Return the pairs of a block that collide or are nearer than the gap; near: the distances, None without a gap."""
     meet = answers.relations != Relation.DISJOINT
     if answers.boolean:
         answers.relations[meet] = Relation.TOUCHING
@@ -268,7 +268,7 @@ def _concatenate(parts: list[ScenePairs]) -> ScenePairs:
 
 
 def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> BoolArray:
-    """Return for pairs of bodies whether both have an interior."""
+    """Return, for each pair, whether both bodies have an interior."""
     kinds, places = np.unique(bodies.kinds[pairs], return_inverse=True)
     solid = np.array([has_interior(bodies.distinct[kind], budget) for kind in kinds.tolist()], np.bool_)
     first, second = places.reshape(-1, 2).T
@@ -278,8 +278,9 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
 def _candidates(
     bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
 ) -> Iterator[IntArray]:
-    """Yield sorted blocks of pairs whose boxes intersect, restricted to wanted and without skipped keys; low: moved
-    outward."""
+    """Yield sorted blocks of pairs whose boxes intersect. low: corners of the boxes, moved outward by the gap. wanted,
+    skipped: keys first * n + second to which pairs are restricted, and that are left out; None for no restriction.
+    """
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
@@ -289,7 +290,7 @@ def _candidates(
 
 
 def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntArray]:
-    """Yield blocks of the pairs of given keys whose boxes intersect."""
+    """Yield blocks of those pairs, among the given keys first * n + second, whose boxes intersect."""
     for start in range(0, len(keys), BLOCK):
         first, second = np.divmod(keys[start : start + BLOCK], len(low))
         meet = (first < second) & ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
@@ -297,6 +298,9 @@ def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntA
 
 
 def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
+    """Return the keys first * n_bodies + second, first < second, of the caller's pairs. Raises if `named` is no such
+    array.
+    """
     try:
         array = np.asarray(named)
     except ValueError:
@@ -318,7 +322,8 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
 
 
 _STRETCHED: Final = 1.0 + 2.0**-38
-"""Factor by which a pose may stretch: no entry of R' R - I exceeds 1e-12; boxes have equal poses that `collide` drops.
+"""Bound on the factor by which a pose may stretch: no entry of R' R - I exceeds 1e-12. Boxes have equal poses that
+`collide` drops.
 """
 
 
@@ -326,16 +331,17 @@ _NONE: Final = pool_bodies([])
 
 
 def enlarged(bodies: SceneBodies, gap: float | None) -> FloatArray:
-    """Return the low corners (n, d) moved outward by the gap: the boxes of bodies nearer than that intersect."""
+    """Return the low corners (n, d) of the boxes moved outward by the gap, so that boxes of bodies nearer than that
+    intersect.
+    """
     return bodies.low if gap is None else np.nextafter(bodies.low - gap * _STRETCHED, -np.inf)
 
 
 def distances_below(
     batches: SceneBatches, pairs: IntArray, gap: float, is_measured: bool, budget: Budget, workers: int | None
 ) -> FloatArray:
-    """Return ``(n,)`` distances of disjoint pairs that are nearer than the gap, infinite for others.
-
-    is_measured: if False, pairs nearer than the gap get 0.0 instead.
+    """Return the distances (n,) of disjoint pairs nearer than the gap, infinite for others; exact. is_measured: if
+    False, pairs nearer than the gap get 0.0 instead.
     """
     bodies, distances = batches.bodies, np.full(len(pairs), np.inf)
     if not gap:
@@ -377,7 +383,7 @@ def distances_below(
 def _distances_of_group(
     bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
 ) -> FloatArray:
-    """Return `distances_below` for pairs of the same two solids, under the poses of some rows."""
+    """Return as `distances_below` for pairs of the same two solids; places (n, 2): the rows of their poses."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
     distances = np.full(len(pairs), np.nan)
     if has_plane(first, second):

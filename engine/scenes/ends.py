@@ -51,14 +51,14 @@ class ScenePieces(Columns):
 
 
 class LoosePieces(NamedTuple):
-    """Unsorted pieces; those of one segment in one body are in order.
+    """Pieces of segments, unsorted, but those of one segment in one body in order.
 
     | field | shape | meaning |
     |---|---|---|
-    | source, body | (m,) | |
-    | are_long | (m,) | 1 if longer than a point, 0 if not; UNDECIDED perhaps, if both ends round alike |
-    | ends | (2, m, dim) | |
-    | t, faces | (m, 2) | |
+    | source, body | (m,) | the segment, the body |
+    | are_long | (m,) | 1 if longer than a point, 0 if not; UNDECIDED possible if both ends round alike |
+    | ends | (2, m, dim) | first and last points |
+    | t, faces | (m, 2) | parameters and faces of both ends |
     """
 
     source: Any
@@ -70,11 +70,11 @@ class LoosePieces(NamedTuple):
 
 
 Exact = Callable[[int, int, int], tuple[Parameter, Parameter]]
-"""Function from source, body and number of a piece among theirs to its exact parameters."""
+"""Function of source, body and index of a piece among those of both: returns its exact parameters."""
 
 
 def merge_parts(parts: list[LoosePieces], dimension: int) -> LoosePieces:
-    """Return all pieces, unordered."""
+    """Return the pieces of all parts, concatenated."""
     if len(parts) == 1:
         return parts[0]
     none = np.empty(0, np.int64)
@@ -86,7 +86,7 @@ def merge_parts(parts: list[LoosePieces], dimension: int) -> LoosePieces:
 
 
 def take_pieces(pieces: LoosePieces, rows: IntArray) -> LoosePieces:
-    """Return the pieces of some rows."""
+    """Return the pieces with indices ``rows``."""
     source, body, are_long, ends, t, faces = pieces
     return LoosePieces(source[rows], body[rows], are_long[rows], ends[:, rows], t[rows], faces[rows])
 
@@ -94,7 +94,7 @@ def take_pieces(pieces: LoosePieces, rows: IntArray) -> LoosePieces:
 def sort_pieces(
     pieces: LoosePieces, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED
 ) -> ScenePieces:
-    """Return pieces in the exact order of their starts; those of one source and body are in order already."""
+    """Return pieces sorted by segment and exact start; caller guarantees those of one segment and body in order."""
     m = len(pieces.source)
     numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, pieces.ends.shape[2]))
     out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)
@@ -112,7 +112,8 @@ def sort_pieces(
 
 
 def _sort_exactly(pieces: LoosePieces, exact: Exact) -> tuple[Any, ...]:
-    """Return the arrays of `ScenePieces` for segments with ends, 2 * piece + side, that round alike."""
+    """Return the arrays of `ScenePieces` for pieces of segments on which ends round alike, sorted by exact parameters.
+    """
     pieces, ranks = (
         take_pieces(pieces, np.lexsort((pieces.body, pieces.source))),
         np.empty((len(pieces.source), 2), np.int64),
@@ -121,6 +122,7 @@ def _sort_exactly(pieces: LoosePieces, exact: Exact) -> tuple[Any, ...]:
     numbers = [0] * len(sources)  # of a piece among those of its source and body
 
     def value(end: int) -> Parameter:
+        """Return the exact parameter of an end, 2 * piece + side."""
         piece, side = divmod(end, 2)
         is_own = faces[piece][side] < 0
         return (ZERO, ONE)[side] if is_own else exact(sources[piece], bodies[piece], numbers[piece])[side]
@@ -198,7 +200,7 @@ def sort_rounded(
 
 @inline
 def _sort_ends(order: IntArray, first: int, last: int, body: IntArray, t: FloatArray) -> None:
-    """Sort ends, 2 * piece + side, by parameter, body and piece."""
+    """Sort order[first:last], ends coded as 2 * piece + side, by parameter, body and piece."""
     gap = (last - first) // 2
     while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
         for i in range(first + gap, last):

@@ -29,15 +29,16 @@ from engine.solids.registry import BodyKind
 from engine.types import UNDECIDED, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 _BYTES: Final = 72
-"""Memory of a candidate: its key in its part and with the others, sorted; its point, body and location."""
+"""Memory counted for a candidate: its key, twice; its point, body and location."""
 _MOST_SORTED: Final = 32
-"""Number of candidates of a point up to which their keys are sorted by insertion."""
+"""Most candidates of a point whose keys are sorted by insertion."""
 _FEW_POINTS, _FEW_BODIES, _FEW_VERTICES = 32, 16, 1000
-"""Limits of a small batch, in points, bodies, and vertices of a body; it is located body by body on first use."""
+"""Limits of a small batch in points, in bodies, and in vertices of a body; it is located body by body, without tables.
+"""
 _MOST_IN_GROUP: Final = 1 << 14
-"""Most points that one body locates in one task."""
+"""Most points located in one body in one task."""
 _FEWEST_FOR_TREES: Final = 64
-"""Number of points from which a tree is built; fewer are located as a small batch of `locate`."""
+"""Smallest number of points for which a polyhedron's tree is built."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -78,11 +79,11 @@ def locate_near(
     points: FloatArray, first: int, last: int, where: Where, tables: LocateTables, room: IntArray, keys: IntArray,
     query_counts: IntArray, flag: FlagArray,
 ) -> Any:  # fmt: skip
-    """Write the bodies that contain points (n, dim) first ... last, or may, as far as there is room.
+    """Write the bodies that contain points first .. last - 1 of (n, dim), or may, as keys, until there is no more room.
 
-    keys (room,): 4 (point n_bodies + body) + location, UNDECIDED possible, ascending. query_counts (n_meshes,): number
-    of points for which each mesh is a candidate. Returns the numbers of points done, of keys, of those that took more
-    than a filter, and whether the keys ascend.
+    keys (room,): 4 (point n_bodies + body) + location, ascending; UNDECIDED is possible. query_counts (n_meshes,):
+    number of points for which each mesh is a candidate. Returns the numbers of points done, of keys, of locations that
+    took more than a filter, and whether the keys ascend.
     """
     scratch, n, is_flat, is_sorted = scratch_at(room), where.together.low.shape[0], points.shape[1] == 2, True
     n_keys, n_beyond, done = 0, 0, first
@@ -119,7 +120,7 @@ def locate_pairs(
     points: FloatArray, owners: IntArray, bodies: IntArray, tables: LocateTables, room: IntArray, located: Int8Array,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill located (n,) int8 for pairs of a point and a body that its tables decide, UNDECIDED for others."""
+    """Fill located (n,) int8 for pairs of point owners[i] and body bodies[i]; UNDECIDED if the tables do not decide."""
     scratch, is_flat = scratch_at(room), points.shape[1] == 2
     for pair in range(owners.size):
         if flag[0]:
@@ -131,7 +132,7 @@ def locate_pairs(
 def locate_all(
     points: FloatArray, scene: Placements, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
-    """Return the bodies that contain each of some checked points."""
+    """Return the bodies that contain each of some checked points, and the accuracy report."""
     budget.check()
     n, n_bodies, parts = len(points), len(scene.base.solids), dict[int, IntArray]()
     if not n_bodies:
@@ -181,7 +182,7 @@ def locate_all(
 def _locate_small_batch(
     points: FloatArray, scene: Placements, budget: Budget, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
-    """Fast path for small batches before a tree exists: locates all points body by body."""
+    """Locate a small batch of points body by body, without a tree over the bodies; returns as `locate_all`."""
     n, located, counts = len(points), np.empty((len(scene.base.solids), len(points)), np.int8), [0, 0]
     scene.base.check_located(budget)
     for body in range(len(located)):
@@ -204,7 +205,9 @@ def _locate_exactly(
     points: FloatArray, owners: IntArray, bodies: IntArray, scene: Placements, has_new: bool, budget: Budget,
     workers: int | None,
 ) -> tuple[Int8Array, Counts]:  # fmt: skip
-    """Return the locations of pairs of a point and a body, by each body's locator, and their counts."""
+    """Return the locations of pairs of point owners[i] and body bodies[i], by each body's own locator, and their
+    counts. has_new: a tree was built since the kernel ran, so it is run again first.
+    """
     locations, order = np.full(len(owners), UNDECIDED, np.int8), np.argsort(bodies, kind="stable")
     if has_new:
         tables, names, scratch = scene.tables(budget), scene.rows_of(bodies), scratch_for(scene.n_rows)
@@ -235,7 +238,7 @@ def _locate_exactly(
 
 
 def _build_trees(scene: Placements, query_counts: IntArray, budget: Budget, workers: int | None) -> bool:
-    """Build trees and cells of polyhedra that are queried often enough; return whether a table lacks one of these."""
+    """Build trees and cells of polyhedra queried often enough; return whether the scene's tables lack one of these."""
     chosen = list[tuple[Polyhedron, int]]()
     for solid, n_queries in zip(scene.base.solid_tables(budget).meshes, query_counts.tolist()):
         if n_queries and len(solid.triangles) <= MOST_FACES:

@@ -37,53 +37,58 @@ from engine.solids.registry import BodyKind, row_of
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point3, read_only
 
 _MOST_EDGES: Final = 128
-"""Number of edges up to which all edges of a polygon are tested; above it the index of the solid is faster."""
+"""Most edges of a polygon of which all are tested; for more, the index of the solid is faster."""
 _CHECK_EVERY: Final = 256
 
 
 class LocateTables(NamedTuple):
-    """What kernels read of bodies, the moved ones last (n + m,), and of their solids."""
+    """Input of location kernels: the n bodies and the m moved ones (n + m,), then the data of their solids by kind."""
 
     kinds: Int8Array
-    """See `BodyKind`; of OTHER the locator of the body decides."""
+    """`BodyKind` of each body; OTHER: only the body's own locator decides."""
     slots: Int32Array
+    """Row of each body's solid in the arrays of its kind."""
     frames: Int32Array
-    """Row of a body's pose in the next three, -1 for none."""
+    """Row of each body's pose in the next three, -1 for none."""
     inverses: FloatArray
     """``(n_poses, 3, 3)``: R^-1 rounded (methods/filters.py); the plane's in the upper left."""
     translations: FloatArray
     is_turn: BoolArray
     centers: FloatArray
-    """``(n_balls, 3)``: of balls, in the world; their slots count bodies."""
+    """``(n_balls, 3)``: centres in the world; the slot of a ball counts bodies, not solids."""
     balls: FloatArray
     """``(n_balls, 2)``: radius, and a bound on the error of each coordinate of the centre."""
     box_lows: FloatArray
-    """``(n, 3)``: of boxes in their own frame."""
+    """``(n_boxes, 3)``: low corners in the box's own frame."""
     box_highs: FloatArray
     row_offsets: IntArray
-    """Where the rows of a half-space or convex begin."""
+    """Offsets into `rows`, by half-space or convex."""
     rows: FloatArray
-    """``(n, 4)``: normal and offset; the plane's have 0 in the third place."""
+    """``(n, 4)``: normal and offset of planes; planar ones have 0 in the third column."""
     polygon_offsets: IntArray
-    """Where the rings of a polygon begin."""
+    """Offsets into `rings`, by polygon."""
     rings: Int32Array
     xs: FloatArray
     """The vertices of all rings, each ended by its first one."""
     ys: FloatArray
+    """x and y of the vertices of all rings, each ring ended by its first vertex."""
     cell_frames: FloatArray
     cell_places: IntArray
-    """``(n, 6)`` and ``(n, 4)``: what `Sides` has of a polyhedron, 0 where there is none."""
+    """cell_frames ``(n, 6)`` and cell_places ``(n, 4)``: the cells (`Sides`) of a polyhedron, 0 where there are none.
+    """
     addresses: IntArray
     sizes: IntArray
     places: FloatArray
-    """What `tree_row` has of a polyhedron, 0 where there is no tree."""
+    """addresses, sizes and places: `tree_row` of a polyhedron, 0 where there is no tree."""
 
 
 @merged
 def locate_in_body(
     tables: LocateTables, body: int, is_flat: bool, p: tuple[float, ...], stack: Int32Array, flag: FlagArray
 ) -> tuple[int, bool]:
-    """Return the location of a point in a body, and whether it took more than a filter; stack: (STACK,), scratch."""
+    """Return the location of point p in a body, and whether it took more than a filter. 1, 0, -1 (inside, boundary,
+    outside) or UNDECIDED. stack: (STACK,), scratch.
+    """
     kind, slot = tables.kinds[body], tables.slots[body]
     q, blur = to_frame(tables, tables.frames[body], p)
     if kind == BodyKind.RINGS:
@@ -107,7 +112,7 @@ def locate_in_body(
 
 
 class Tables:
-    """Tables of the distinct solids of some bodies, by kind, each in its own frame."""
+    """Location tables of distinct solids, by kind, each solid in its own frame."""
 
     def __init__(self, solids: Sequence[Solid], owners: IntArray, poses: Sequence[Pose | None], budget: Budget) -> None:
         n, self.dimension = len(solids), solids[0].dimension
@@ -138,18 +143,19 @@ class Tables:
         self._fixed = lows, highs, *rows, *rings, *_meshes(self.meshes)
 
     def _chosen(self, indices: list[int], kind: int) -> list[Any]:
-        """Return the solids of a kind, and set their slots in the given order."""
+        """Return the solids with the given indices, and record their kind and, in this order, their slots."""
         self.kinds[indices], self.slots[indices] = kind, np.arange(len(indices))
         return [self._solids[index] for index in indices]
 
     def _vectors(self, values: list[FloatArray]) -> FloatArray:
-        """Return vectors as (n, 3), with third coordinate 0 in the plane."""
+        """Return vectors as an array (n, 3); planar ones have 0 as third coordinate."""
         vectors = np.zeros((len(values), 3))
         if values:
             vectors[:, : self.dimension] = values
         return vectors
 
     def _rings(self, indices: list[int]) -> tuple[Any, ...]:
+        """Return the arrays polygon_offsets, rings, xs, ys of the polygons with the given indices."""
         solids = self._chosen(indices, BodyKind.RINGS)
         offsets = [solid.ring_offsets for solid in solids]
         polygon_offsets = summed([len(each) - 1 for each in offsets])
@@ -162,12 +168,13 @@ class Tables:
         return polygon_offsets, rings, xs, ys
 
     def _rows(self, indices: list[int]) -> tuple[Any, ...]:
+        """Return the arrays row_offsets, rows of the half-spaces and convexes with the given indices."""
         planes = [rows_of(solid) for solid in self._chosen(indices, BodyKind.ROWS)]
         rows = np.concatenate([np.zeros((0, self.dimension + 1)), *planes])
         return summed([len(each) for each in planes]), rows_in_space(rows)
 
     def placed(self, owners: IntArray, poses: Sequence[Pose | None]) -> LocateTables:
-        """Return the tables of bodies, given the solid and the pose of each."""
+        """Return the tables of bodies, body i being solid owners[i] under poses[i]."""
         frames, kinds, slots = frames_of(poses, self.dimension), self.kinds[owners], self.slots[owners]
         bodies = np.flatnonzero(kinds == BodyKind.BALL)
         low, high = moved_boxes(*(self._centers[slots[bodies]],) * 2, frames, frames.rows[bodies])
@@ -184,7 +191,7 @@ class Tables:
 
 
 def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
-    """Return the cells and the trees of polyhedra, where they are cached."""
+    """Return the arrays cell_frames, cell_places, addresses, sizes, places of polyhedra, 0 for what is not cached."""
     cells, trees = [solid.cached("sides") for solid in solids], [solid.cached("tree") for solid in solids]
     lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_row(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())
@@ -197,7 +204,7 @@ def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
 
 
 def concatenated(first: LocateTables, then: LocateTables) -> LocateTables:
-    """Return the tables of bodies followed by others of the same solids."""
+    """Return the tables of the bodies of `first`, then those of `then`; both share the same solids."""
     rows, slots = np.where(then.frames < 0, -1, then.frames + len(first.inverses)), then.slots.copy()
     slots[then.kinds == BodyKind.BALL] += len(first.balls)
     then = then._replace(frames=rows.astype(np.int32), slots=slots)
@@ -208,7 +215,9 @@ def concatenated(first: LocateTables, then: LocateTables) -> LocateTables:
 
 
 def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> tuple[FloatArray, FloatArray]:
-    """Return boxes (n, 2 or 3) around the images of finite boxes under poses; rows: of each its pose, -1 for none."""
+    """Return low and high of boxes around posed finite boxes (n, 2 or 3), rounded outward; rows: pose of each, -1 for
+    none.
+    """
     low, high, n = np.empty_like(lows), np.empty_like(highs), len(rows)
     boxes, moves = np.stack([lows, highs], axis=1), (frames.rotations, frames.translations)
     with np.errstate(all="ignore"):

@@ -21,36 +21,36 @@ from engine.segment_clipping.pieces import Pieces, point_of
 from engine.types import FloatArray, Int32Array, IntArray, Point3
 
 MOST_MET: Final = 512
-"""Most triangles that a segment crosses; with more it is UNDECIDED."""
+"""Most triangles of one body that a segment may cross; with more it is UNDECIDED."""
 
 _here: Final = threading.local()
 _MOST_CACHED: Final = 1 << 14
-"""Number of bodies up to which a thread caches its work space: some 800 kB."""
+"""Most bodies for which a thread caches its work space: some 800 kB."""
 
 Scratch = namedtuple("Scratch", "stack cuts room waiting keys entered best hit depths near")
 """Work space of one segment.
 
 | field | meaning |
 |---|---|
-| stack, cuts | of one body, the latter its `Crossings` |
-| room | the pieces of one body, the last row for the first piece of all |
-| waiting, keys | nodes and bodies waiting, and where the segment enters them |
-| entered | (1, 8), entries of one node |
-| best, hit | start of the first piece; its body, and whether another may begin there too |
-| depths | number of nodes and bodies of a tree waiting, and of bodies outside the tree |
-| near | bodies |
+| stack, cuts | for one body: stack of its tree, its `Crossings` |
+| room | the pieces in one body; the last row is the first piece of all bodies |
+| waiting, keys | stack of nodes and bodies, and where the segment enters their boxes |
+| entered | (1, 8), where it enters the children of one node |
+| best, hit | start of the first piece; its body, and 1 if another may begin there too |
+| depths | number of entries of `waiting`, and of bodies outside the tree still to be tested |
+| near | result: bodies |
 """
 _SIZES: Final = (
     STACK // 2, MOST_MET, MOST_MET, 3 * MOST_MET, MOST_MET, MOST_MET, MOST_MET + 1, 6 * MOST_MET + 6, 2 * MOST_MET + 2,
     2 * MOST_MET + 2, STACK // 2, STACK // 2, WIDTH // 2, 1, 2, 2, MOST_MET,
 )  # fmt: skip
-"""Words of the arrays of a `Scratch`, in order, but for `near`."""
+"""Sizes of the arrays of a `Scratch` in 8-byte words, in order, without `near`."""
 _AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
-"""Offsets of these, in bytes."""
+"""Byte offsets of these arrays."""
 
 
 def scratch_for(n_bodies: int) -> IntArray:
-    """Return the work space of one segment (`scratch_at`), cached per thread."""
+    """Return the work space of one segment, for `scratch_at`, in a scene of n_bodies; cached per thread."""
     scratch: IntArray | None = getattr(_here, "scratch", None)
     if scratch is None or scratch[1] <= n_bodies:
         scratch = np.empty(_AT[-1] // 8 + n_bodies + 1, np.int64)
@@ -62,7 +62,7 @@ def scratch_for(n_bodies: int) -> IntArray:
 
 @merged
 def scratch_at(words: IntArray) -> Scratch:
-    """Return the named parts of the array of `scratch_for`."""
+    """Return the arrays of a `Scratch` as views, from the array of `scratch_for`."""
     at, m = words[0], MOST_MET
     cuts = Crossings(
         array_at(at + _AT[2], (m,), np.float64), array_at(at + _AT[3], (m, 3), np.float64),
@@ -83,22 +83,27 @@ def scratch_at(words: IntArray) -> Scratch:
 
 
 BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
-"""Boxes of bodies, low and high (n, dimension), infinite for unbounded ones; a `Bvh` over the bounded ones, if there
-are enough, 1 / its scale, and the body of each item; the other bodies, tested one by one."""
+"""A tree over bodies. low, high (n, dimension): their boxes, infinite for unbounded ones; tree, inverse: a `Bvh` over
+the bounded ones, if there are enough, and 1 / its scale; bounded: the body of each item; listed: bodies tested one by
+one.
+"""
 Where = namedtuple("Where", "together moved names")
-"""Positions of the bodies of a scene: the `BodyTree` of all n together, and of those moved since, numbered from n on;
-the indices of the latter in the scene, ascending."""
+"""Positions of the bodies of a scene. together: the `BodyTree` of all n as first placed; moved: that of the moved ones,
+numbered from n on; names: the indices of the moved ones in the scene, ascending.
+"""
 N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, NAMES, PLACED = range(12)
 """Columns of a `BodyTree` encoded as a row of integers, sizes and addresses: one argument instead of a hundred.
-NUMBERS: of (4,), inverse and origin. NAMES: of (n,), indices of moved bodies. PLACED: of the rows of their `Table`."""
+NUMBERS: address of (4,), inverse and origin. NAMES: of (n,), indices of moved bodies. PLACED: of the rows of their
+`Table`.
+"""
 _MOST_WAY: Final = 2.0**1000
 _SLACK: Final = 2.0**-20
-"""Enlargement of a box in tree coordinates, at most 2 where it matters, for its rounding to float32."""
+"""Enlargement of a box in tree coordinates (at most 2 where it matters) that covers its rounding to float32."""
 
 
 @inline
 def place_in(names: IntArray, body: int) -> int:
-    """Binary search: return the index of a body in ascending names; -1 if absent."""
+    """Return the index of a body in ascending ``names`` by binary search, -1 if absent."""
     low, high = 0, names.size
     while low < high:  # bound: halved each turn
         middle = (low + high) // 2
@@ -111,7 +116,7 @@ def place_in(names: IntArray, body: int) -> int:
 
 @merged
 def tree_in(row: IntArray, dimension: int) -> BodyTree:
-    """Decode the `BodyTree` of a row."""
+    """Return the `BodyTree` encoded in a row of integers."""
     n, numbers = row[N_BODIES], array_at(row[NUMBERS], (4,), np.float64)
     boxes = array_at(row[BOXES], (row[N_NODES], BOX_ROWS, WIDTH), np.float32)
     child = array_at(row[CHILD], (row[N_NODES], WIDTH), np.int32)
@@ -123,21 +128,21 @@ def tree_in(row: IntArray, dimension: int) -> BodyTree:
 
 @inline
 def name_in(words: IntArray, body: int) -> int:
-    """Return the index in the scene of a body, given its number, where moved bodies count from n on."""
+    """Return the index in the scene of body number ``body``: moved bodies are numbered from n on."""
     n, m = words[0, N_BODIES], words[1, N_BODIES]
     return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
 
 
 @inline
 def has_moved(words: IntArray, body: int) -> bool:
-    """Return whether one of the n bodies has been moved since."""
+    """Return whether body ``body`` < n has been moved, so that its first placement no longer counts."""
     m = words[1, N_BODIES]
     return m > 0 and place_in(array_at(words[1, NAMES], (m,), np.int64), body) >= 0
 
 
 @inline
 def way_of(segments: FloatArray, item: int, bodies: BodyTree) -> Way:
-    """Return a segment in the coordinates of a tree."""
+    """Return segment ``item`` in the coordinates of a tree."""
     is_flat = segments.shape[2] == 2
     px, py, pz = point_of(segments, item, 0, is_flat)
     qx, qy, qz = point_of(segments, item, 1, is_flat)
@@ -146,13 +151,15 @@ def way_of(segments: FloatArray, item: int, bodies: BodyTree) -> Way:
 
 @inline
 def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
-    """Start the traversal of a tree for a segment."""
+    """Initialise `scratch` for the traversal of a tree along a segment."""
     scratch.waiting[0], scratch.keys[0], scratch.depths[0], scratch.depths[1] = 0, -1.0, way.is_near, bodies.listed.size
 
 
 @inline
 def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last: float, scratch: Scratch) -> int:
-    """Return the next body whose box a segment may enter before `last`, about in order of entry; -1 for none."""
+    """Return the next body whose box the segment may enter before parameter `last`, roughly in order of entry; -1 for
+    none.
+    """
     depths = scratch.depths
     while depths[0] > 0:  # bound: each node, and each body, waits once
         depths[0] -= 1
@@ -172,7 +179,9 @@ def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last:
 
 @inline
 def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray) -> int:
-    """Fill scratch.near with the bodies that a segment may meet; return their number."""
+    """Fill scratch.near with the numbers of the bodies whose boxes a segment may meet; return how many. words: both
+    rows of `words_of`. room: of `scratch_for`.
+    """
     scratch, n_near = scratch_at(room), 0
     for side in range(1 + (words[1, N_BODIES] > 0)):
         bodies, n_before = tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
@@ -188,10 +197,9 @@ def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray
 
 @inline
 def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) -> bool:
-    """Return whether a segment may meet the box of a body.
-
-    error: (box - start) / (end - start) is off by 4 units of rounding on each axis, or 2^-1074 on underflow;
-    differences beyond `_MOST_WAY`, which may be infinite, decide nothing.
+    """Return whether a segment may meet the box of a body (slab test). error: (box - start) / (end - start) is off by 4
+    units of rounding on each axis, or 2^-1074 on underflow; differences beyond `_MOST_WAY`, which may be infinite,
+    decide nothing.
     """
     meet, enters, leaves = True, 0.0, 1.0
     for k in range(segments.shape[2]):
@@ -207,8 +215,9 @@ def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) ->
 
 @inline
 def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, depth: int) -> int:
-    """Push the children of a node that a segment enters before `last` on scratch.waiting from `depth` on, the nearest
-    last; return the new depth."""
+    """Push the children of a node whose boxes the segment enters before `last` on scratch.waiting, the nearest one on
+    top. Returns the new depth.
+    """
     waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
     bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
     while bits != 0:
@@ -226,7 +235,9 @@ def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, de
 
 @inline
 def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array, hits: IntArray) -> int:
-    """Fill hits with the bodies of a `Where` whose boxes meet a box (dim,), maybe infinite; return their number."""
+    """Fill `hits` with the numbers of the bodies whose boxes intersect the box low .. high (dim,), maybe infinite;
+    return how many.
+    """
     n_hits, names = _of_box(low, high, where.together, 0, where.names, stack, hits, 0), where.names
     if names.size > 0:
         n_hits = _of_box(low, high, where.moved, where.together.low.shape[0], names[:0], stack, hits, n_hits)
@@ -235,7 +246,9 @@ def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array
 
 @inline
 def _is_met(low: FloatArray, high: FloatArray, bodies: BodyTree, body: int, left_out: IntArray) -> bool:
-    """Return whether a box meets that of a body which is not among those left out."""
+    """Return whether the box low .. high intersects that of a body, and the body is not among those left out
+    (ascending).
+    """
     meet = True
     for k in range(low.size):
         meet &= (low[k] <= bodies.high[body, k]) & (high[k] >= bodies.low[body, k])
@@ -244,6 +257,7 @@ def _is_met(low: FloatArray, high: FloatArray, bodies: BodyTree, body: int, left
 
 @inline
 def _local(value: float, inverse: float, way: float) -> Any:
+    """Return a coordinate in a tree's scale, enlarged outward: way 1.0 upward, -1.0 downward."""
     return np.float32(value * inverse + way * _SLACK)
 
 
@@ -252,8 +266,9 @@ def _of_box(
     low: FloatArray, high: FloatArray, bodies: BodyTree, n_before: int, left_out: IntArray, stack: Int32Array,
     hits: IntArray, n_hits: int,
 ) -> int:  # fmt: skip
-    """Append to hits the bodies of a `BodyTree` whose boxes meet a box and that are not left out; return the new
-    number."""
+    """Append to `hits` n_before + each body of a `BodyTree` whose box intersects low .. high; return the new number.
+    left_out: ascending bodies to skip.
+    """
     tree, inverse, depth, stack[0] = bodies.tree, bodies.inverse, 1, 0
     is_flat, x, y, z = low.size == 2, tree.origin[0], tree.origin[1], tree.origin[2]
     bottom, top = (0.0 if is_flat else low[2]) - z, (0.0 if is_flat else high[2]) - z
@@ -281,7 +296,8 @@ def _of_box(
 
 @kernel
 def put_keys(segments: Any, t: float, bodies: Any, keys: Any) -> None:
-    """Set keys (n,) to the Morton codes, 32 cells an axis, of the positions of segments at t (G. M. Morton, 1966)."""
+    """Set keys (n,) to Morton codes, 32 cells an axis, of the points at parameter t of segments (G. M. Morton, 1966).
+    """
     origin, inverse = bodies.tree.origin, bodies.inverse
     for item in range(segments.shape[0]):
         key = 0

@@ -26,14 +26,16 @@ from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 
 _FEW: Final = 64
 _PART: Final = 4
-"""Up to `_FEW` moved bodies, or 1 / `_PART` of the scene, are stored apart from the others."""
+"""Up to `_FEW` moved bodies, or 1 / `_PART` of the scene, are stored apart from the others; more become the scene's
+own.
+"""
 _LISTED: Final = 128
-"""Number of moved bodies up to which their boxes are tested one by one, as fast as building a tree."""
+"""Most moved bodies whose boxes are tested one by one, which is as fast as building a tree."""
 _NO_WORDS: Final = [0] * (PLACED + 1)
 
 
 class Placements(Preparing):
-    """Bodies, and those moved since; safe to share between threads, as `Bodies` are."""
+    """The bodies of a scene as first placed, and those moved since; safe to share between threads, as `Bodies` are."""
 
     __slots__ = ("_lock", "_placed", "_prepared", "_words", "base", "moved", "names")
 
@@ -55,12 +57,12 @@ class Placements(Preparing):
 
     @property
     def all_cached(self) -> list[Any]:
-        """All cached structures."""
+        """The structures cached so far, to count their memory."""
         others = (self.cached("few"), self.cached("whole"))
         return [self.base._prepared, self._placed, *(each._prepared for each in others if each is not None)]
 
     def after(self, poses: Mapping[int, Pose | None]) -> Placements:
-        """Return the placements after some bodies, given in ascending order, were moved."""
+        """Return the placements after the bodies of `poses`, in ascending order, were moved."""
         given = dict(sorted({**self.moved, **poses}.items())) if self.moved else dict(poses)
         if len(given) <= max(_FEW, len(self.base.solids) // _PART):
             return Placements(self.base, given)
@@ -71,41 +73,42 @@ class Placements(Preparing):
 
     @property
     def n_rows(self) -> int:
-        """Number of bodies as kernels count them, unmoved and moved."""
+        """Number of bodies as kernels count them: the n of the scene, and the moved ones again."""
         return len(self.base.solids) + len(self.names)
 
     def whole(self) -> Bodies:
-        """Return all bodies at their current poses."""
+        """Return all bodies under their current poses."""
         return self.prepared("whole", lambda: Bodies(self.base.solids, self.poses)) if self.moved else self.base
 
     def few(self) -> Bodies:
-        """Return the moved bodies at their current poses; at least one."""
+        """Return the moved bodies under their current poses; caller guarantees that there is one."""
         solids, poses = tuple(self.base.solids[body] for body in self.moved), tuple(self.moved.values())
         owners = self.base.arrays(UNLIMITED).kinds[self.names]
         return self.prepared("few", lambda: Bodies(solids, poses, self.base, owners))
 
     def pose(self, body: int) -> Pose | None:
-        """Return the pose of a body."""
+        """Return the current pose of a body."""
         return self.moved[body] if body in self.moved else self.base.poses[body]
 
     def placed(self, body: int) -> tuple[Solid, Pose | None]:
-        """Return a body's solid, and its pose, None for an identity."""
+        """Return a body's solid and its current pose, None for the identity."""
         pose = self.pose(body)
         return self.base.solids[body], None if pose is None or pose.is_identity else pose
 
     def names_of(self, bodies: IntArray) -> IntArray:
-        """Return the indices in the scene of bodies, of which moved ones are numbered from n on."""
+        """Return the scene's indices for body numbers of kernels, which number moved bodies from n on."""
         n = len(self.base.solids)
         if not self.moved or not len(bodies):
             return bodies
         return np.where(bodies < n, bodies, self.names.take(bodies - n, mode="clip"))
 
     def where(self, budget: Budget) -> Where:
-        """Return the positions of all bodies, for kernels."""
+        """Return the positions of all bodies, as input of kernels."""
         return (self._placed or self.placed_numbers(budget))[0]
 
     def placed_numbers(self, budget: Budget) -> tuple[Where, FloatArray, FloatArray]:
-        """Return also the rotations and translations of the moved bodies, the identity for None."""
+        """Return the positions of all bodies, and rotations and translations of the moved ones, the identity for None.
+        """
         if self._placed is None:  # who comes second makes the same
             tree, names = self.base.tree(budget), self.names
             if self.moved:
@@ -117,7 +120,7 @@ class Placements(Preparing):
         return self._placed
 
     def words(self, budget: Budget) -> IntArray:
-        """Return the rows of numbers that kernels for segments read of all bodies, and of the moved ones."""
+        """Return two rows of integers from which segment kernels read all bodies, and the moved ones (`words_of`)."""
         if self._words is None:
             together, moved, arrays = self.base.words(budget), _NO_WORDS, ()
             if self.moved:
@@ -128,7 +131,7 @@ class Placements(Preparing):
         return self._words[0]
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
-        """Prepare the kernel inputs named by `wanted` for one body."""
+        """Build the kernel input `wanted` (WANTS_BODY, WANTS_TREE) for one body, given by the kernels' number."""
         n = len(self.base.solids)
         if body < n:
             self.base.prepare(body, wanted, budget)
@@ -138,17 +141,16 @@ class Placements(Preparing):
             self.words(budget)[1, PLACED] = few.table(budget).rows.ctypes.data
 
     def boxes(self, budget: Budget) -> FloatArray:
-        """Return the boxes of all bodies at their current poses."""
+        """Return the boxes (n, 2, dim) of all bodies under their current poses."""
         where = self.where(budget)
         boxes = np.stack([where.together.low, where.together.high], axis=1)
         boxes[self.names, 0], boxes[self.names, 1] = where.moved.low, where.moved.high
         return boxes
 
     def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
-        """Return the keys first * n + second, unordered, of the pairs of a named body and another whose boxes, enlarged
-        by `reach`, meet; and their relations by the batch of convex bodies, UNSETTLED if it cannot decide.
-
-        Raises: as `collide_scene` for an unsupported body.
+        """Return the keys first * n + second of the pairs of a named body and another whose boxes meet, and their
+        relations. Boxes are enlarged by `reach`; keys are unsorted; relations are those of the batch of convex bodies,
+        else UNSETTLED. Raises: as `collide_scene` for an unsupported body.
         """
         batches, (where, *moves), room = self.base.batches(budget), self.placed_numbers(budget), 16 + 6 * len(named)
         arrays, d = batches.bodies, batches.bodies.dimension
@@ -165,27 +167,28 @@ class Placements(Preparing):
             room = n
 
     def locator(self, body: int) -> Locator:
-        """Return the point locator of a body."""
+        """Return the point locator of a body under its current pose."""
         if body not in self.moved:
             return self.base.locator(body)
         return self.few().locator(int(np.searchsorted(self.names, body)))
 
     def tables(self, budget: Budget) -> LocateTables:
-        """Return the location tables, moved bodies last."""
+        """Return the location tables of all bodies, then of the moved ones."""
         if not self.moved:
             return self.base.tables(budget)
         few = self.few()
         return self.prepared("tables", lambda: concatenated(self.base.tables(budget), few.tables(budget)), budget.check)
 
     def rows_of(self, bodies: IntArray) -> IntArray:
-        """Return the numbers of bodies, where moved ones count from n on: the inverse of `names_of`."""
+        """Return the kernels' numbers of bodies, moved ones from n on: the inverse of `names_of`."""
         rows = np.arange(len(self.base.solids))
         rows[self.names] = len(rows) + np.arange(len(self.names))
         return rows[bodies]
 
     def has_new_trees(self, solids: list[Polyhedron]) -> bool:
-        """Return whether tables lack a structure of some solids that is cached by now; then the tables are rebuilt on
-        next use."""
+        """Return whether cached location tables lack a tree or cells of some solids, cached by now; then these tables
+        are dropped.
+        """
         known: set[int] = self.base.prepared("trees", lambda: set())
         new = {2 * id(solid) + (solid.cached("sides") is not None) for solid in solids} - known
         if new:
@@ -197,15 +200,18 @@ class Placements(Preparing):
 
 
 Placed = namedtuple("Placed", "kinds rotations translations")
-"""Placements of bodies as in `SceneBodies`: kinds (n,), rotations (n + 1, d, d), translations (n + 1, d)."""
+"""Placements of n bodies: kinds (n,) their solids, rotations (n + 1, d, d) and translations (n + 1, d), row 0 the
+identity.
+"""
 PairRows = namedtuple("PairRows", "keys kinds rotations translations")
-"""Pairs by keys first * n + second (room,), and their bodies (2 room + 1, ...): pair i has rows 2 i + 1 and 2 i + 2,
-row 0 is the identity."""
+"""Pairs of bodies. keys (room,): first * n + second. kinds, rotations, translations (2 room + 1, ...): their bodies,
+those of pair i in rows 2 i + 1 and 2 i + 2; row 0 is the identity.
+"""
 
 
 @inline
 def _put_row(rows: PairRows, row: int, still: Placed, moved: Placed, body: int, name: int) -> None:
-    """Fill a row with a body at its current pose."""
+    """Fill row ``row`` with a body at its current pose; body: its number, name: its index in the scene."""
     n = still.kinds.size
     rows.kinds[row] = still.kinds[name]
     for i in range(rows.translations.shape[1]):
@@ -221,11 +227,9 @@ def list_pairs(
     named: IntArray, reach: float, where: Where, still: Placed, moved: Placed, rows: PairRows, room: IntArray,
     box: FloatArray, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill `rows` with the pairs of a named body and another whose boxes, enlarged by `reach`, meet, each once,
-    unordered; return their number, which may exceed the room.
-
-    named: ascending. where: a `Where` of n bodies and m that moved; still, moved: `Placed` of both, moved without its
-    row 0. Work space: that of `scratch_for`, box (2, dim).
+    """Fill `rows` with the pairs of a named body and another whose boxes, enlarged by `reach`, intersect, each once,
+    unsorted. Returns their number, which may exceed the room. named: ascending. still, moved: `Placed` of the n bodies
+    as first placed and of those moved since, without row 0. room: work space of `scratch_for`; box (2, dim): scratch.
     """
     n, n_pairs, scratch = still.kinds.size, 0, scratch_at(room)
     rows.kinds[0] = 0
@@ -259,6 +263,8 @@ def list_pairs(
 
 @inline
 def _outward(value: float, reach: float, side: int) -> float:
-    """Return a side of a box moved by more than a pose may stretch `reach` (bounding/aabb.py)."""
+    """Return a bound of a box moved outward (side 0: down, 1: up) by more than a pose may stretch `reach`
+    (bounding/aabb.py).
+    """
     far = 1.001 * reach
     return np.nextafter(value - far, -np.inf) if side == 0 else np.nextafter(value + far, np.inf)

@@ -34,22 +34,25 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
 UNSURE: Final = -1
 WANTS_BODY: Final = -2
 WANTS_TREE: Final = -3
-"""In place of a number of pieces: UNDECIDED, or the body, or its location tree, is not prepared."""
+"""Codes in place of a number of pieces: UNSURE, undecided; WANTS_BODY, WANTS_TREE: the body, or its location tree, must
+be prepared first.
+"""
 
 
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
-"""The fields of `Mesh` that are read here."""
+"""A mesh in its own frame, as kernels here read it: fields of `Mesh` in on_boundary/prepared_boundary.py."""
 MESH_WORDS: Final = 37
 """Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_row`'s
 addresses, 0 without a tree, and sizes (8,); then as doubles origin, inverse, whether all is in range, low and high of
 its box (11,), and `tree_row`'s places (10,)."""
 TREE, PLACES, TREE_PLACES = 8, 16, 27
-"""Offsets of these."""
+"""Offsets of the tree's addresses, of the doubles, and of the tree's places among these numbers."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
 
 
 @inline
 def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
+    """Return the mesh encoded in MESH_WORDS numbers; lines and numbers are one array, as int64 and as float64."""
     return PlacedMesh(
         array_at(lines[0], (lines[5], 3, 3), np.float64),
         array_at(lines[1], (lines[5],), np.int64),
@@ -65,6 +68,7 @@ def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
 
 @inline
 def _tree_of(address: int) -> Any:
+    """Return the location tree of a mesh encoded at an address."""
     lines = _Lines(
         array_at(address + 8 * TREE, (1, 5), np.int64),
         array_at(address + 8 * (TREE + 5), (1, 3), np.int64),
@@ -75,9 +79,8 @@ def _tree_of(address: int) -> Any:
 
 @inline
 def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
-    """Fill met and codes with the triangles that a segment crosses; return their number, UNSURE if one is not proven.
-
-    With `is_any`, one triangle that is provably met ends the search with 1.
+    """Fill cuts.met and cuts.codes with the triangles that segment pq crosses, and how; return their number. UNSURE if
+    one is not proven. With `is_any`, the first triangle proven to be met ends the search with 1.
     """
     cuts = scratch.cuts
     waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
@@ -92,10 +95,9 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
 
 @inline
 def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
-    """Merge sorted crossings in one point; return the number of remaining ones, or UNSURE.
-
-    If the location does not flip, a closed mesh is met in a point, or not left: such a point is written twice, the
-    second time as -2 - face. At least two crossings make such a point, so 4 n places suffice.
+    """Merge sorted crossings in one point; return the number of crossings left, or UNSURE. If the location does not
+    flip, a closed mesh is met in a point, or not left: such a point is written twice, the second time as -2 - face. At
+    least two crossings make such a point, so 4 n places suffice.
     """
     cuts, order, n_out, begin = scratch.cuts, scratch.cuts.order, 2 * n, 0
     if 4 * n > MOST_MET:
@@ -130,14 +132,18 @@ def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_c
 
 @inline
 def _values(at_p: tuple[float, ...], blur: float, normal: Any) -> Any:
-    """Return `dot` of a vector with errors `blur` a coordinate, rounded to 4 u^2 of itself."""
+    """Return a dot product h + low with a bound on its error. at_p: the product and its own rounding, 4 u^2; blur:
+    error of each coordinate of the vector.
+    """
     h, low, bound = at_p
     return h, low, 1.5 * bound + 1.01 * blur * (normal[0][2] + normal[1][2] + normal[2][2])
 
 
 @inline
 def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
-    """Compute a crossing, in a corner if one is touched; return whether all coordinates are correctly rounded."""
+    """Compute crossing ``place`` (t and point), equal to an earlier one in the same corner or edge; return whether all
+    coordinates are correctly rounded.
+    """
     (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
@@ -174,7 +180,7 @@ def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame
 
 @inline
 def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_placed: bool) -> tuple[Point3, Any, float]:
-    """Return doubles of both ends of a segment in a frame, and the error of a coordinate."""
+    """Return both ends of a segment in a frame, as doubles, and a bound on the error of their coordinates."""
     p = Point3(own[0][0], own[1][0], own[2][0])
     q = Point3(p.x + along[0][0], p.y + along[1][0], p.z + along[2][0])
     size = max(abs(p.x), abs(p.y), abs(p.z), abs(q.x), abs(q.y), abs(q.z))
@@ -185,10 +191,9 @@ def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_plac
 def crossings_in(
     body: IntArray, segments: FloatArray, item: int, is_any: bool, words: IntArray, stop: FlagArray
 ) -> tuple[int, bool]:
-    """Compute the crossings of a segment with a placed mesh, in order; return their number, or a reason, and whether
-    the first end is inside.
-
-    With `is_any` they are not computed, and any positive number means that there is one.
+    """Compute the crossings of a segment with a placed mesh, in order; return their number, and whether its start is
+    inside. The number may be UNSURE, WANTS_BODY or WANTS_TREE. With `is_any` crossings are not computed, and any
+    positive number means that there is one.
     """
     is_placed, is_closed, scratch = body[3] != 0, body[1] != 0, scratch_at(words)
     lines, numbers = array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
@@ -224,7 +229,7 @@ def crossings_in(
 
 @inline
 def _is_near_box(numbers: FloatArray, p: Point3, blur: float) -> bool:
-    """Return whether a point with errors `blur` a coordinate may lie in the box of a mesh."""
+    """Return whether point p, each coordinate known to +- `blur`, may lie in the box of a mesh."""
     low, high = PLACES + 5, PLACES + 8
     is_out = (p.x + blur < numbers[low]) | (p.x - blur > numbers[high])
     is_out |= (p.y + blur < numbers[low + 1]) | (p.y - blur > numbers[high + 1])

@@ -227,7 +227,9 @@ class Scene(Immutable):
     def _collide_some(
         self, named: list[int], query: PairQuery, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[ScenePairs, Accuracy]:
-        """Return the pairs with a named body: convex bodies in one batch, others as a scene of their own."""
+        """Return the pairs of a named body and any other; convex bodies in one batch, other pairs as a scene of their
+        own.
+        """
         standing, n = self._placements, len(self)
         reach = 0.0 if query.gap is None else checked_distance(query.gap, "gap")
         keys, relations = standing.pairs_with(np.array(named, np.int64), reach, bool(query.boolean), budget)
@@ -375,7 +377,8 @@ class Scene(Immutable):
 
 
 def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Pose | None, ...]]:
-    """Return solids of one dimension and a pose or None for each; other shapes are read (`engine.solids.shapes`)."""
+    """Return solids of one dimension and a pose or None for each; other shapes are read as by `engine.solids.shapes`.
+    """
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
     solids = list(solids)
@@ -400,7 +403,7 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:
-    """Return an error with the index of a subset of bodies replaced by that of the scene."""
+    """Return an error about a subset of bodies with their indices in the scene instead."""
     if len(error.where) > 1 and error.where[0] == "solids":
         place = cast(int, error.where[1])
         message = error.message.replace(f"solids[{place}]", f"solids[{bodies[place]}]")

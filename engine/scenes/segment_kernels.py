@@ -41,11 +41,11 @@ from engine.solids.registry import BodyKind
 from engine.types import OPEN, FlagArray, FloatArray, IntArray
 
 MET: Final = 1
-"""State of a segment; others: SETTLED, which meets nothing, and OPEN."""
+"""State of a segment that meets a body; others: SETTLED, it meets none, and OPEN, undecided."""
 AHEAD: Final = 8
-"""Number of segments by which memory is prefetched."""
+"""Segments are prefetched so many ahead."""
 Firsts = namedtuple("Firsts", "source body start end t faces ranks")
-"""One piece of each segment, fields as in `ScenePieces`."""
+"""The first piece of each segment; fields as in `ScenePieces`."""
 
 
 @inline
@@ -53,10 +53,9 @@ def _cut_on(
     words: IntArray, name: int, segments: FloatArray, item: int, is_any: bool, scratch: IntArray, stop: FlagArray,
     out: Pieces, row: int,
 ) -> int:  # fmt: skip
-    """Write the pieces of a segment within a body to the rows of `out` from `row` on; return their number, or a reason.
-
-    With `is_any` nothing is written, and a positive number means that there are some. A piece of one point has the
-    second face -2 - face.
+    """Write the pieces of a segment within one body to `out` from row `row` on; return their number, or a code. Codes:
+    UNSURE, WANTS_BODY, WANTS_TREE. With `is_any` nothing is written, and a positive number means that there are some. A
+    piece of one point has the second face -2 - face.
     """
     n = words[0, N_BODIES]
     address = words[0, PLACED] + 32 * name if name < n else words[1, PLACED] + 32 * (name - n)
@@ -83,7 +82,8 @@ def _cut_on(
 
 @inline
 def _emit_points(cuts: Crossings, n: int, source: int, out: Pieces, row: int) -> int:
-    """Write each crossing of a surface as a piece of one point, as `_merge_touches` does; return their number."""
+    """Write each of the n crossings with a surface as a piece of one point, second face -2 - face; return their number.
+    """
     for place in range(n):
         i = cuts.order[place]
         out.source[row + place] = source
@@ -100,16 +100,16 @@ def cut_near(
     segments: FloatArray, order: IntArray, last: int, words: IntArray, scratch: IntArray, stop: FlagArray, out: Pieces,
     names: IntArray, left: IntArray, n: IntArray,
 ) -> None:  # fmt: skip
-    """Cut segments (n, 2, dim), those before `last` in an order (n,), on the bodies that they may meet.
+    """Clip segments order[n[0]:last] to the bodies that they may meet; write pieces to `out`.
 
-    names (2, m): of each piece the body, and whether it is longer than a point. left: rows of a segment and a body that
-    are OPEN.
+    names (2, m): of each piece the body, and whether it is longer than a point. left: pairs (segment, body) that are
+    OPEN.
 
     | n | meaning |
     |---|---|
     | 0, 1 | on entry the first segment and its first candidate, on return where to continue |
     | 2, 3 | number of rows of `out`, of `left` |
-    | 4, 5 | 0, or the structure that the next one needs (of `crossings_in`), and the body |
+    | 4, 5 | 0, or the code of what must be prepared (WANTS_BODY, WANTS_TREE), and the body |
     | 6 | whether a segment is out of the kernels' range |
     """
     near = scratch_at(scratch).near
@@ -144,7 +144,9 @@ def cut_near(
 
 @inline
 def _record_first_hit(scratch: Scratch, name: int) -> None:
-    """Store the first piece in a body, unless the stored one begins before it."""
+    """Store the piece in row 0 as first piece of the segment, if no stored one begins before it; name: its body. hit[1]
+    is set if both begin at parameters that round alike.
+    """
     room, best, hit = scratch.room, scratch.best, scratch.hit
     t = room.t[0, 0]
     if t > best[0]:
@@ -165,7 +167,7 @@ def _record_first_hit(scratch: Scratch, name: int) -> None:
 
 @inline
 def _write_first_hit(scratch: Scratch, out: Firsts, row: int, item: int) -> None:
-    """Write the first piece of a segment to a row."""
+    """Write the first piece of segment ``item`` to a row of `out`."""
     piece, is_long = scratch.room, scratch.room.faces[MOST_MET, 1] >= -1
     out.source[row], out.body[row], out.ranks[row, 0], out.ranks[row, 1] = item, scratch.hit[0], 0, is_long
     for k in range(out.start.shape[1]):
@@ -178,7 +180,9 @@ def _write_first_hit(scratch: Scratch, out: Firsts, row: int, item: int) -> None
 def _query_body(
     words: IntArray, body: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
-    """Query a body for the first piece, or any; return SETTLED to continue, MET or OPEN to end, or what it needs."""
+    """Clip a segment to one body for its first piece, or any. Returns SETTLED to continue with the next body, MET or
+    OPEN to end, or WANTS_BODY, WANTS_TREE.
+    """
     scratch = scratch_at(room)
     n_pieces = _cut_on(words, body, segments, item, is_any, room, stop, scratch.room, 0)
     if n_pieces < UNSURE:
@@ -197,9 +201,8 @@ def _query_body(
 
 @inline
 def _first_hit_bound(scratch: Scratch, bodies: BodyTree, way: Way) -> Any:
-    """Return an `enter_boxes` parameter beyond the start of the first piece so far.
-
-    On the longest axis k, t = (x - m) / e. The slack exceeds the rounding of m and e; it is taken twice. That of x, the
+    """Return a bound beyond the start of the first piece so far, as parameter of the segment in tree coordinates. On
+    the longest axis k, t = (x - m) / e. The slack exceeds the rounding of m and e; it is taken twice. That of x, the
     nearest double, is half an ulp where it was computed: much, in the tree, for a scene far from the origin.
     """
     k = longest_axis(way.half)
@@ -215,9 +218,10 @@ def _first_hit_bound(scratch: Scratch, bodies: BodyTree, way: Way) -> Any:
 def _search_tree(
     words: IntArray, side: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
-    """Query the bodies of one `BodyTree` that a segment may meet, about in order of entry, until no other can have an
-    earlier piece (with is_any: until one is met). Return SETTLED to go on with the next tree, MET or OPEN to end, or
-    the code of a structure that must be prepared first."""
+    """Clip a segment to the bodies of one `BodyTree`, about in order of entry, until none can have an earlier piece.
+    side: 0 for the bodies as first placed, 1 for moved ones. With is_any one met body ends the search. Returns SETTLED
+    to continue with the next tree, MET or OPEN to end, or WANTS_BODY, WANTS_TREE.
+    """
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
     way, last = way_of(segments, item, bodies), np.float32(1.0)
     begin_way(bodies, way, scratch)
@@ -238,8 +242,7 @@ def find_first(
     segments: FloatArray, order: IntArray, last: int, words: IntArray, room: IntArray, is_any: bool, stop: FlagArray,
     state: FlagArray, out: Firsts, n: IntArray,
 ) -> None:  # fmt: skip
-    """Compute the first piece of segments (n, 2, dim), those before `last` in an order (n,); with `is_any` only whether
-    there is one.
+    """Compute the first piece of segments order[n[0]:last]; with `is_any` only whether there is one.
 
     state: (n,) uint8, SETTLED, MET or OPEN. out: the pieces of those that are MET, unless `is_any`. room: of
     `scratch_for`.
@@ -247,7 +250,7 @@ def find_first(
     | n | meaning |
     |---|---|
     | 0 | on entry the first segment, on return where to continue |
-    | 1, 2 | 0, or the structure that the next one needs (of `crossings_in`), and the body |
+    | 1, 2 | 0, or the code of what must be prepared (WANTS_BODY, WANTS_TREE), and the body |
     | 3, 4 | number of MET, of OPEN segments |
     | 5 | whether rows of `out` are filled consecutively, not at the segment's index |
     """

@@ -23,7 +23,7 @@ from engine.types import FloatArray, IntArray
 
 
 class Table:
-    """Segment table of a scene: `rows` (n, 4), filled body by body, the kind of each last.
+    """Segment table of a scene: `rows` (n, 4) int64, filled body by body on demand, the kind last.
 
     | column | meaning |
     |---|---|
@@ -32,7 +32,7 @@ class Table:
     | address | planes: (k, 4); ball: (7,) centre in the world as double-doubles, radius; mesh: `MESH_WORDS` |
     | frame | address of `_frame_of`, 0 for none |
 
-    like: the table of which these bodies are a subset, sharing the data of solids.
+    like: the table of bodies of which these are a subset; both share the data of solids.
     """
 
     def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None], like: Table | None = None) -> None:
@@ -44,7 +44,8 @@ class Table:
         """The same, of one body."""
 
     def prepare(self, body: int, wanted: int) -> None:
-        """Prepare the kernel inputs for one body. Caller holds the lock of the bodies."""
+        """Fill the row of a body, or the location tree of its solid (WANTS_TREE). Caller holds the lock of the bodies.
+        """
         solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)
@@ -57,7 +58,7 @@ class Table:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 
     def _fill(self, row: IntArray, solid: Any, pose: Pose | None) -> int:
-        """Fill the row of a body, except its kind, and return that; OTHER if no kernel takes its type, or numbers."""
+        """Fill the row of a body except its kind; return the kind, OTHER if kernels do not take the body."""
         kind = row_of(solid).kind
         if kind == BodyKind.BALL:
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
@@ -88,14 +89,14 @@ class Table:
 
 
 def unready(n: int) -> IntArray:
-    """Return the empty prepared-state table for n bodies."""
+    """Return the rows of n bodies of which none is prepared."""
     rows = np.zeros((n, 4), np.int64)
     rows[:, 0] = BodyKind.UNREADY
     return rows
 
 
 def _words_of(solid: Any) -> IntArray:
-    """Return the numbers that kernels read of a mesh, without its location tree."""
+    """Return the MESH_WORDS numbers of a mesh, without its location tree."""
     mesh: Any = boundary_of(solid)
     low, high, _ = own_box(solid)
     words = np.zeros(MESH_WORDS, np.int64)
@@ -106,9 +107,8 @@ def _words_of(solid: Any) -> IntArray:
 
 
 def _frame_of(pose: Pose) -> FloatArray | None:
-    """Return the frame of a pose: a row (7,) for each axis, of R^-1 as double-doubles and of the shift.
-
-    None if kernels do not take its numbers. Poses of the plane map z to z.
+    """Return the frame of a pose (3, 7): by axis a row of R^-1 as double-doubles, then the translation; planar poses
+    fix z. None if numbers are out of the kernels' range.
     """
     entries, below = exact_inverse(pose)
     n, frame = pose.dimension, np.zeros((3, 7))
@@ -119,4 +119,6 @@ def _frame_of(pose: Pose) -> FloatArray | None:
 
 
 def _are_safe(numbers: Iterable[float]) -> bool:
+    """Return whether all numbers are zero or within the range in which kernels compute without underflow or overflow.
+    """
     return all(x == 0.0 or SMALLEST <= abs(x) <= LARGEST for x in numbers)

@@ -36,13 +36,13 @@ from engine.segment_clipping.pieces import (
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 _LOST: Final = 2.0**-1060
-"""Error of a sum of products that underflow."""
+"""Error bound of a sum of products that underflow."""
 
 Pair = tuple[float, float]
 
 
 class _Quadratic(NamedTuple):
-    """a, 2 b and c' of the quadratic, its value at 1, D, and an error bound of each."""
+    """The quadratic a t^2 + 2 b t + c': a, b, c', its value at t = 1, D = b^2 - a c', and an error bound of each."""
 
     a: Pair
     b: Pair
@@ -58,13 +58,13 @@ class _Quadratic(NamedTuple):
 
 @inline
 def difference(p: Triple, q: Triple) -> Vector:
-    """Return q - p."""
+    """Return q - p, each coordinate an exact pair of doubles."""
     return two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2])
 
 
 @inline
 def sign_of(value: float, bound: float) -> int:
-    """Return the sign of a value with an error bound, or UNDECIDED."""
+    """Return the sign (1, -1) of a value known to +- bound, or UNDECIDED."""
     if value > bound:
         return 1
     return -1 if value < -bound else UNDECIDED
@@ -72,11 +72,13 @@ def sign_of(value: float, bound: float) -> int:
 
 @inline
 def _size(v: Vector) -> float:
+    """Return the 1-norm of a vector of pairs, by their heads."""
     return abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0])
 
 
 @inline
 def _dot(a: Vector, b: Vector) -> Pair:
+    """Return the scalar product of two vectors of pairs, as a double-double."""
     xh, xl = dd_mul(a[0][0], a[0][1], b[0][0], b[0][1])
     yh, yl = dd_mul(a[1][0], a[1][1], b[1][0], b[1][1])
     zh, zl = dd_mul(a[2][0], a[2][1], b[2][0], b[2][1])
@@ -86,7 +88,7 @@ def _dot(a: Vector, b: Vector) -> Pair:
 
 @inline
 def _in_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
-    """Return the quadratic computed in doubles, from the heads of the pairs."""
+    """Return the quadratic computed in doubles from the heads of d = q - p and f = p - c."""
     d_size, f_size = _size(d), _size(f)
     a = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[2][0] * d[2][0]
     b = d[0][0] * f[0][0] + d[1][0] * f[1][0] + d[2][0] * f[2][0]
@@ -102,6 +104,7 @@ def _in_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
 
 @inline
 def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
+    """Return the quadratic computed in double-doubles from d = q - p and f = p - c."""
     d_size, f_size = _size(d), _size(f)
     ah, al = _dot(d, d)
     bh, bl = _dot(d, f)
@@ -123,7 +126,7 @@ def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Qua
 
 @inline
 def _meets(e: _Quadratic) -> tuple[int, int, int]:
-    """Return the result of `meets_ball` as far as a quadratic decides it."""
+    """Return as `meets_ball`, from a quadratic and its bounds."""
     a, b, gap = e.a[0], e.b[0], e.gap[0]
     past = e.a_bound + e.b_bound + 2.0**-50 * (a + abs(b))
     of_p, of_q = sign_of(e.c, e.c_bound), sign_of(e.at_q, e.q_bound)
@@ -135,17 +138,20 @@ def _meets(e: _Quadratic) -> tuple[int, int, int]:
 
 @called
 def _meets_in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
+    """Return as `meets_ball`, computed in double-doubles."""
     return _meets(_in_double_doubles(d, f, blur, radius))
 
 
 @inline
 def meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
-    """Return whether a segment meets a ball, and on which side of the sphere its ends are.
+    """Return whether a segment meets a ball, and on which side of the sphere its ends p and q lie.
 
     | result | 1 | -1 | UNDECIDED |
     |---|---|---|---|
     | first | meets | misses | not proven |
     | second, third (p, q) | outside | inside | not proven |
+
+    d = q - p, f = p - c; blur: error of each coordinate of f.
     """
     meets, of_p, of_q = _meets(_in_doubles(d, f, blur, radius))
     if meets == UNDECIDED or (meets == 1 and (of_p == UNDECIDED or of_q == UNDECIDED)):
@@ -155,10 +161,8 @@ def meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, i
 
 @inline
 def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, of_q: int) -> tuple[int, End, End]:
-    """Return 1 and the two ends of the piece of a segment in the ball, as `put_piece` takes them; UNDECIDED if not
-    precise.
-
-    of_p, of_q: 1 where that end is outside, and so replaced by a root.
+    """Return 1 and both ends of the piece of a segment in a ball, as `put_piece` takes them; or UNDECIDED. of_p, of_q:
+    1 if that end is outside, so that a root replaces it.
     """
     first, last = OWN_START, OWN_END
     if of_p < 0 and of_q < 0:
@@ -186,7 +190,7 @@ def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, o
 
 @inline
 def _ball_of(segments: FloatArray, item: int, center: FloatArray) -> tuple[Vector, Vector]:
-    """Return d and f of a segment, with z = 0 in 2D."""
+    """Return d = q - p and f = p - c of segment ``item``, z being 0 in 2D."""
     is_flat = segments.shape[2] == 2
     p, c = point_of(segments, item, 0, is_flat), (center[0], center[1], 0.0 if is_flat else center[2])
     return difference(p, point_of(segments, item, 1, is_flat)), difference(c, p)

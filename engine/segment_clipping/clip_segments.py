@@ -170,7 +170,7 @@ def plan_for(region: Solid) -> Plan:
 
 
 def on_box(region: Aabb) -> Plan:
-    """Return the clipping method of a box."""
+    """Return the clipping plan of a box: Cohen-Sutherland."""
     low, high = region.min, region.max
 
     def with_columns(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -185,7 +185,7 @@ def on_box(region: Aabb) -> Plan:
 
 
 def on_planes(region: HalfSpace | Convex) -> Plan:
-    """Return the clipping method of a half-space or convex solid."""
+    """Return the clipping plan of a half-space or convex solid: Cyrus-Beck."""
     rows = rows_of(region)
     plain = balanced_rows(rows, 0)
 
@@ -199,7 +199,7 @@ def on_planes(region: HalfSpace | Convex) -> Plan:
 
 
 def on_ball(region: Sphere) -> Plan:
-    """Return the clipping method of a ball."""
+    """Return the clipping plan of a ball: roots of a quadratic."""
     center, radius = region.center, float(region.radius)
 
     def scale(segments: FloatArray) -> Scaled | None:

@@ -47,7 +47,9 @@ T_TINY: Final = 2.0**-1060
 """Bound for parameters that underflow."""
 SHORTEST: Final = 2.0**-400
 LONGEST: Final = 2.0**400
-"""Range of d in which the bound of a crossing holds: quotients of products that underflow are below `_UNDERFLOW`."""
+"""Range of |d| (SHORTEST .. LONGEST) in which the bound of a crossing holds: quotients of products that underflow are
+below `_UNDERFLOW`.
+"""
 _UNDERFLOW: Final = 2.0**-600
 _CLOSE: Final = 48.0 * U2
 """Relative error of the difference of two parameters: 26 u^2 for both, 6 u^2 for the difference of their low parts;
@@ -71,7 +73,9 @@ class PlaneCrossing(NamedTuple):
 
 @merged
 def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing:
-    """Return the crossing of p q, its coordinates on one axis, with the plane at `at`."""
+    """Return the crossing of a segment with the plane x = at; p, q: coordinates of its ends on that axis. plane: its
+    number, copied.
+    """
     n, n_low = two_diff(at, p)
     d, d_low = two_diff(q, p)
     d = d if p != q else 1.0  # not met: any number
@@ -83,7 +87,9 @@ def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing
 def slab_crossings(
     p: float, q: float, low: float, high: float, axis: float
 ) -> tuple[PlaneCrossing, PlaneCrossing, bool]:
-    """Return the crossings where p q enters and leaves the slab low .. high; False if q - p is out of range."""
+    """Return the crossings where a segment enters and leaves the slab low .. high; False if q - p is out of range. p,
+    q: coordinates of its ends on the axis (0.0, 1.0, 2.0).
+    """
     is_entered, is_left = (p < low) | (p > high), (q < low) | (q > high)
     entered = plane_crossing(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
     left = plane_crossing(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
@@ -96,8 +102,7 @@ def slab_crossings(
 
 @merged
 def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]:
-    """Return the parameter of a minus that of b, and whether its sign is certain; exactly zero if both are equal.
-
+    """Return the parameter of a minus that of b, and whether its sign is proven; exactly 0.0 if both are proven equal.
     Of exact differences equality is n_a d_b = n_b d_a (lattices: diagonals through corners).
     """
     gap = (a.t - b.t) + (a.t_low - b.t_low)
@@ -109,7 +114,9 @@ def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]
 
 @merged
 def slab(p: float, q: float, low: float, high: float, not_entered: float, not_left: float) -> tuple[float, float]:
-    """Return the parameters at which p q, on one axis, enters and leaves low .. high, or those given if it does not."""
+    """Return the parameters at which a segment enters and leaves low .. high, in doubles. p, q: coordinates of its ends
+    on the axis. not_entered, not_left: returned where it does not.
+    """
     d = q - p if p != q else 1.0  # not met: any number
     enters, leaves = ((low if p < low else high) - p) / d, ((low if q < low else high) - p) / d
     return (enters if (p < low) | (p > high) else not_entered), (leaves if (q < low) | (q > high) else not_left)
@@ -117,7 +124,9 @@ def slab(p: float, q: float, low: float, high: float, not_entered: float, not_le
 
 @merged
 def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Decide segment p q against a box: state (OPEN if doubles do not suffice), plane entered, plane left."""
+    """Return state, plane entered and plane left (-1.0: none) of segment p q in a box low .. high. State: 0.0 REJECTED,
+    1.0 ACCEPTED, 2.0 OPEN, if doubles do not prove it.
+    """
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, low, high
     misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
     misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit
@@ -140,7 +149,7 @@ def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple
 
 @merged
 def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Decide as `decide_in_doubles` does, in double-doubles."""
+    """Return as `decide_in_doubles`, proven in double-doubles."""
     a, d, is_x = slab_crossings(p[0], q[0], low[0], high[0], 0.0)
     b, e, is_y = slab_crossings(p[1], q[1], low[1], high[1], 1.0)
     c, f, is_z = slab_crossings(p[2], q[2], low[2], high[2], 2.0)

@@ -38,13 +38,14 @@ VALUE_TINY: Final = 2.0**-1070
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
 """Error of a parameter in doubles besides that of its plane values: two or three roundings of a number up to 1."""
 WIDEST: Final = 2.0**900
-"""Bound of plane values below which no term overflows."""
+"""Bound on plane values below which no term overflows."""
 NARROWEST: Final = 2.0**-960
-"""Size beyond which the inverse of the difference of two plane values of different signs does not overflow."""
+"""If the difference of two plane values of different signs is larger, its inverse does not overflow."""
 
 
 class Latest(NamedTuple):
-    """The last plane that a segment crosses: at t, within `slack`; rival: the largest t that another plane may have."""
+    """The last plane that a segment crosses: at t, known to +- slack; rival: largest t that any other plane may have.
+    """
 
     t: float
     slack: float
@@ -53,11 +54,9 @@ class Latest(NamedTuple):
 
 
 def as_columns(rows: FloatArray) -> FloatArray:
-    """Return plane rows (m, dim + 1) as columns (dim + 3, m).
-
-    The last two columns bound the error of a value in doubles: relative to the largest coordinate, and absolute. They
-    are zero if a value is a coordinate and a number, rounded once: its sign is exact, and comparisons have room for a
-    rounding of each.
+    """Return plane rows (m, dim + 1) as columns (dim + 3, m), with two columns of error bounds. The bounds of a value
+    in doubles: relative to the largest coordinate, and absolute. They are zero if a value is a coordinate and a number,
+    rounded once: its sign is exact, and comparisons have room for a rounding of each.
     """
     with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
         slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
@@ -71,7 +70,8 @@ def as_columns(rows: FloatArray) -> FloatArray:
 
 @inline
 def are_safe(row: FloatArray, segment: FloatArray) -> bool:
-    """Return whether every number of a row and a segment is zero or in the range in which expansions are exact."""
+    """Return whether all numbers of a plane row and a segment are zero or in the range in which expansions are exact.
+    """
     safe = True
     for k in range(row.size):
         safe = safe and is_safe(row[k])
@@ -82,7 +82,7 @@ def are_safe(row: FloatArray, segment: FloatArray) -> bool:
 
 @inline
 def expand_value(row: FloatArray, point: FloatArray, e: Components) -> int:
-    """Set e to the exact value of `row` at `point` as an expansion (7 places in 3D); return its length."""
+    """Set expansion e to the value of a plane row at a point; return its length, at most 7 in 3D."""
     d = row.size - 1
     n = grow(e, 0, row[d])
     for k in range(d):
@@ -92,14 +92,16 @@ def expand_value(row: FloatArray, point: FloatArray, e: Components) -> int:
 
 @called
 def exact_sign(row: FloatArray, point: FloatArray) -> int:
-    """Return the exact sign of `row` at `point`, both within the safe range."""
+    """Return the exact sign of a plane row at a point, both in the range of `are_safe`."""
     e = workspace(8)
     return sign(e, expand_value(row, point, e))
 
 
 @called
 def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> int:
-    """Return the exact sign of t_i - t_j for two planes that `segment` crosses, all within the safe range."""
+    """Return the exact sign of t_i - t_j, the parameters where a segment crosses two planes, all in the range of
+    `are_safe`.
+    """
     p_i, q_i, p_j, q_j, e = workspace(8), workspace(8), workspace(8), workspace(8), workspace(200)
     n_pi, n_qi = expand_value(row_i, segment[0], p_i), expand_value(row_i, segment[1], q_i)
     n_pj, n_qj = expand_value(row_j, segment[0], p_j), expand_value(row_j, segment[1], q_j)
@@ -110,10 +112,9 @@ def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> in
 def decide_by_rows(
     segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
 ) -> tuple[int, int, int, int]:
-    """Decide one segment by the n `chosen` planes: state, plane entered, plane left, 1 if beyond the filter.
-
-    s_p, s_q, bounds: values of each plane at both ends, and their error bound. An item with an uncertain sign or order
-    outside of the safe range stays OPEN.
+    """Decide one segment by n chosen planes; return state, plane entered, plane left (-1: none), and 1 if beyond the
+    filter. chosen: columns of the planes; planes are returned as indices into it. s_p, s_q, bounds: value of each plane
+    at both ends, and their error bound. An uncertain sign or order outside the safe range leaves the state OPEN.
     """
     entered = left = -1
     beyond = 0
@@ -158,7 +159,8 @@ def decide_by_rows(
 def compare_rows(
     segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, i: int, j: int
 ) -> tuple[int, bool]:
-    """Return the sign of t_i - t_j for two planes that `segment` crosses, and whether the filter sufficed."""
+    """Return the sign of t_i - t_j for chosen planes i and j that a segment crosses, and whether the filter sufficed.
+    """
     order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
     if order != UNDECIDED:
         return order, True
@@ -170,7 +172,8 @@ def compare_rows(
 
 @merged
 def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
-    """Return the later of the latest crossing so far and another one, within `slack`, if is_crossed."""
+    """Return the later of the latest crossing so far, `best`, and a crossing at t +- slack, ignored unless is_crossed.
+    """
     is_later = is_crossed & (t > best.t)
     other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
     return Latest(
@@ -181,9 +184,9 @@ def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best:
 
 @merged
 def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> float:
-    """Return the state of a segment from the latest plane entered and, by -t, the first plane left; OPEN if uncertain.
-
-    t = s_p / (s_p - s_q) has the error bound / (|s_p| + |s_q|) if both values have the error bound.
+    """Return the state (0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN) of a segment. entered: the last plane entered; left: the
+    first plane left, with -t for t. t = s_p / (s_p - s_q) has the error bound / (|s_p| + |s_q|) if both values have the
+    error bound. is_out, is_open: already decided so.
     """
     start, end = entered.t, -left.t
     is_sure = max(start + entered.slack, entered.rival) < min(end - left.slack, -left.rival)
@@ -195,7 +198,7 @@ def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> floa
 
 @inline
 def coordinate_limit(columns: FloatArray) -> float:
-    """Return the bound on coordinates below which bounds of plane values stay below `WIDEST`."""
+    """Return a bound on coordinates below which the bounds of plane values stay below `WIDEST`."""
     limit = np.inf
     for j in range(columns.shape[1]):
         limit = min(limit, (WIDEST - columns[-1, j]) / columns[-2, j])
@@ -206,9 +209,8 @@ def coordinate_limit(columns: FloatArray) -> float:
 def decide_alone(
     segments: FloatArray, item: int, columns: FloatArray, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
-    """Decide one segment as `decide_by_rows` does.
-
-    limit: of coordinates. numbers (3, m), chosen (m,): scratch.
+    """Decide segment ``item``; return as `decide_by_rows`, with planes as indices of rows. limit: `coordinate_limit`.
+    numbers (3, m), chosen (m,): scratch.
     """
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
@@ -232,9 +234,8 @@ def decide_on_rows(
     segments: FloatArray, columns: FloatArray, first: int, last: int, stop: FlagArray, items: Int32Array,
     planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide which planes bound the pieces of ``segments[first:last]`` ((n, 2, dim) float64) where all planes are >= 0.
-
-    Plane by plane over a block of segments, without branches. columns: of `as_columns`. Outputs: see `decide_on_boxes`.
+    """Decide which planes bound the pieces of ``segments[first:last]`` in a convex region; outputs: see
+    `decide_on_boxes`. Plane by plane over a block of segments (n, 2, dim), without branches. columns: of `as_columns`.
     """
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0

@@ -28,23 +28,24 @@ from engine.solids.checks import check_finite
 from engine.types import FloatArray, Int32Array, IntArray
 
 Clipped = tuple[Pieces, int, int]
-"""Pieces, number of items beyond the filter, and number decided in rationals."""
+"""Pieces, number of segments beyond the filter, and number decided in rationals."""
 
 FEW: Final = 32
-"""Number of OPEN items that cost the exact fallback as much as a search for a scale; and of segments below which chunks
-cost more than they save."""
+"""Most segments of a small batch, run as one chunk; and most OPEN items for which the exact fallback costs no more than
+a search for a scale.
+"""
 
 
 _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
 """Scratch of the small batch path, for one call at a time."""
 _NO_FLAG: Final = UNLIMITED.flag
 _PER_BLOCK: Final = 1 << 12
-"""Segments that are decided before their pieces are filled."""
+"""Segments decided before their pieces are filled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scaled:
-    """A batch and its region times 2^-exponent, the arguments of the kernels."""
+    """A batch of segments and its region, both times 2^-exponent, as arguments of kernels."""
 
     points: FloatArray
     region: tuple[Any, ...]
@@ -52,7 +53,7 @@ class Scaled:
 
 
 def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
-    """Return a batch and the arrays of its region scaled; None if no scaling is needed or it is not exact."""
+    """Return a batch and the arrays of its region scaled by a power of two; None if that is not needed or not exact."""
     exponent = exponent_of(points, *region)
     arrays = [shifted(array, -exponent) for array in (points, *region)]
     exact = [array for array in arrays if array is not None]
@@ -62,10 +63,8 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 
 
 class Method(NamedTuple):
-    """How to clip segments to one convex region.
-
-    decide, fill: kernels; see cohen_sutherland.py, planes_cut.py. region: their arguments. scale: returns the batch
-    scaled, None if no scaling is needed or it is not exact.
+    """How to clip segments to one convex region. decide, fill: kernels; see cohen_sutherland.py, planes_cut.py. region:
+    their arguments. scale: returns the batch scaled, None if that is not needed or not exact.
     """
 
     decide: Any
@@ -75,23 +74,23 @@ class Method(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """How to clip segments to one solid: made by the cell `clip` of its row, cached with the solid."""
+    """How to clip segments to one solid, by its type (`Row.clip`); cached with the solid."""
 
     name: str
-    """For `Accuracy.method`."""
+    """Name of the method in `Accuracy.method`."""
     cut: Callable[[FloatArray, Any, Plan, Budget, int | None, Progress | None], Clipped]
     """(segments, solid, plan, budget, workers, progress); segments: (n, 2, dim) float64, not yet tested for NaN. Raises
     NotFiniteError."""
     few: int = FEW
     """Largest batch that runs as one chunk if the call has no limits: `budget` is UNLIMITED then."""
     method: Method | None = None
-    """Kernels, for a convex region."""
+    """Kernels, for a convex region; None for others."""
 
 
 def clip_on_convex(
     segments: FloatArray, region: Solid, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the piece of each segment that has one: see `Plan.cut`."""
+    """Return the pieces of segments in a convex region, at most one a segment; as of `Plan.cut`."""
     method = plan.method
     assert method is not None
     if len(segments) <= FEW and (few := _clip_few(segments, method)) is not None:
@@ -110,7 +109,7 @@ def clip_on_convex(
 
 
 def _clip_few(segments: FloatArray, method: Method) -> Clipped | None:
-    """Return the pieces of up to `FEW` segments (n, 2, dim) float64, not yet tested for NaN; None if any stays OPEN."""
+    """Return the pieces of at most `FEW` segments (n, 2, dim) float64, maybe NaN; None if one stays OPEN."""
     n, _, dimension = segments.shape
     decide, fill, region, _ = method
     try:
@@ -133,7 +132,7 @@ def _clip(
     segments: FloatArray, region: Solid, method: Method, scene: Scaled, most_open: int, budget: Budget,
     workers: int | None, progress: Progress | None,
 ) -> Clipped | None:  # fmt: skip
-    """Return the pieces; None if more than `most_open` items are left to the exact fallback."""
+    """Return the pieces of a batch; None if more than `most_open` segments need the exact fallback."""
     batch = _Batch(method, scene, budget)
     run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress)
     n_open = sum(map(len, batch.open_items))
@@ -150,10 +149,9 @@ def _clip(
 
 
 class _Batch:
-    """Clips chunks of a batch and writes each piece to its final row, behind those of all earlier chunks.
-
-    Rows are assigned in the order of the chunks: a chunk that is decided early waits, and the thread that decides the
-    chunk before it also fills it. Rows are allocated for a piece of every segment; unused ones cost address space only.
+    """Clips chunks of a batch and writes each piece to its final row, after those of all earlier chunks. Rows are
+    assigned in the order of the chunks: a chunk that is decided early waits, and the thread that decides the chunk
+    before it also fills it. Rows are allocated for a piece of every segment; unused ones cost address space only.
     """
 
     def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
@@ -167,13 +165,14 @@ class _Batch:
         self._lock, self._next = Lock(), 0
 
     def clip(self, first: int, last: int) -> None:
-        """Clip segments first .. last - 1 in blocks, which are still in the cache when their pieces are filled."""
+        """Clip segments first .. last - 1, in blocks that are still in the cache when their pieces are filled."""
         for begin in range(first, last, _PER_BLOCK):
             self._decide(begin, min(begin + _PER_BLOCK, last))
             while (chunk := self._next_to_fill()) is not None:
                 self._fill(*chunk)
 
     def _decide(self, first: int, last: int) -> None:
+        """Decide segments first .. last - 1, and add the chunk to those waiting to be filled."""
         size, scene = last - first, self._scene
         items, planes, still = np.empty(size, np.int32), np.empty((size, 2), np.int32), np.empty(size, np.int32)
         counts = np.zeros(3, np.int64)
@@ -188,7 +187,9 @@ class _Batch:
             self._waiting[first] = last, items, planes, n_accepted
 
     def _next_to_fill(self) -> tuple[int, Int32Array, Int32Array, int] | None:
-        """Return the first row and the items of the next chunk in order, None if it is not yet decided."""
+        """Return first row, segments, planes and number of rows of the next chunk in order; None if it is still
+        undecided.
+        """
         with self._lock:
             if self._next not in self._waiting:
                 return None
@@ -198,7 +199,7 @@ class _Batch:
             return row, items, planes, n_accepted
 
     def _fill(self, row: int, items: Int32Array, planes: Int32Array, n_accepted: int) -> None:
-        """Fill `n_accepted` rows from `row` on."""
+        """Fill `n_accepted` rows from `row` on; note the rows that are not certainly rounded."""
         scene, pieces, counts, still = self._scene, self.pieces, np.zeros(2, np.int64), np.empty(n_accepted, np.int32)
         entry_of(self._method.fill)(
             scene.points, *scene.region, items, planes, row, n_accepted, self._flag, pieces, still, counts
@@ -218,7 +219,9 @@ class _Batch:
 
 
 def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, region: Solid, budget: Budget) -> Pieces:
-    """Return the pieces with uncertain rows recomputed by the exact fallback, and with the pieces of OPEN items."""
+    """Return the pieces in order of source, after the exact fallback recomputed uncertain rows and clipped OPEN
+    segments.
+    """
     rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
     again = clip_exactly(segments, filled.source[rows], region, None, budget)
     filled.t[rows], filled.ends[:, rows], filled.faces[rows] = again.t, again.ends, again.faces

@@ -35,9 +35,8 @@ _CHECK_EVERY: Final = 64
 
 
 class Contact(NamedTuple):
-    """A common stretch of a segment and an element, from `first` to `last`, equal for a point.
-
-    is_along: it is in the element's plane or line. turns: the perturbed line crosses the element.
+    """Common part of a segment and an element (edge or triangle), from parameter `first` to `last`, equal for a point.
+    is_along: the segment lies in the element's plane or line. turns: the perturbed line crosses the element.
     """
 
     first: Fraction
@@ -48,12 +47,14 @@ class Contact(NamedTuple):
 
 
 def _cross(u: Integers, v: Integers) -> Integers:
-    """Return u x v; in 2D its one component, and 0."""
+    """Return the cross product u x v; in 2D its only component, and 0."""
     return cross(u, v) if len(u) == 3 else (u[0] * v[1] - u[1] * v[0], 0)
 
 
 def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
-    """Return the common stretch of p q and the edge a b, and whether they are collinear (also if a = b)."""
+    """Return first and last parameter of the common part of segment p q and edge a b, and whether they are collinear.
+    Collinear also if a = b. None if there is no common point.
+    """
     u, v, w = minus(q, p), minus(b, a), minus(a, p)
     normal = _cross(u, v)
     size = dot(normal, normal)
@@ -73,10 +74,12 @@ def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
 def triangle_overlap(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
-    """Return the common stretch of the segment p q and the closed triangle a b c, and whether they are coplanar.
+    """Return first and last parameter of the common part of segment p q and closed triangle a b c, and whether
+    coplanar.
 
-    A triangle without area counts as coplanar. With corners relative to p and u = q - p, the normal is B x C + C x A +
-    A x B; the line meets the triangle unless signs of the volumes u . (B x C), ... differ, and their sum is n . u.
+    None if there is no common point. A triangle without area counts as coplanar. With corners relative to p and u = q -
+    p, the normal is B x C + C x A + A x B; the line meets the triangle unless signs of the volumes u . (B x C), ...
+    differ, and their sum is n . u.
     """
     u, *seen = (minus(x, p) for x in (q, a, b, c))
     around = [cross(seen[k - 2], seen[k - 1]) for k in range(3)]
@@ -110,9 +113,8 @@ def triangle_overlap(
 
 
 def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
-    """Return whether the line through p and q, moved by infinitesimals, crosses an edge or a triangle.
-
-    Seen along the line, an element parallel to it has no length or no area: it contains no perturbed point.
+    """Return whether the line through p and q, moved by infinitesimals, crosses an edge or triangle. Seen along the
+    line, an element parallel to it has no length or no area: it contains no perturbed point.
     """
     u = minus(q, p)
     if len(u) == 2:
@@ -127,7 +129,7 @@ def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
 def contacts_of(
     start: Integers, end: Integers, elements: Sequence[tuple[int, Sequence[Integers]]], check: Callable[[], object]
 ) -> Iterator[Contact]:
-    """Yield the contacts of a segment with elements, the face and the corners (two or three) of each."""
+    """Yield the contacts of a segment with elements, each given as its face and its two or three corners."""
     for i, (face, corners) in enumerate(elements):
         if i % _CHECK_EVERY == 0:
             check()
@@ -137,7 +139,7 @@ def contacts_of(
 
 
 def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]]:
-    """Return the sorted parameters at which contacts begin or end, with 0 and 1, and these contacts."""
+    """Return the sorted parameters at which contacts begin or end, 0 and 1 included, each with the contacts there."""
     events: list[tuple[Fraction, Contact | None]] = [(FIRST, None), (LAST, None)]
     events += [(contact.first, contact) for contact in contacts]
     events += [(contact.last, contact) for contact in contacts if contact.first < contact.last]
@@ -150,10 +152,9 @@ def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]
 def nodes_with_locations(
     contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
 ) -> Iterator[tuple[Fraction, list[Contact], bool, bool]]:
-    """Yield each parameter of `nodes_of` with its contacts and the location of the span after it.
-
-    The location: whether the segment lies in an element there, and else whether it is inside. locations: of the ends of
-    the segment. locate: returns the location at a parameter; called at most once, if both ends are on the boundary.
+    """Yield each parameter of `nodes_of` with its contacts, and of the span after it: is it along an element? is it
+    inside? locations: of the ends of the segment. locate: returns the location at a parameter; called at most once, if
+    both ends are on the boundary.
     """
     nodes = nodes_of(contacts)
     n_along, has_turned = 0, False
@@ -176,7 +177,7 @@ def nodes_with_locations(
 
 
 class Parameter(NamedTuple):
-    """The number (u + v sqrt(w)) / z of integers, w >= 0 and z > 0, and the double nearest to it."""
+    """The number (u + v sqrt(w)) / z, integers with w >= 0 and z > 0, and the double nearest to it."""
 
     u: int
     v: int
@@ -186,7 +187,7 @@ class Parameter(NamedTuple):
 
 
 def parameter(u: int, v: int, w: int, z: int) -> Parameter:
-    """Return (u + v sqrt(w)) / z, z not 0."""
+    """Return the number (u + v sqrt(w)) / z; z is not 0."""
     if z < 0:
         u, v, z = -u, -v, -z
     return Parameter(u, v, w, z, nearest_with_root(u, v, w, z))
@@ -197,7 +198,7 @@ ONE: Final = parameter(1, 0, 0, 1)
 
 
 def compare(a: Parameter, b: Parameter) -> int:
-    """Return the sign of a - b."""
+    """Return the exact sign of a - b."""
     if a.near != b.near:
         return 1 if a.near > b.near else -1
     top, root = a.u * b.z - b.u * a.z, _sign_with_root(a.u * b.z - b.u * a.z, a.v * b.z, a.w)
@@ -209,7 +210,7 @@ def compare(a: Parameter, b: Parameter) -> int:
 
 
 def _sign_with_root(a: int, b: int, m: int) -> int:
-    """Return the sign of a + b sqrt(m)."""
+    """Return the exact sign of a + b sqrt(m)."""
     first, second = sign_of(a), sign_of(b) * sign_of(m)
     if first * second >= 0:
         return first or second

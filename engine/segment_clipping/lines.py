@@ -26,9 +26,11 @@ from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
 
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
-"""Output arrays: vertices (2 m, dim), offsets (m + 1,) into them, line (m,), and first and last piece of a segment."""
+"""Output of `join_parts`: vertices (2 m, dim), offsets (m + 1,) into them, and by joined piece its line and its first
+and last piece of a segment (m,).
+"""
 _PER_BLOCK: Final = 1 << 20
-"""Pieces whose columns are gathered between two polls."""
+"""Pieces whose columns are gathered between two polls of the flag."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -169,7 +171,7 @@ def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
 
 
 def _joined(pieces: Pieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray, budget: Budget) -> LinePieces:
-    """Join the pieces of segments; firsts: first vertex of each segment."""
+    """Join the pieces of segments to pieces of lines; firsts: first vertex of each segment."""
     m, at = len(pieces.source), firsts[pieces.source]
     starts, ends = map(np.ascontiguousarray, pieces.ends)
     made = Joined(np.empty((2 * m, vertices.shape[1])), np.empty(m + 1, np.int64), *np.empty((3, m), np.int64))
@@ -191,10 +193,8 @@ def join_parts(
     starts: FloatArray, ends: FloatArray, faces: IntArray, at: IntArray, vertices: FloatArray, offsets: IntArray,
     out: Joined, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Join consecutive pieces of segments, from starts (m, dim) to ends, at common vertices; return the number of
-    pieces.
-
-    at: (m,) first vertex of the segment of each piece; offsets: of the lines into all vertices. Polls `flag`.
+    """Join consecutive pieces of segments, from starts (m, dim) to ends, where they meet in a vertex; return their
+    number. at: (m,) first vertex of the segment of each piece; offsets: of the lines into all vertices. Polls `flag`.
     """
     n, n_made, begin, line = 0, 0, 0, 0
     out.offsets[0] = 0
@@ -230,15 +230,14 @@ def join_parts(
 
 @inline
 def _continues(faces: IntArray, at: IntArray, part: int, after: int) -> bool:
-    """Return whether a part reaches the end of its segment, and the next part begins the next segment there."""
+    """Return whether piece `part` reaches the end of its segment, and piece `after` begins the next segment there."""
     return (faces[part, 1] < 0) & (faces[after, 0] < 0) & (at[after] == at[part] + 1)
 
 
 @inline
 def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: FloatArray, first: int, last: int) -> int:
-    """Return how many parts at the start of a closed line follow its last part, and so move behind it.
-
-    0 unless first and last vertex are equal, both are inside, and not all parts are connected.
+    """Return how many pieces at the start of a closed line continue its last piece, and so move behind it. 0 unless
+    first and last vertex are equal and inside, and some piece of the line is not connected to the next.
     """
     if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
         return 0
@@ -252,7 +251,7 @@ def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: Floa
 
 @inline
 def _append_vertex(rows: FloatArray, row: int, points: FloatArray, point: int) -> int:
-    """Copy a point to the next row; return the row after it."""
+    """Copy point ``point`` to row ``row``; return the row after it."""
     for k in range(points.shape[1]):
         rows[row, k] = points[point, k]
     return row + 1

@@ -15,20 +15,22 @@ from engine.types import FloatArray
 
 Triple = tuple[float, float, float]
 End = tuple[float, float, float, int]
-"""End of a piece: parameter, its low part, its relative error, and the face, -1 for the segment's own end."""
+"""End of a piece: parameter, its low part, its relative error, and the face; face -1: the segment's own end."""
 OWN_START, OWN_END = (-1.0, 0.0, 0.0, -1), (2.0, 0.0, 0.0, -1)
-"""The ends of a segment as ends of a piece."""
+"""The ends of a segment itself, as ends of a piece."""
 REJECTED: Final = 0
 ACCEPTED: Final = 1
 """States of a segment, besides OPEN."""
 LARGE: Final = 2.0**1000
-"""Bound on the sum of |coordinates| of an item: a larger sum (or NaN) leaves it OPEN."""
+"""Bound on the sum of |coordinates| of a segment: a larger sum (or NaN) leaves it OPEN."""
 BLOCK: Final = 64
-"""Segments of a block: fifteen numbers each fit the L1 cache."""
+"""Segments of a block, so that fifteen numbers of each fit the L1 cache."""
 
 
 class Piece(NamedTuple):
-    """One piece of one segment: parameters and points correctly rounded, faces crossed (-1: own end)."""
+    """One piece of one segment: parameters and points, correctly rounded, and faces crossed (-1: the segment's own
+    end).
+    """
 
     t: tuple[float, float]
     start: list[float]
@@ -41,23 +43,23 @@ Pieces = namedtuple("Pieces", "source ends t faces")
 
 
 def allocate_pieces(m: int, dimension: int) -> Pieces:
-    """Return uninitialised arrays for m pieces."""
+    """Allocate arrays for m pieces, uninitialised."""
     return Pieces(np.empty(m, np.int64), np.empty((2, m, dimension)), np.empty((m, 2)), np.empty((m, 2), np.int64))
 
 
 def joined(parts: Sequence[Pieces]) -> Pieces:
-    """Return several sets of pieces concatenated."""
+    """Concatenate several sets of pieces."""
     source, ends, t, faces = zip(*parts)
     return Pieces(concatenated(source), concatenated(ends, axis=1), concatenated(t), concatenated(faces))
 
 
 def first_of(pieces: Pieces, m: int) -> Pieces:
-    """Return the first m pieces."""
+    """Return the first m pieces, as views."""
     return Pieces(pieces.source[:m], pieces.ends[:, :m], pieces.t[:m], pieces.faces[:m])
 
 
 def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -> Pieces:
-    """Return pieces of the exact fallback as columns, without negative zeros."""
+    """Return pieces of the exact fallback as columns, -0.0 replaced by 0.0."""
     ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, dimension) + 0.0
     return Pieces(
         np.array(sources, np.int64),
@@ -68,7 +70,8 @@ def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -
 
 
 def in_order_of_source(parts: Sequence[Pieces]) -> Pieces:
-    """Return several sets of pieces merged by source; the pieces of one source are in one set."""
+    """Merge several sets of pieces by source; caller guarantees that the pieces of one source are in one set, in order.
+    """
     pieces = joined(parts)
     order = np.argsort(pieces.source, kind="stable")
     return Pieces(pieces.source[order], pieces.ends[:, order], pieces.t[order], pieces.faces[order])
@@ -76,19 +79,19 @@ def in_order_of_source(parts: Sequence[Pieces]) -> Pieces:
 
 @merged
 def is_plain(p: Triple, q: Triple) -> bool:
-    """Return whether the coordinates of a segment are finite and below `LARGE`."""
+    """Return whether the coordinates of a segment are finite, and their magnitudes add up to less than `LARGE`."""
     return abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(q[0]) + abs(q[1]) + abs(q[2]) < LARGE
 
 
 @merged
 def point_of(segments: FloatArray, item: int, end: int, is_flat: bool) -> Triple:
-    """Return an end of a segment."""
+    """Return end 0 or 1 of segment ``item``, with z = 0 if is_flat."""
     return segments[item, end, 0], segments[item, end, 1], (0.0 if is_flat else segments[item, end, 2])
 
 
 @merged
 def put_end(pieces: Pieces, row: int, end: int, point: Triple, is_flat: bool) -> None:
-    """Write an end of a piece, without negative zeros."""
+    """Write ``point`` as end 0 or 1 of the piece in a row, -0.0 replaced by 0.0."""
     pieces.ends[end, row, 0], pieces.ends[end, row, 1] = point[0] + 0.0, point[1] + 0.0
     if not is_flat:
         pieces.ends[end, row, 2] = point[2] + 0.0
@@ -96,14 +99,14 @@ def put_end(pieces: Pieces, row: int, end: int, point: Triple, is_flat: bool) ->
 
 @merged
 def put_own_end(pieces: Pieces, row: int, end: int, segments: FloatArray, item: int, is_flat: bool) -> None:
-    """Write an end of a piece that is the segment's own."""
+    """Write end 0 or 1 of segment ``item`` as that end of the piece in a row: t 0 or 1, face -1."""
     pieces.t[row, end], pieces.faces[row, end] = end, -1
     put_end(pieces, row, end, point_of(segments, item, end, is_flat), is_flat)
 
 
 @inline
 def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
-    """Return the relative error of s / d from the bounds of s and d; infinite if their sizes are out of its range."""
+    """Return a bound on the relative error of s / d; infinite if s or d is out of the range of the bound."""
     if not (2.0**-400 <= abs(d) <= 2.0**400 and abs(s) >= 2.0**-500):
         return np.inf
     return 1.01 * (s_bound / abs(s) + d_bound / abs(d))
@@ -111,7 +114,8 @@ def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
 
 @inline
 def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low: float, slack: float) -> bool:
-    """Write the point at t, known within slack; return whether it and t are certainly the nearest doubles."""
+    """Write the point at parameter t + low, relative error slack; return whether it and t are proven nearest doubles.
+    """
     bound = (T_BOUND + slack) * abs(t)
     sure = (slack < 0.001) & (t + (low - bound) == t + (low + bound))
     for k in range(segments.shape[2]):
@@ -123,7 +127,7 @@ def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low:
 
 @inline
 def put_piece(out: Pieces, row: int, source: int, segments: FloatArray, item: int, first: End, last: End) -> bool:
-    """Write a piece between two ends; return whether all numbers are certainly the nearest doubles."""
+    """Write a piece of segment ``item`` between two ends; return whether all numbers are proven nearest doubles."""
     sure = True
     out.source[row] = source
     for end in range(2):

@@ -21,10 +21,8 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 @called
 def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: int, at: float) -> tuple[float, bool]:
-    """Set `point` to the crossing of `segment` with the plane of `row` by expansions; return t and whether all is
-    certain.
-
-    axis, at: of an axis-parallel plane, whose row has a single 1 or -1; else -1 and anything.
+    """Set `point` to the crossing of a segment with the plane of `row`, by expansions; return t, and whether all is
+    proven. axis, at: of an axis-parallel plane, whose row has a single 1 or -1; else -1 and anything.
     """
     wp, wq, e = workspace(8), workspace(8), workspace(96)
     if axis >= 0:  # what is not safe on other axes is multiplied by zero
@@ -40,10 +38,8 @@ def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: 
 
 @merged
 def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
-    """Return the crossing of p q with a plane from its values at p and q, t, and whether all is certainly the nearest
-    double.
-
-    slack: relative error bound of t.
+    """Return the crossing x, y, z of p q with a plane, t, and whether all are proven nearest doubles. sp, sq: the
+    plane's value at p and q as double-double and error bound. slack: relative error bound of t.
     """
     sp_h, sp_l, sp_bound = sp
     sq_h, sq_l, sq_bound = sq
@@ -101,7 +97,9 @@ def fill_on_rows(
 def cut_end(
     p: Triple, q: Triple, lowest: Triple, highest: Triple, plane: float, end: float
 ) -> tuple[float, float, float, float, bool]:
-    """Return the crossing of p q with a plane, t, and whether all is certain; for plane -1 the end of p q, 0 or 1."""
+    """Return x, y, z of the crossing of p q with a plane of a box, t, and whether all is proven. plane: 0.0 .. 5.0;
+    -1.0: end 0.0 or 1.0 of the segment itself.
+    """
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, lowest, highest
     is_x, is_y, is_z = plane < 1.5, (plane > 1.5) & (plane < 3.5), plane > 3.5
     is_high = (plane == 1.0) | (plane == 3.0) | (plane == 5.0)
@@ -130,7 +128,7 @@ def cut_end(
 def recompute_ends(
     segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, row: int, unsure: int, pieces: Pieces
 ) -> bool:  # fmt: skip
-    """Recompute by expansions the ends of a piece whose bit of `unsure` is set; return whether all is certain."""
+    """Recompute by expansions the ends of a piece whose bits are set in `unsure`; return whether all is proven."""
     all_sure = True
     for end in range(2):
         if unsure >> end & 1 == 1:

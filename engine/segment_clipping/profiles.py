@@ -52,14 +52,13 @@ from engine.types import FloatArray, IntArray
 
 OUTSIDE, BOUNDARY, INSIDE = -1, 0, 1
 _BYTES: Final = 1000
-"""Memory of a piece as a Python object."""
+"""Memory counted for a piece as a Python object."""
 Point = Sequence[Number]
 
 
 class Node(NamedTuple):
-    """A parameter, the location there, the face crossed there, and the location of the open span up to the next node.
-
-    The face is -1 for none; a face that contains an end of the segment is named if no other is.
+    """A node of a profile: parameter, location there, faces entered and left there, location of the open span after it.
+    A face is -1 for none; a face that contains an end of the segment is named if no other is.
     """
 
     t: Parameter
@@ -72,9 +71,8 @@ class Node(NamedTuple):
 def clip_exactly(
     segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> Pieces:
-    """Return the pieces of the segments `items` of (n, 2, dim) by exact arithmetic; locations: of both ends, if known.
-
-    Raises: UnsupportedSolidError, what `Budget.check` raises.
+    """Return the pieces of segments `items` of (n, 2, dim) by exact arithmetic. locations: of both ends of each, if
+    known. Raises: UnsupportedSolidError, what `Budget.check` raises.
     """
     sources: list[int] = []
     pieces: list[Piece] = []
@@ -92,7 +90,7 @@ def clip_exactly(
 def exact_pieces(
     p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> list[ExactPiece]:
-    """Return the pieces of the segment p q in a posed solid, in order; locations: of p and q, if known."""
+    """Return the pieces of segment p q in a posed solid, in order; locations: of p and q, None if unknown."""
     if p == q:
         is_in = (located(p, solid, pose, budget) if locations is None else locations[0]) >= 0
         return [ExactPiece(ZERO, ONE, (-1, -1))] if is_in else []
@@ -109,7 +107,7 @@ def exact_pieces(
 
 
 class Line(NamedTuple):
-    """A segment in the frame of a posed solid."""
+    """A segment p q with a solid's pose; start and end are p and q in the solid's own frame."""
 
     p: Point
     q: Point
@@ -119,18 +117,18 @@ class Line(NamedTuple):
     pose: Pose | None
     budget: Budget
     locations: Any
-    """Of p and q in the solid, None if unknown."""
+    """Locations of p and q in the solid, None if unknown."""
 
 
 class ExactPiece(NamedTuple):
-    """A piece of a segment: its parameters, and the faces crossed at either end."""
+    """A piece of a segment: exact parameters, and the faces crossed at both ends (-1: the segment's own end)."""
 
     first: Parameter
     last: Parameter
     faces: tuple[int, int]
 
     def rounded(self, p: list[float], q: list[float]) -> Piece:
-        """Return the piece of p q with each number rounded to the nearest double."""
+        """Return the piece of segment p q with all numbers rounded to the nearest double."""
         numbers, scale = common_integers([*p, *q])
         moves = [(x, y - x) for x, y in zip(numbers[: len(p)], numbers[len(p) :])]
 
@@ -141,7 +139,7 @@ class ExactPiece(NamedTuple):
 
 
 def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
-    """Return the location of a point in a posed solid; on a surface it is BOUNDARY."""
+    """Return the location (-1, 0, 1) of a point in a posed solid; on a surface, BOUNDARY."""
     if isinstance(solid, Surface):
         own = p if pose is None else to_body_frame(p, pose)
         return BOUNDARY if list(_contacts(own, own, solid, pose, budget)) else OUTSIDE
@@ -151,7 +149,7 @@ def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
 def profile_of(
     p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> list[Node]:
-    """Return the profile of the segment p q, p and q different, in a posed solid, from t = 0 to t = 1."""
+    """Return the profile of segment p q (p and q differ) in a posed solid: its nodes from t = 0 to t = 1."""
     start, end = (p, q) if pose is None else (to_body_frame(p, pose), to_body_frame(q, pose))
     line = Line(p, q, start, end, pose, budget, locations)
 
@@ -181,7 +179,7 @@ def profile_of(
 
 
 def unsupported(solid: Solid) -> UnsupportedSolidError:
-    """Return the error for a solid to which no segment is clipped."""
+    """Return the error for a solid to which segments cannot be clipped."""
     error: UnsupportedSolidError = refused(
         solid, "no segment is cut on", lambda row: row.profile, ", or a csg of these"
     )
@@ -189,8 +187,9 @@ def unsupported(solid: Solid) -> UnsupportedSolidError:
 
 
 def check_cut(solids: Sequence[Solid]) -> bool:
-    """Return True where segments can be clipped to a solid, leaves of CSG trees included; else raise
-    UnsupportedSolidError for the first whose type does not support it."""
+    """Return True if segments can be clipped to all solids, leaves of CSG trees included; else raise
+    UnsupportedSolidError.
+    """
     for body, solid in enumerate(solids):
         waiting = [solid]
         while waiting:  # bound: a tree has so many leaves at most
@@ -203,7 +202,7 @@ def check_cut(solids: Sequence[Solid]) -> bool:
 
 
 def _face_offsets(solid: Csg) -> dict[int, int]:
-    """Return for each leaf of a tree, by its id, the number of faces of the leaves before it."""
+    """Return, by the id of each node of a CSG tree, the number of faces of the leaves before it."""
     offsets: dict[int, int] = {}
     total = 0
     waiting: list[Solid] = [solid]
@@ -220,7 +219,7 @@ def _face_offsets(solid: Csg) -> dict[int, int]:
 
 
 def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
-    """Return the profile of a Boolean combination; the face at a parameter is the smallest of the operands'."""
+    """Return the profile of a Boolean operation; the face at a parameter is the lowest of the operands' faces."""
     nodes = sorted((node.t for profile in profiles for node in profile), key=cmp_to_key(compare))
     parameters = [t for i, t in enumerate(nodes) if i == 0 or compare(nodes[i - 1], t) != 0]
     combined, places = [], [0] * len(profiles)
@@ -241,8 +240,8 @@ def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
 
 
 def _interval(a: Node, b: Node, between: int) -> list[Node]:
-    """Return the profile of a single interval [a, b], possibly degenerate, between whose nodes the location is
-    `between`."""
+    """Return the profile of one interval from node a to node b, maybe a point; between: the location of its open span.
+    """
     nodes = [] if compare(a.t, ZERO) == 0 else [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE)]
     if compare(a.t, b.t) == 0:
         nodes.append(Node(a.t, min(a.at, b.at), a.entered, b.left, OUTSIDE))
@@ -255,17 +254,17 @@ _NOWHERE: Final = [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE), Node(ONE, OUTSIDE, -1, 
 
 
 def on_planes(line: Line, solid: HalfSpace | Aabb | Convex) -> list[Node]:
-    """Return the profile in a half-space or convex solid."""
+    """Return the profile of a segment in a half-space, box or convex solid."""
     return _on_rows(line, rows_of(solid).tolist())
 
 
 def on_triangle(line: Line, solid: Triangle) -> list[Node]:
-    """Return the profile in a planar triangle, or the prism over a triangle of space."""
+    """Return the profile of a segment in a planar triangle, or in the prism over a triangle of space."""
     return on_boundary(line, solid) if solid.dimension == 2 else _on_rows(line, prism_walls(solid))
 
 
 def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
-    """Return the profile in the set where every row (a, b, ..., d) has dot(row, (x, 1)) >= 0."""
+    """Return the profile of a segment in the set where all rows (a, b, ..., d) have dot(row, (x, 1)) >= 0."""
     p, q, n = line.start, line.end, len(line.p)
     numbers, scale = common_integers([*p, *q])
     start, end = numbers[:n], numbers[n:]
@@ -296,7 +295,9 @@ def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
 
 
 def on_sphere(line: Line, solid: Sphere) -> list[Node]:
-    """Return the profile in a ball, where a t^2 + 2 b t + c <= 0; c and c_end are its values at t = 0 and t = 1."""
+    """Return the profile of a segment in a ball. The ball is where a t^2 + 2 b t + c <= 0; c and c_end are the values
+    at t = 0 and t = 1.
+    """
     center: Point = solid.center.tolist()
     center, n = center if line.pose is None else to_world_frame(center, line.pose), len(center)
     numbers, _ = common_integers([*line.p, *line.q, *center, solid.radius])
@@ -318,7 +319,7 @@ def on_sphere(line: Line, solid: Sphere) -> list[Node]:
 
 
 def on_boundary(line: Line, solid: Any) -> list[Node]:
-    """Return the profile in a polygon, planar triangle or polyhedron, or on a surface."""
+    """Return the profile of a segment in a polygon, planar triangle or polyhedron, or on a surface."""
     _, _, p, q, pose, budget, locations = line
     contacts = list(_contacts(p, q, solid, pose, budget))
     if isinstance(solid, Surface):
@@ -343,7 +344,7 @@ def on_boundary(line: Line, solid: Any) -> list[Node]:
 
 
 def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget) -> Iterator[Contact]:
-    """Yield the contacts of p q, in the frame of the solid, with its elements."""
+    """Yield the exact contacts of segment p q, in the solid's own frame, with the solid's edges or triangles."""
     boundary = boundary_of(solid)
     if pose is None and list(p) != list(q):
         near, _, _ = contacts_with(np.array([[p, q]], np.float64), boundary, budget)
@@ -361,7 +362,8 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
 
 
 def _near(elements: FloatArray, p: Point, q: Point) -> Any:
-    """Return the elements (k, corners, dim) whose boxes the segment p q, rounded outward, may meet."""
+    """Return the indices of the elements (k, corners, dim) that segment p q may meet, by their boxes, rounded outward.
+    """
     with np.errstate(all="ignore"):  # what is no number keeps an element
         a, b = (np.array([float(x) for x in point]) for point in (p, q))
         low, high = elements.min(axis=1), elements.max(axis=1)

@@ -45,15 +45,16 @@ N_NAMED = 32
 BOTH = 3
 
 _BAD, FLUSH, N_SIGNS = 9, 10, 11
-"""Slots of the work space after nine signs: whether a sign is open; corners in the plane of the other face, 3 bits
-each."""
+"""Slots of the work space after nine signs. _BAD: 1 if a sign is undecided; FLUSH: bits of the corners that lie in the
+plane of the other face, 3 bits a face.
+"""
 
 
 @called
 def _orient3d(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float, work: Int8Array
 ) -> int:
-    """Return orient3d; if it is open, 0 and set _BAD."""
+    """Return the exact sign of orient3d(a, b, c, d); if it is undecided, return 0 and set ``work[_BAD]``."""
     side = sign_of_four(poses, a, b, c, d, error)
     if side == UNDECIDED:
         work[_BAD], side = 1, 0
@@ -65,7 +66,9 @@ def _orient_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float,
     work: Int8Array,
 ) -> int:  # fmt: skip
-    """Return the orientation of three points of one plane; if it is open, 0 and set _BAD."""
+    """Return the orientation sign of three points of one plane; if it is undecided, return 0 and set ``work[_BAD]``.
+    off, axis: as of `turn_in_plane`.
+    """
     turn = turn_in_plane(poses, a, b, c, off, axis, error)
     if turn == UNDECIDED:
         work[_BAD], turn = 1, 0
@@ -76,8 +79,9 @@ def _orient_in_plane(
 def _contact_with_face(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, axis: int, error: float, work: Int8Array
 ) -> int:
-    """Return how t meets the open face u, given the sides of t's corners at u's plane: EDGE_FACE, VERTEX_FACE, or a
-    contact at corners."""
+    """Return the strongest kind of contact of t with the open face u: EDGE_FACE, VERTEX_FACE, or VERTEX_EDGE if there
+    is none. sides: of t's corners at the plane of u. Sets ``work[_BAD]`` if a sign is undecided.
+    """
     off, flat = off_plane_point(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     if not np.isfinite(off.x + off.y + off.z):
         work[_BAD] = 1
@@ -124,8 +128,9 @@ def _contact_with_face(
 def _overlap_collinear(
     poses: FloatArray, t: Facet, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Int8Array
 ) -> bool:
-    """Return whether edge k of t and the collinear segment c d share a length, by planes through either end and off the
-    line."""
+    """Return whether edge k of t and the collinear segment c d share more than a point. Decided by orient3d against
+    planes through either end of the edge and off its line.
+    """
     a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), off_plane_point(t, axis)
     for end in range(2):
         p, q = (a, b) if end == 0 else (b, a)
@@ -140,7 +145,9 @@ def _overlap_collinear(
 def _interiors_of_edges_intersect(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Int8Array
 ) -> bool:
-    """Return whether two open edges of the faces have a common point."""
+    """Return whether an open edge of t and an open edge of u have a common point. sides, their_sides: of the corners of
+    t at the plane of u, and vice versa. Sets ``work[_BAD]`` if a sign is undecided.
+    """
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
     off, flat = off_plane_point(t, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     for k in range(3):
@@ -174,7 +181,9 @@ def _interiors_of_edges_intersect(
 
 @inline
 def single_coplanar_corner(sides: Signs) -> int:
-    """Return the one corner of a face on a plane if the others lie strictly on one side of it, else -1."""
+    """Return the only corner of a face that lies in a plane, if the other two lie strictly on one side of it, else -1.
+    sides: of the three corners.
+    """
     for k in range(3):
         if sides[k] == 0 and sides[(k + 1) % 3] * sides[(k + 2) % 3] == 1:
             return k
@@ -185,11 +194,9 @@ def single_coplanar_corner(sides: Signs) -> int:
 def classify_contact(
     poses: FloatArray, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Int8Array
 ) -> tuple[int, int]:
-    """Return the kind of the contact of two faces with area, UNSETTLED if a sign is open, and which open face it may
-    cut.
-
-    May cut: bit 1 for t, 2 for u, BOTH; none if the faces share a single point, or a part of the border only. Sets
-    FLUSH.
+    """Return the kind of contact of two faces with area (UNSETTLED if undecided), and bits of the open faces that it
+    may cut. Bits: 1 for t, 2 for u, BOTH; 0 if the faces share a single point, or a part of their borders only. Sets
+    ``work[FLUSH]``.
     """
     work[_BAD] = work[FLUSH] = 0
     sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
@@ -225,7 +232,9 @@ def classify_contact(
 
 @inline
 def _plane_sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tuple[int, int]:
-    """Return the proven sides of c and d at the plane of the origin, a and b; 0 if unsure."""
+    """Return the signs of the sides of c and d at the plane through the origin, a and b, as proven by floats; 0:
+    undecided.
+    """
     n, bound = cross(a, b), bound_near(a, b, c, d, d, error)
     one, other = dot(n, c), dot(n, d)
     return int(one > bound) - int(one < -bound), int(other > bound) - int(other < -bound)
@@ -233,12 +242,12 @@ def _plane_sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tu
 
 @merged
 def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
-    """Return 3 k + m if corner k of one face is corner m of the other and their only common point, else -1.
+    """Return 3 k + m if corner k of t and corner m of u are one point, proven to be the only common point; else -1.
 
-    t, u: rounded posed triangles, each coordinate within `error`. own, their: the same before their poses. The other
-    corners v, w of one lie strictly on one side of the plane of the other; or both faces straddle, and leave the corner
-    along the common line in opposite directions. With normals m and n that is (m x n) sign(n . v), and (n x m) sign(m .
-    x), where x is the corner of the other in the role of v.
+    t, u: rounded posed triangles, each coordinate within `error`. own, their: the same before their poses. Proof: the
+    other corners v, w of one lie strictly on one side of the plane of the other; or both faces straddle, and leave the
+    corner along the common line in opposite directions. With normals m and n that is (m x n) sign(n . v), and (n x m)
+    sign(m . x), where x is the corner of the other in the role of v.
     """
     for k in range(3):
         for m in range(3):
@@ -260,10 +269,9 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
 def insert_sorted(
     faces: Any, their_faces: Any, pairs: Any, kinds: Any, i: int, j: int, kind: int
 ) -> tuple[int, int, int]:
-    """Insert a pair of faces (i, j) of a kind into the last N_NAMED rows, sorted by the callers' faces, then by index
-    (`_precedes`), empty rows (-1) last.
-
-    Return the pair and kind that has no place there: the last in order, maybe the given one; i is -1 if a row was free.
+    """Insert a pair of faces (i, j) and its kind into the last N_NAMED rows, in the order of `_precedes`, empty rows
+    (-1) last. Returns the pair and kind pushed out, the last in order (possibly the given one); its first face is -1 if
+    a row was free.
     """
     n = kinds.shape[0]
     for place in range(n - N_NAMED if _precedes(faces, their_faces, i, j, pairs, n - 1) else n, n):
@@ -278,6 +286,7 @@ def insert_sorted(
 
 @inline
 def _precedes(faces: Any, their_faces: Any, i: int, j: int, pairs: Any, place: int) -> bool:
-    """Return whether a pair comes before that of a row: by the callers' faces, then by index."""
+    """Return whether the pair (i, j) sorts before that of row ``place``: by the caller's face numbers, then by index.
+    """
     p, q = pairs[place, 0], pairs[place, 1]
     return p < 0 or (faces[i], their_faces[j], i, j) < (faces[p], their_faces[q], p, q)

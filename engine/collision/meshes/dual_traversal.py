@@ -47,10 +47,10 @@ DONE, SETTLED, FULL, INTERRUPTED = range(4)
 | INTERRUPTED | the flag was set |
 """
 LEAST_LOOK = 4096
-"""Number of pairs counted even if the room is smaller: a later one may decide the query."""
+"""A search counts at least so many pairs even if the room is smaller: a later pair may decide the query."""
 
 STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH
-"""Bound on pairs of nodes waiting: a pair is replaced by at most 64, one of the two nodes a level deeper."""
+"""Bound on the pairs of nodes on the stack: a pair is replaced by at most 64, one of its nodes a level deeper."""
 
 
 Descent = namedtuple("Descent", "stack frames work poses signs")
@@ -66,15 +66,16 @@ Descent = namedtuple("Descent", "stack frames work poses signs")
 """
 
 Contacts = namedtuple("Contacts", "pairs kinds met")
-"""Room for pairs of faces in contact: pairs (room, 2), their classes kinds (room,), room >= 1.
-
-met: empty, or for all faces of the first, then of the second body, whether a listed pair has it. Then
-`contact_kinds.py` selects the pairs, and there are N_NAMED rows more.
+"""Room for pairs of faces in contact: ``pairs`` (room, 2), and ``kinds`` (room,), their classes; room >= 1. met: empty,
+or for all faces of the first, then of the second body, whether a listed pair contains it. If it is not empty,
+`contact_kinds.py` selects the pairs to list, and there are N_NAMED rows more.
 """
 
 
 class Place(NamedTuple):
-    """Placements of two bodies: rounded (`place_pair`), whether they are posed, and the error of exact signs."""
+    """Placements of two bodies: a and b rounded (`place_pair`), the error of either, and that of exact signs under
+    poses.
+    """
 
     a: Placement
     b: Placement
@@ -83,7 +84,9 @@ class Place(NamedTuple):
 
 
 class Search(NamedTuple):
-    """One query about two bodies: placements, the goal that ends it early (SEEK_...), and the room for its contacts."""
+    """One query about two bodies: meshes, placements, goal that ends it early (SEEK_...), room for contacts, cancel
+    flag.
+    """
 
     first: MeshArrays
     second: MeshArrays
@@ -95,26 +98,29 @@ class Search(NamedTuple):
 
 
 def new_descent() -> Descent:
-    """Return the work space of one search."""
+    """Allocate the work space of one search."""
     frames, work = np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((WORK_ROWS, LANES), np.float32)
     return Descent(np.empty((STACK_ROWS, 2), np.int32), frames, work, np.zeros((2, 12)), np.zeros(N_SIGNS, np.int8))
 
 
 def new_contacts(room: int, n_faces: int = 0) -> Contacts:
-    """Return room for pairs of faces; n_faces: the faces of both bodies if pairs with common corners are selected."""
+    """Allocate room for pairs of faces in contact; n_faces: of both bodies, if pairs with a common corner are selected,
+    else 0.
+    """
     n = room + (N_NAMED if n_faces else 0)
     return Contacts(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
 
 
 @inline
 def capacity_of(contacts: Contacts) -> int:
-    """Return the number of pairs that fit."""
+    """Return how many pairs of faces fit, without the N_NAMED extra rows."""
     return len(contacts.kinds) - (N_NAMED if len(contacts.met) > 0 else 0)
 
 
 @inline
 def store_pose(poses: FloatArray, row: int, pose: PoseArrays, item: int) -> None:
-    """Write a pose for exact signs: rotation by rows, then translation."""
+    """Write a pose to ``poses[row]`` for exact signs: nine numbers of the rotation, row by row, then the translation.
+    """
     for i in range(3):
         for k in range(3):
             poses[row, 3 * i + k] = pose.rotations[item, i, k]
@@ -126,7 +132,9 @@ def place_bodies(
     first: MeshArrays, first_pose: PoseArrays, first_item: int, second: MeshArrays, second_pose: PoseArrays,
     second_item: int, descent: Descent,
 ) -> tuple[Place, bool]:  # fmt: skip
-    """Place two bodies and fill the frames and poses of a search; return whether they are provably disjoint."""
+    """Place two bodies and fill the frames and poses of a search; return the placements, and whether the bodies are
+    proven disjoint.
+    """
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
     is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
@@ -144,20 +152,24 @@ def place_bodies(
 
 @inline
 def placed_triangle(t: Facet, place: Placement) -> Facet:
-    """Return the rounded posed triangle."""
+    """Return a triangle under its placement, rounded."""
     return Facet(placed(t.p, place), placed(t.q, place), placed(t.r, place))
 
 
 @inline
 def unposed_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
-    """Return a face of each body in its own coordinates."""
+    """Return face i of the first and face j of the second body in their own coordinates, tagged with their pose
+    numbers.
+    """
     own = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
     return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
 
 
 @inline
 def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
-    """Return two faces for exact signs, unposed unless placing is exact, and an axis of each."""
+    """Return faces i and j as input of exact signs, and for each an axis along which its projection has an area. If
+    placing is exact (error 0) these are posed points; else points before their poses, with pose numbers.
+    """
     axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
     if s.place.error == 0.0:
         t, u = placed_triangle(triangle_of(s.first, i), s.place.a), placed_triangle(triangle_of(s.second, j), s.place.b)
@@ -168,13 +180,14 @@ def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
 
 @inline
 def exact_error(s: Search) -> float:
-    """Return the error of the points of `exact_faces`, for the filter of exact signs."""
+    """Return the bound on the rounding of posed points that exact signs of `exact_faces` take for their filter."""
     return 0.0 if s.place.error == 0.0 else s.place.posed_error
 
 
 @merged
 def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
-    """Return the class of two faces, placed t and u, that provably share one corner only; else UNDECIDED."""
+    """Return CORNER + 3 k + m for two faces proven to share one corner only, else UNDECIDED; t, u: the faces as placed.
+    """
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their = unposed_faces(s, i, j)
@@ -184,7 +197,7 @@ def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
 
 @merged
 def settle_class(s: Search, i: int, j: int) -> int:
-    """Return the class of two faces left open by the filter; UNDECIDED without area, or out of range."""
+    """Return the class of two faces by exact signs; UNDECIDED if a face has no area, or exponents are out of range."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their, axis, _ = exact_faces(s, i, j)
@@ -193,7 +206,7 @@ def settle_class(s: Search, i: int, j: int) -> int:
 
 @merged
 def is_decisive(s: Search, kind: int, i: int, j: int) -> bool:
-    """Return whether a contact of class `kind` answers the query."""
+    """Return whether a contact of class ``kind`` between faces i and j reaches the goal ``s.seek`` of the search."""
     if s.seek == SEEK_CONTACT:
         return True
     if kind != CROSSING:
@@ -207,7 +220,9 @@ def is_decisive(s: Search, kind: int, i: int, j: int) -> bool:
 
 @merged
 def pop_lowest_bit(low: int, high: int) -> tuple[int, int, int]:
-    """Return the index of the lowest set bit of 64, given as two halves not both 0, and the halves without it."""
+    """Clear the lowest set bit of a 64-bit mask, given as two 32-bit halves (not both 0); return its index and both
+    halves.
+    """
     if low != 0:
         return lowest_bit(low), low & (low - 1), high
     return 32 + lowest_bit(high), low, high & (high - 1)
@@ -215,9 +230,9 @@ def pop_lowest_bit(low: int, high: int) -> tuple[int, int, int]:
 
 @merged
 def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int]:
-    """Classify the pairs of faces of blocks i and j selected by the bits low and high; write those in contact.
-
-    Returns DONE or the early outcome, and the number of pairs.
+    """Classify pairs of faces of the leaf blocks i and j, and append those in contact to ``s.contacts``. low, high:
+    mask of the pairs, bit 8 * lane of i + lane of j. Returns DONE, SETTLED, FULL or INTERRUPTED, and the number of
+    pairs.
     """
     pairs, kinds, met = s.contacts
     room = capacity_of(s.contacts)
@@ -256,9 +271,8 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
 
 @merged
 def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]:
-    """Replace nodes i and j on the stack by the pairs of children that may intersect; push nothing for two blocks.
-
-    Returns the height of the stack, and for two blocks the bits of their pairs of faces that may intersect.
+    """Replace the nodes i and j on the stack by the pairs of children that may intersect. Returns the height of the
+    stack and two halves of a mask: for two leaf blocks, the pairs of faces that may intersect.
     """
     stack, frames, work, _, _ = s.descent
     child, their_child = s.first.child, s.second.child
@@ -291,7 +305,9 @@ def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]
 
 @merged
 def search(s: Search) -> tuple[int, int]:
-    """Write the pairs of faces in contact, a decisive one to row 0; return the outcome and the number of pairs."""
+    """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...) and the number of pairs. If
+    one pair decides the query, it stands in row 0.
+    """
     stack = s.descent.stack
     stack[0, 0], stack[0, 1] = 0, 0
     n_stack, n_pairs = 1, 0

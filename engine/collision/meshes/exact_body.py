@@ -39,7 +39,7 @@ Corners = tuple[Vector, Vector, Vector]
 
 
 def plane_through(corners: Corners) -> Plane:
-    """Return the plane of three points; all zero if they have no area."""
+    """Return the plane (a, b, c, d) through three points; all zero if these are collinear."""
     p, q, r = corners
     n = cross(minus(q, p), minus(r, p))
     return (*n, -dot(n, p))
@@ -52,7 +52,8 @@ def on_lattice(value: float, shift: int) -> int:
 
 
 class ExactBody:
-    """A placed body on the lattice of a pair."""
+    """A body under its pose, in integers: every coordinate times 2^shift. Vertices and planes are computed on demand.
+    """
 
     def __init__(self, mesh: MeshBody, pose: Pose | None, shift: int) -> None:
         self.mesh = mesh
@@ -68,7 +69,7 @@ class ExactBody:
         self._planes: dict[int, Plane] = {}
 
     def vertex(self, index: int) -> Vector:
-        """Return the exact placed vertex."""
+        """Return a vertex under the pose, in units of the lattice."""
         point = self._vertices.get(index)
         if point is None:
             p = self.mesh.arrays.vertices[index].tolist()
@@ -81,35 +82,35 @@ class ExactBody:
         return point
 
     def corners(self, face: int) -> Corners:
-        """Return the three exact corners of a triangle."""
+        """Return the three corners of a triangle under the pose, in units of the lattice."""
         a, b, c = self.mesh.arrays.triangles[face].tolist()
         return self.vertex(a), self.vertex(b), self.vertex(c)
 
     def plane(self, face: int) -> Plane:
-        """Return the exact plane of a triangle."""
+        """Return the plane (a, b, c, d) of a triangle, cached; all zero without area."""
         cached = self._planes.get(face)
         if cached is None:
             cached = self._planes[face] = plane_through(self.corners(face))
         return cached
 
     def axis(self, face: int) -> int:
-        """Return the axis of the largest component of a triangle's normal, -1 without area."""
+        """Return the axis (0, 1, 2) of the largest component of a triangle's normal, -1 for a triangle without area."""
         return largest_axis(self.plane(face)[:3])
 
     def faces_in(self, low: list[float], high: list[float]) -> list[int]:
-        """Return, ascending, a superset of the triangles that meet a closed box; bounds may be infinite."""
+        """Return, ascending, a superset of the triangles that intersect a closed box, whose bounds may be infinite."""
         faces: list[int] = faces_in(self.mesh.arrays, self.pose, low, high).tolist()
         return faces
 
     def at(self, point: Sequence[Fraction]) -> tuple[int, ...]:
-        """Return a point as x, y, z, w on the lattice."""
+        """Return a rational point as x, y, z, w: its coordinates are x / w, y / w, z / w in units of the lattice."""
         w = math.lcm(*(x.denominator for x in point))
         x, y, z = (int(x * w) << self.shift for x in point)
         return x, y, z, w
 
 
 def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[float]) -> IntArray:
-    """Return, ascending, a superset of the triangles of a placed mesh that meet a closed box, which may be infinite."""
+    """Return, ascending, a superset of the triangles of a posed mesh that intersect the closed box low .. high."""
     box, hits = np.array([*low, *high]), np.empty(256, np.int64)
     n_hits = entry_of(_faces_in_box)(arrays, pose, box, hits)
     if n_hits > len(hits):
@@ -119,7 +120,7 @@ def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[
 
 
 def exact_pair(first: MeshBody, second: MeshBody, poses: Poses, shift: int = 0) -> tuple[ExactBody, ExactBody]:
-    """Return both bodies on one lattice of spacing at most 2^-shift."""
+    """Return both bodies under their poses, in integers over one power of two, 2^-shift or finer."""
     for mesh, pose in zip((first, second), poses):
         own = mesh.shift
         if pose is not None:
@@ -129,14 +130,16 @@ def exact_pair(first: MeshBody, second: MeshBody, poses: Poses, shift: int = 0) 
 
 
 def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
-    """Return doubles on both sides of a rational, infinite beyond their range."""
+    """Return a double below and a double above numerator / denominator; infinite beyond the range of doubles."""
     value = rounded_quotient(numerator, denominator)
     return float(np.nextafter(value, -np.inf)), float(np.nextafter(value, np.inf))
 
 
 @inline
 def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: FloatArray) -> bool:
-    """Return whether a placed child box provably misses bounds (6,); a NaN proves nothing."""
+    """Return whether the box of child ``lane`` of a node, posed and enlarged by ``margin``, is proven disjoint from
+    ``bounds``. bounds: x, y, z minimum, then maximum. A NaN proves nothing.
+    """
     r, t = pose.rotations[0], pose.translations[0]
     for i in range(3):
         centre, half = t[i], margin
@@ -150,7 +153,9 @@ def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, mar
 
 @allocating_kernel
 def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: FloatArray, hits: IntArray) -> int:
-    """Write the triangles whose placed boxes may meet bounds (6,) to hits (room,); return their number."""
+    """Write the triangles whose posed boxes may intersect ``bounds`` (6,) to ``hits`` (room,); return their number,
+    maybe more than the room.
+    """
     t = pose.translations[0]
     shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
     margin = 2.0**-47 * (3.0 * mesh.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
@@ -178,17 +183,17 @@ Flat = tuple[int, int]
 
 
 def value_at(plane: Plane, p: Vector) -> int:
-    """Return a x + b y + c z + d."""
+    """Return a x + b y + c z + d of plane (a, b, c, d) at point p: its sign is the side of p."""
     return plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3]
 
 
 def drop_axis(p: Vector, axis: int) -> Flat:
-    """Return the two other coordinates in cyclic order."""
+    """Return the two coordinates of p other than ``axis``, in cyclic order."""
     return p[(axis + 1) % 3], p[(axis + 2) % 3]
 
 
 def as_simplex(t: Corners) -> tuple[Vector, ...]:
-    """Return the three corners of a face; without area the two ends of its segment, or its one point."""
+    """Return the corners of a face; without area, the two ends of the segment that it is, or its one point."""
     p, q, r = t
     if any(cross(minus(q, p), minus(r, p))):
         return t
@@ -197,7 +202,9 @@ def as_simplex(t: Corners) -> tuple[Vector, ...]:
 
 
 def _common_weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector]:
-    """Return the weights of the corners of s, then of t, in a basis of all weights that give the same point of both."""
+    """Return, for each corner of s, then of t, its weight in each vector of a basis of common weights. Common weights:
+    weights of the corners of s and of those of t, of equal sums, that give the same point.
+    """
     origin, n = s[0], len(s) - 1  # its own weight is what the others of s lack
     vectors = [*(minus(p, origin) for p in s[1:]), *(minus(origin, p) for p in t)]
     rows = [(*vector, *(int(k == i) for k in range(len(vectors)))) for i, vector in enumerate(vectors)]
@@ -211,7 +218,9 @@ def _common_weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector
 
 
 def _is_feasible(positive: list[Vector], not_negative: list[Vector]) -> bool:
-    """Return whether some z makes all `positive` linear functions positive and all `not_negative` ones not negative."""
+    """Return whether some vector z gives dot(row, z) > 0 for all rows of `positive`, and >= 0 for all of
+    `not_negative`.
+    """
     n = len(positive[0])
     rows = {(*row, True) for row in positive} | {(*row, False) for row in not_negative}
     for k in range(n):  # of rows that grow and fall with z[k], a sum without it
@@ -222,7 +231,7 @@ def _is_feasible(positive: list[Vector], not_negative: list[Vector]) -> bool:
 
 
 def _simplices_intersect(s: tuple[Vector, ...], t: tuple[Vector, ...], *, within: bool) -> bool:
-    """Return whether two simplices have a common point, and whether their relative interiors have one."""
+    """Return whether two closed simplices have a common point; within: whether their relative interiors have one."""
     weights = _common_weights(s, t)
     if not weights:
         return False
@@ -233,7 +242,7 @@ def _simplices_intersect(s: tuple[Vector, ...], t: tuple[Vector, ...], *, within
 
 
 def classify_exact(t1: Corners, t2: Corners) -> int:
-    """Return APART, CROSSING, CONTACT or COPLANAR for any two faces; never undecided."""
+    """Return the class of two faces, with or without area: APART, CROSSING, CONTACT or COPLANAR; never UNDECIDED."""
     plane1, plane2 = plane_through(t1), plane_through(t2)
     sides1, sides2 = [sign_of(value_at(plane2, p)) for p in t1], [sign_of(value_at(plane1, p)) for p in t2]
     s1, s2 = as_simplex(t1), as_simplex(t2)
@@ -248,7 +257,9 @@ def classify_exact(t1: Corners, t2: Corners) -> int:
 
 
 def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
-    """Return the kind of the contact of two faces that meet: the one of the highest dimension."""
+    """Return the kind of contact of two faces that intersect, the strongest one: face_face, edge_face, ...,
+    vertex_edge.
+    """
     first, second = _features(as_simplex(t1)), _features(as_simplex(t2))
 
     def meet(d: int, e: int) -> bool:
@@ -264,5 +275,5 @@ def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
 
 
 def _features(s: tuple[Vector, ...]) -> tuple[list[tuple[Vector, ...]], ...]:
-    """Return the corners, the edges and the faces of a simplex."""
+    """Return the lists of corners, of edges and of faces of a simplex, each a tuple of points."""
     return tuple(list(combinations(s, n)) for n in (1, 2, 3))

@@ -40,11 +40,13 @@ Homogeneous = tuple[int, ...]
 Only = tuple[int, list[int]]
 
 WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
-"""Weights of the corners for points within a face."""
+"""Barycentric weights, not normalised, of sample points inside a face."""
 
 
 class Sides(NamedTuple):
-    """Status of a body at a point of a face: inside just above, just below, and at it (on no face)."""
+    """Whether a body is inside just above a point, inside just below it, and inside at it (then the point lies on no
+    face).
+    """
 
     above: bool
     below: bool
@@ -52,15 +54,18 @@ class Sides(NamedTuple):
 
 
 def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
-    """Return the status of `body` along `axis` at q; a face that contains q must not contain that axis."""
+    """Return whether `body` is inside just above q along `axis`, just below and at q. Caller guarantees that no face
+    through q is parallel to the axis.
+    """
     sides = sides_over(body, q, axis, None)
     assert sides is not None
     return sides
 
 
 def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
-    """Return the status of `body` along `axis` at q, a point of `plane`; None if a face through q that is not parallel
-    to that plane leaves it open (not tested if `plane` is None)."""
+    """Return as `sides_at` for a point q of `plane`; None if a face through q, not parallel to that plane, makes it
+    ambiguous. plane None: that is not tested.
+    """
     if not body.mesh.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
@@ -87,8 +92,9 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
-    """Return the side of a clean face on which its body lies: 1 that of its normal, or -1; 0 if unknown. Cached in the
-    mesh."""
+    """Return 1 if the body lies on the side of a clean face to which its normal points, -1 if on the other; 0 if
+    undecided. Cached in the mesh.
+    """
     cached, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
     if cached[face] not in (1, -1):
         for q in points_within(body.corners(face)):
@@ -101,20 +107,22 @@ def side_of_clean(body: ExactBody, face: int) -> int:
 
 
 def points_within(corners: Corners) -> Iterator[Homogeneous]:
-    """Yield a few points in the relative interior of a face."""
+    """Yield a few points in the relative interior of a face, homogeneous."""
     for weights in WITHIN:
         x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
         yield x, y, z, sum(weights)
 
 
 def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
-    """Return the ends of a box of doubles around points over one denominator."""
+    """Return the low and the high end of a box of doubles that contains the points, which have one w."""
     scale, sides = points[0][3] << body.shift, list(zip(*points))[:3]
     return [rounded_outward(min(x), scale)[0] for x in sides], [rounded_outward(max(x), scale)[1] for x in sides]
 
 
 def _perturbed_line_hits(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
-    """Return whether the line over (x, y) / w, moved by (eps, eps^2), passes through a face that is not upright."""
+    """Return whether the line through (x, y) / w along the third axis, moved by (eps, eps^2), passes through a face. j,
+    k: the axes of x and y. Caller guarantees that the face is not parallel to the line.
+    """
     before = 0
     for index in range(3):
         a, b = corners[index], corners[(index + 1) % 3]
@@ -132,9 +140,9 @@ def _perturbed_line_hits(corners: Corners, j: int, k: int, x: int, y: int, w: in
 def regions_of(
     body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None = None
 ) -> Iterator[Homogeneous]:
-    """Yield a point in each region that the faces of `cutters` cut from a face with area; none lies on a trace.
-
-    only: a side of the face's plane and the faces that meet the face; restricts the cutters to that side.
+    """Yield a point in each region into which the faces of `cutters` cut a face with area; no point lies on a trace.
+    only: (side, faces): restricts the cutters to parts of these faces strictly on that side (1, -1) of the face's
+    plane.
     """
     traces = _traces(body, face, cutters, budget, only)
     if not traces:
@@ -144,7 +152,9 @@ def regions_of(
 
 
 def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
-    """Yield an interior point and the corners of each convex cell between the traces of the body's own faces."""
+    """Yield an interior point and the four corners of each trapezoid between the traces of the body's other faces on a
+    face.
+    """
     plane, axis = body.plane(face), body.axis(face)
     for (x, y), (x0, x1, low, high) in _sample_regions(body, face, _traces(body, face, [body], budget, None), budget):
         corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
@@ -152,7 +162,7 @@ def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homog
 
 
 def _lift_to_plane(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
-    """Return the point of the plane over (x, y)."""
+    """Return the point of a plane whose coordinates other than ``axis`` are (x, y), homogeneous."""
     j, k, n = (axis + 1) % 3, (axis + 2) % 3, abs(plane[axis])
     w, sign = x.denominator * y.denominator, sign_of(plane[axis])
     xw, yw = x.numerator * y.denominator, y.numerator * x.denominator
@@ -167,7 +177,8 @@ def _segment(p: Rational2, q: Rational2) -> Trace:
 
 
 def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None) -> list[Trace]:
-    """Return the segments in which other faces meet the plane of a face, near the face, projected along its axis."""
+    """Return the segments in which other faces intersect the plane of a face, near the face, projected along its axis.
+    """
     low, high = _around(body, [(*p, 1) for p in body.corners(face)])
     segments = set()
     for cutter in cutters:
@@ -183,7 +194,9 @@ def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget
 
 
 def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
-    """Return the segments in which a face meets the plane at which its corners have `values`."""
+    """Return the segments in which a face intersects a plane, projected along ``axis``; values: its corners' in the
+    plane's equation.
+    """
     if not any(values):
         return [(drop_axis(points[i], axis), drop_axis(points[i - 2], axis)) for i in range(3)]
     flat = [drop_axis(p, axis) for p in points]
@@ -198,7 +211,7 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
 def _sample_regions(
     body: ExactBody, face: int, traces: list[Trace], budget: Budget
 ) -> Iterator[tuple[Rational2, _Cell]]:
-    """Yield a point in every region that `traces` cut from a face, projected along its axis, and its cell."""
+    """Yield a point in every region into which `traces` cut a face, and the trapezoid that contains it, projected."""
     corners = [drop_axis(corner, body.axis(face)) for corner in body.corners(face)]
     own = [_segment(corners[i], corners[i - 2]) for i in range(3)]
     left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
@@ -224,7 +237,8 @@ def _sample_regions(
 
 
 class _Segment(NamedTuple):
-    """Left and right end, as integers (x, y, w), and the line a x + b y + c = 0 through them."""
+    """A segment of the plane: its ends, the same as integers (x, y, w), left and right, and its line a x + b y + c = 0.
+    """
 
     ends: Trace
     left: Vector
@@ -233,22 +247,24 @@ class _Segment(NamedTuple):
 
 
 def _on_line(ends: Trace) -> _Segment:
+    """Return the segment between two rational points, the left one first."""
     whole = [(*x.as_integer_ratio(), *y.as_integer_ratio()) for x, y in ends]
     left, right = ((x * v, y * u, u * v) for x, u, y, v in whole)
     return _Segment(ends, left, right, cross(left, right))
 
 
 _Cell = tuple[Rational, Rational, _Segment, _Segment]
-"""Between two abscissas and two segments that do not cross there."""
+"""A trapezoid: left and right abscissa, lower and upper segment, which do not cross between these."""
 
 
 def _height(s: _Segment, x: Rational) -> Fraction:
+    """Return the ordinate of the line of s at abscissa x."""
     a, b, c = s.line
     return Fraction(-(a * x.numerator + c * x.denominator), b * x.denominator)
 
 
 def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
-    """Return the abscissa where two segments cross in a point that is an end of neither, else None."""
+    """Return the abscissa of the crossing of two segments in a point inside both, else None."""
     for one, other in ((s, t), (t, s)):
         if sign_of(dot(one.line, other.left)) * sign_of(dot(one.line, other.right)) >= 0:
             return None
@@ -259,7 +275,9 @@ def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
 def pieces_of_segment(
     body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
 ) -> Iterator[Homogeneous]:
-    """Yield a point in each piece that the faces of `cutter` cut from a segment; some may lie on a face."""
+    """Yield a point inside each piece into which the faces of `cutter` cut a segment, homogeneous; some may lie on a
+    face.
+    """
     p, q = ends
     low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}
@@ -278,8 +296,9 @@ def pieces_of_segment(
 
 
 def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:
-    """Yield the plane of a face and the planes through its edges across it: a segment changes its status on these
-    only."""
+    """Yield the plane of a face, and the planes through its edges perpendicular to it. A segment enters or leaves the
+    body only where it crosses one of these.
+    """
     plane = cutter.plane(face)
     if any(plane[:3]):
         yield plane

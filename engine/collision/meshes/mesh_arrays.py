@@ -52,12 +52,12 @@ STATE_STACKED = 2
 
 
 STILL = PoseArrays(read_only(np.eye(3)[None]), read_only(np.zeros((1, 3))), False)
-"""Pose of a body without a pose."""
+"""The identity as pose of a body that has none."""
 
 
 BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
     ([0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6])])  # fmt: skip
-"""Of each face of a box (6, 2, 3), counter-clockwise from outside; numbers of corners as in `corners_of_box`."""
+"""Two triangles for each face of a box (6, 2, 3), counter-clockwise from outside; vertices as of `corners_of_box`."""
 
 
 MeshArrays = namedtuple(
@@ -74,35 +74,35 @@ first_face: the least in the first component. has_inside: False for surfaces and
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshBody:
-    """Triangles of one body. arrays: for kernels; shift: every coordinate times 2^shift is an integer."""
+    """Triangles of one body. arrays: input of kernels; shift: every coordinate times 2^shift is an integer."""
 
     arrays: MeshArrays
     shift: int
 
     @property
     def faces(self) -> IntArray:
-        """The caller's face of each triangle."""
+        """The caller's face number of each triangle."""
         return self.arrays.faces
 
     @property
     def has_inside(self) -> bool:
-        """False for surfaces and flat boxes."""
+        """False for surfaces and flat boxes, which have no interior."""
         return self.arrays.has_inside
 
     def posed(self, pose: Pose | None) -> PoseArrays:
-        """Return the pose as kernels take it."""
+        """Return a pose as kernels take it: arrays of one rotation and one translation, `STILL` for None."""
         if pose is None:
             return STILL
         return PoseArrays(pose.rotation[None], pose.translation[None], True)
 
 
 def mesh_body_of(solid: Solid) -> MeshBody:
-    """Return the cached mesh of a polyhedron, surface or 3D box."""
+    """Return the mesh of a polyhedron, surface or 3D box, built at the first call and cached with the solid."""
     return solid.prepared("mesh_body", lambda: build_mesh_body(solid))
 
 
 def build_mesh_body(solid: Solid) -> MeshBody:
-    """Return a new mesh of a polyhedron, surface or 3D box."""
+    """Build the mesh of a polyhedron, surface or 3D box."""
     if isinstance(solid, Aabb):
         vertices, triangles, faces = _box_triangles(solid)
         has_inside = bool((solid.min < solid.max).all())
@@ -114,10 +114,9 @@ def build_mesh_body(solid: Solid) -> MeshBody:
 
 
 def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:
-    """Return the mesh of checked arrays.
-
-    Triangles and vertices are copied in the order of the tree, so that faces near a contact are close in memory; large
-    meshes under many poses depend on it.
+    """Build the mesh of checked arrays; faces: the caller's face number of each triangle. Triangles and vertices are
+    copied in the order of the tree, so that faces near a contact are close in memory; large meshes under many poses
+    depend on it.
     """
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
@@ -150,10 +149,10 @@ def _reorder_by_tree(
     vertices: FloatArray, triangles: IntArray, faces: IntArray, child: Int32Array, order: IntArray, ordered: IntArray,
     used: FloatArray, axis: Int8Array, components: IntArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Renumber triangles and vertices in the order of the tree.
+    """Renumber triangles and vertices in the order of the tree's leaves.
 
-    child: of the tree, items renumbered. order (n,): the old number of each triangle; ordered (n, 3): its vertices;
-    used (n_vertices, 3): their coordinates; axis (n,): `axis_of`; components: the first triangle of each. Returns the
+    child: of the tree, rewritten. Filled: order (n,), the old number of each triangle; ordered (n, 3), its vertices;
+    used (n_vertices, 3), their coordinates; axis (n,), `axis_of`; components, the first triangle of each. Returns the
     numbers of vertices and components, and the least face connected with the first triangle.
     """
     n_triangles = n_used = n_components = 0
@@ -193,7 +192,9 @@ def _reorder_by_tree(
 def _fill_blocks(
     vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float, blocks: Float32Array
 ) -> None:
-    """Fill blocks (n_nodes, 9, 8) with the corners of the triangles of each block, in the coordinates of the tree."""
+    """Fill blocks (n_nodes, 9, 8) of leaf nodes with the corners of their triangles (x, y, z of each), in tree
+    coordinates.
+    """
     for node in range(child.shape[0]):
         if child[node, 0] >= 0:
             continue
@@ -209,8 +210,9 @@ def _fill_blocks(
 
 @kernel
 def _lattice_of(vertices: FloatArray) -> tuple[float, int, int]:
-    """Return the largest magnitude of a coordinate, the exponent k of the largest 2^k that divides all (0 if all are
-    zero), and some k >= 0 with every coordinate times 2^k an integer."""
+    """Return the largest |coordinate|; the largest k such that 2^k divides all coordinates (0 if all are zero); and
+    some k >= 0 such that every coordinate times 2^k is an integer.
+    """
     reach, lowest, smallest = 0.0, 2000, 2000
     for vertex in range(vertices.shape[0]):
         for k in range(3):
@@ -228,13 +230,15 @@ def _lattice_of(vertices: FloatArray) -> tuple[float, int, int]:
 
 
 def lattice_shift(values: FloatArray) -> int:
-    """Return k so that every value times 2^k is an integer."""
+    """Return some k >= 0 such that every value times 2^k is an integer."""
     exponents = np.frexp(values[values != 0.0])[1]
     return max(0, 53 - int(exponents.min())) if exponents.size else 0
 
 
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return the triangles of a box by face (xmin, xmax, ymin, ymax, zmin, zmax), without duplicates for a flat box."""
+    """Return vertices, triangles and the face number of each triangle (xmin, xmax, ymin, ymax, zmin, zmax) of a box. A
+    flat box has the triangles of one face.
+    """
     flat, corners = box.min == box.max, corners_of_box(box.min, box.max)
     faces = np.arange(6)
     if not flat.any():
@@ -264,21 +268,21 @@ def axis_of(t: Facet) -> int:
 
 @inline
 def triangle_of(mesh: MeshArrays, item: int) -> Facet:
-    """Load a triangle in the body's own coordinates."""
+    """Return triangle ``item`` of a mesh in the body's own coordinates."""
     t = mesh.triangles
     return facet_at(mesh.vertices, t[item, 0], t[item, 1], t[item, 2])
 
 
 @inline
 def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
-    """Return a point in the coordinates of the tree, rounded."""
+    """Return a point of the body's coordinates in the coordinates of its tree, (p - origin) / scale, rounded."""
     o, scale = mesh.origin, mesh.scale
     return Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale)
 
 
 @kernel
 def join_vertices(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
-    """Union-find: set parent (n_vertices,) to one representative of vertices connected by triangles not left out."""
+    """Set parent (n_vertices,) to one representative for all vertices connected by triangles that are not left out."""
     _union(triangles, left_out, parent)
 
 

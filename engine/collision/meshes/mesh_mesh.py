@@ -40,8 +40,9 @@ from engine.types import FloatArray, IntArray, Relation
 
 
 def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
-    """Return whether both bodies are inside on one side of a region of a face, and whether one body is inside the
-    other."""
+    """Return whether both bodies are inside on one side of some region of a face, and whether the face has a point
+    inside the other body. own: 0 or 1, the body of the face. The second result is valid if the first is False.
+    """
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
     if axis < 0:
@@ -67,7 +68,7 @@ def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
 
 
 def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
-    """Return whether a face that is only a segment has a point in the other body's open interior."""
+    """Return whether a face of body `own` that is only a segment has a point in the other body's open interior."""
     body, other = pair.exact[own], pair.exact[1 - own]
     if body.axis(face) >= 0 or not other.mesh.has_inside:
         return False
@@ -80,7 +81,7 @@ def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
 
 
 def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collision:
-    """Return the relation of two polyhedra, surfaces or 3D boxes."""
+    """Return the relation of two polyhedra, surfaces or 3D boxes under poses, with its witness if requested."""
     a, b = mesh_body_of(first), mesh_body_of(second)
     posed = STILL, STILL
     if poses[0] is not None or poses[1] is not None:
@@ -99,7 +100,7 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
 def relation_from_kernel(
     first: MeshBody, second: MeshBody, posed: PosedPair, work: Work
 ) -> Collision | tuple[list[int], Contacts]:
-    """Return the answer of `relate_poses` if it is complete, else what `relate` returns."""
+    """Return the kernel's answer if that is complete, else the row and the contacts that `relate` returns."""
     seek = search_goal(first, second, work)
     row, contacts = relate(first, second, posed, seek, work)
     relation, kind, face, their_face, n = row
@@ -116,8 +117,9 @@ def relation_from_kernel(
 
 @lru_cache(1 << 14)
 def decode_row(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
-    """Return the answer encoded in a row of `relate_poses`, None if incomplete; cached, since making one costs more
-    than a search."""
+    """Return the answer encoded in a row of `relate_poses`, None if incomplete. Cached, since constructing one costs
+    more than a search. pierces: the contact shows a surface inside the other body.
+    """
     if relation == DISJOINT:
         return NO_CONTACT
     if UNSETTLED in (relation, kind):
@@ -127,7 +129,7 @@ def decode_row(relation: int, kind: int, face: int, their_face: int, pierces: bo
 
 
 def _relation(pair: MeshPair) -> Collision:
-    """Return the relation: by contacts, by patches, by regions."""
+    """Return the relation of a pair: decided by its contacts, else by its patches, else by regions."""
     contacts = pair.contacts
     if pair.is_settled:
         relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
@@ -147,7 +149,9 @@ def _relation(pair: MeshPair) -> Collision:
 
 
 def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collision:
-    """Return overlapping or touching, where no crossing has proven overlapping."""
+    """Return OVERLAPPING or TOUCHING for a pair that meets without a crossing that proves OVERLAPPING. patches: by
+    body, its patches inside the other body.
+    """
     contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
     both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):
@@ -174,7 +178,7 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
 
 
 def _containment(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
-    """Return a relation whose witness is a patch of body `own` inside the other one."""
+    """Return a relation whose witness is a patch of body `own` inside the other body."""
     face = int(pair.meshes[own].faces[patch].min())
     answer = decode_row(relation, CONTAINED, *((face, -1), (-1, face))[own], piercing)
     return answer if pair.work.witness and answer is not None else UNNAMED[relation]
@@ -185,7 +189,9 @@ _ABOVE, _BELOW = regions.Sides(True, False, False), regions.Sides(False, True, F
 
 
 def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
-    """Return which of two overlapping polyhedra or boxes has a part outside the other."""
+    """Return which of two overlapping polyhedra or boxes has a part outside the other, and whether their boundaries
+    meet.
+    """
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
         a, b, poses = mesh_body_of(first), mesh_body_of(second), unless_identity(poses)
         if poses == (None, None) and _have_equal_faces(a, b):
@@ -203,7 +209,7 @@ def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
 
 
 def _sorted_faces(mesh: MeshBody) -> FloatArray:
-    """Return the triangles (n, 9), corners in ascending order, rows too."""
+    """Return the triangles as rows (n, 9), corners of each row sorted, then rows sorted."""
     corners = mesh.arrays.vertices[mesh.arrays.triangles]
     order = np.lexsort(tuple(np.moveaxis(corners, 2, 0)[::-1]), axis=1)
     rows = np.take_along_axis(corners, order[:, :, None], axis=1).reshape(-1, 9)
@@ -211,10 +217,10 @@ def _sorted_faces(mesh: MeshBody) -> FloatArray:
 
 
 class _OverlappingPair(MeshPair):
-    """Two bodies with intersecting open interiors, and which of them is known to have a part outside the other."""
+    """Two bodies known to overlap; decides which of them has a part outside the other."""
 
     def parts(self) -> Parts:
-        """Return the answer; skips every step that cannot change it."""
+        """Return whether the first, and whether the second body sticks out, and whether their boundaries meet."""
         self._sticks_out = [False, False]
         self.find_contacts()
         if self.is_settled:  # by a crossing: overlapping is known
@@ -224,6 +230,7 @@ class _OverlappingPair(MeshPair):
         return Parts(first, second, len(self.contacts) > 0)
 
     def _search(self, contacts: IntArray) -> None:
+        """Inspect patches, then faces in contact, until both bodies are known to stick out or all are inspected."""
         for own in (0, 1):
             for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
                 for patch in self.patches(own, contacts[:, own], place):
@@ -241,7 +248,9 @@ class _OverlappingPair(MeshPair):
                     return
 
     def _record_region(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
-        """Record the statuses on either side of a region of body `own`."""
+        """Record who sticks out, by the statuses of body `own` (ours) and of the other (theirs) on both sides of a
+        region.
+        """
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
                 self._sticks_out[own] = True
@@ -249,7 +258,7 @@ class _OverlappingPair(MeshPair):
                 self._sticks_out[1 - own] = True
 
     def _record_face(self, own: int, face: int, kinds: set[int]) -> None:
-        """Record the statuses on both sides of a face whose contacts are of some kinds (`classify_in_detail`)."""
+        """Record who sticks out near a face of body `own`; kinds: details of its contacts (`classify_in_detail`)."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:

@@ -25,7 +25,7 @@ _BLOCK = 64
 
 
 class _WorkSpace(threading.local):
-    """Work space of a kernel call; calls of one thread take turns."""
+    """Work space of kernel calls, one for each thread."""
 
     def __init__(self) -> None:
         self.descent, self.contacts, self.rows = (
@@ -37,13 +37,13 @@ class _WorkSpace(threading.local):
 
 
 PosedPair = tuple[PoseArrays, PoseArrays]
-"""The pose of each body, as kernels take it."""
+"""The poses of both bodies, in the form that kernels take."""
 INITIAL_ROOM = 256
 SPACE = _WorkSpace()
 
 
 def unless_identity(poses: Poses) -> Poses:
-    """Return None for the identity."""
+    """Return both poses, None in place of the identity."""
     a, b = poses
     return None if a is None or a.is_identity else a, None if b is None or b.is_identity else b
 
@@ -52,10 +52,8 @@ def relate(
     first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: dual.Contacts | None = None,
     n_named: int | None = None,
 ) -> tuple[list[int], dual.Contacts]:  # fmt: skip
-    """Return the row of `relate_poses` for a pair, and its contacts, valid until the next call.
-
-    known: the contacts and their classes, if computed already. n_named: as of `relate_poses`; None to take it from
-    `work`.
+    """Return the row that `relate_poses` writes for a pair, and its contacts, valid until the thread's next call.
+    known: the contacts and their classes, if computed already. n_named: as of `relate_poses`; None: as `work` requests.
     """
     contacts, n_known = (SPACE.contacts, 0) if known is None else (known, len(known.kinds))
     n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
@@ -75,7 +73,7 @@ def relate(
 
 
 def search_goal(first: MeshBody, second: MeshBody, work: Work) -> int:
-    """Return the goal that ends the search for contacts early."""
+    """Return the goal (SEEK_...) at which the search for contacts may end early, given what `work` requests."""
     own, their = first.arrays.has_inside, second.arrays.has_inside
     if own and their and not work.boolean:
         return dual.SEEK_OVERLAP
@@ -105,13 +103,13 @@ class MeshPair:
 
     @property
     def exact(self) -> tuple[ExactBody, ExactBody]:
-        """Both bodies in exact coordinates."""
+        """Both bodies in integer coordinates, made at first use."""
         if self._exact is None:
             self._exact = exact_pair(*self.meshes, self.poses)
         return self._exact
 
     def find_contacts(self, seen: tuple[list[int], dual.Contacts] | None = None) -> None:
-        """Compute all contacts; seen: the result of `relate`, if the pair was related already."""
+        """Compute all contacts, their classes exact. seen: the result of `relate`, if the pair was related already."""
         self.row, room = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
@@ -121,7 +119,7 @@ class MeshPair:
             self._settle_classes(self.kinds)
 
     def _settle_classes(self, kinds: Int8Array) -> None:
-        """Decide exactly the classes that kernels left open, then relate the pair by all contacts again."""
+        """Decide exactly the classes that kernels left UNDECIDED, then relate the pair again by all contacts."""
         open_ones = np.flatnonzero(kinds == UNDECIDED)
         self.work.n_rational += len(open_ones)
         a, b = self.exact
@@ -139,7 +137,7 @@ class MeshPair:
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
-        """Apply the rule of `dual_traversal.is_decisive` to an exact class."""
+        """Return whether a contact of an exact class decides the query: the rule of `dual_traversal.is_decisive`."""
         if self.seek == dual.SEEK_CONTACT:
             return True
         if kind != CROSSING:
@@ -152,8 +150,9 @@ class MeshPair:
         return STATE_CLEAN in (first, second) and STATE_STACKED not in (first, second)
 
     def named(self, *, piercing: bool = False) -> Witness | None:
-        """Return the strongest of the first contacts, of equal ones that of the first faces; None if no witness is
-        requested."""
+        """Return the witness: the strongest of the first contacts, among equals that of the lowest faces; None if not
+        requested.
+        """
         if not self.work.witness:
             return None
         best = tuple(self.row[KIND:N_CONTACTS])
@@ -170,10 +169,13 @@ class MeshPair:
         return Witness(STRENGTH[best[0]], best[1], best[2], "", piercing)
 
     def state(self, own: int, face: int) -> int:
+        """Return the state (STATE_...) of a face of body `own`."""
         return state_at(self.meshes[own].arrays, face)
 
     def patches(self, own: int, in_contact: IntArray, place: int) -> list[IntArray]:
-        """Return the patches (connected faces without contact) of one body that lie INSIDE or OUTSIDE the other."""
+        """Return the patches (connected faces without contact) of body `own` whose location in the other body is
+        ``place``. in_contact: its faces in contact. Each patch is an array of faces.
+        """
         mesh, other = self.meshes[own], self.meshes[1 - own]
         if not other.has_inside:
             return []
@@ -198,8 +200,9 @@ class MeshPair:
         return [free_faces[roots == vertex] for vertex in vertices[locations == place]]
 
     def patch_sides(self, own: int, patch: IntArray) -> Iterator[Sides]:
-        """Yield the status of a body next to each region of a patch; a status that changes across a face ends the
-        search."""
+        """Yield whether body `own` is inside above, below and at each region of a patch. One result suffices, and is
+        all, if a face has the status change across it.
+        """
         body = self.exact[own]
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):

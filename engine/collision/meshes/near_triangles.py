@@ -27,15 +27,18 @@ FACE: Final = 6
 | face | 6 |
 """
 _ROUNDING: Final = 2.0**-47
-"""Relative to the largest coordinate seen from a corner: a point on an edge or face takes 4 roundings a coordinate,
-three dot products of 3 terms and the differences less than 30 u in all."""
+"""Bound on the rounding of a distance, relative to the largest coordinate seen from a corner: a point on an edge or
+face takes 4 roundings a coordinate; three dot products of 3 terms and the differences, less than 30 u in all.
+"""
 _TINY: Final = 1e-300
 _AS_GOOD: Final = 1.0 - 2.0**-45
-"""Factor on a distance: points within it count as nearest."""
+"""The lower bound on a distance suffices if it is at least so much of the upper bound."""
 
 
 class Nearest(NamedTuple):
-    """Nearest points so far, their features, and their squared distance."""
+    """Nearest points so far, p on the first and q on the second triangle, their features (codes above), squared
+    distance.
+    """
 
     p: Point3
     q: Point3
@@ -56,13 +59,13 @@ def _clamped(value: float) -> float:
 
 @merged
 def _end_or_edge(t: float, k: int) -> int:
-    """Return the feature at parameter t of edge k."""
+    """Return the feature code of the point at parameter t (0 .. 1) of edge k: a vertex at either end, else the edge."""
     return k if t <= 0.0 else ((k + 1) % 3 if t >= 1.0 else 3 + k)
 
 
 @inline
 def _nearest_on_edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
-    """Return the nearer of `best` and the closest points of edge i of s and edge j of t."""
+    """Return the closest points of edge i of s and edge j of t, or `best` if these are no nearer."""
     a, c = corner(s, i), corner(t, j)
     u, v = minus(corner(s, i + 1), a), minus(corner(t, j + 1), c)
     w = minus(a, c)
@@ -81,8 +84,9 @@ def _nearest_on_edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Near
 
 @inline
 def _project_to_triangle(p: Point3, t: Facet) -> tuple[bool, Point3]:
-    """Return whether the foot of p on the plane of t lies in the triangle, and the foot as a convex combination of the
-    corners, which is a point of the triangle even if the normal of a needle is badly rounded."""
+    """Return whether the foot of p on the plane of t lies in the triangle, and the foot. The foot is a convex
+    combination of the corners: a point of the triangle even if the normal of a needle is badly rounded.
+    """
     u, v, w = minus(t.q, t.p), minus(t.r, t.p), minus(p, t.p)
     normal = cross(u, v)
     size = dot(normal, normal)
@@ -93,7 +97,7 @@ def _project_to_triangle(p: Point3, t: Facet) -> tuple[bool, Point3]:
 
 
 class SlabBounds(NamedTuple):
-    """Lower and upper bound on the distance of two triangles, and whether they suffice."""
+    """Lower bound ``low`` and upper bound ``size`` on the distance of two triangles, and whether the search may end."""
 
     low: float
     size: float
@@ -102,7 +106,9 @@ class SlabBounds(NamedTuple):
 
 @inline
 def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, most: float) -> SlabBounds:
-    """Return the bounds after nearer points: the slab between the triangles across their line."""
+    """Return the bounds for new nearest points: from below by the slab between the triangles across the line of the
+    points. most: a lower bound above it ends the search.
+    """
     gap = minus(nearest.q, nearest.p)
     largest = largest_of(gap)
     if not largest > 0.0:
@@ -115,8 +121,9 @@ def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, mos
 
 @inline
 def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, SlabBounds]:
-    """Return nearly nearest points of two disjoint triangles and bounds; any points if they are farther apart than
-    `most`."""
+    """Return nearly nearest points of two disjoint triangles, and bounds on the distance. If the triangles are proven
+    farther apart than `most`, the points are any.
+    """
     best, across = Nearest(s.p, t.p, 0, 0, np.inf), SlabBounds(-np.inf, np.inf, False)
     for i in range(3):
         for j in range(3):
@@ -141,12 +148,12 @@ def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, SlabBounds
 
 @inline
 def relative_to(origin: Point3, s: Facet) -> Facet:
-    """Return a triangle in coordinates relative to an origin."""
+    """Return a triangle with its coordinates relative to an origin."""
     return Facet(minus(s.p, origin), minus(s.q, origin), minus(s.r, origin))
 
 
 @inline
 def rounding_bound(s: Facet, t: Facet) -> float:
-    """Return the rounding error of a bound for two triangles given relative to a point near them."""
+    """Return a bound on the rounding error of `nearest_points`; s, t: given relative to a point near them."""
     largest = max(largest_of(s.p), largest_of(s.q), largest_of(s.r))
     return _ROUNDING * max(largest, largest_of(t.p), largest_of(t.q), largest_of(t.r)) + _TINY

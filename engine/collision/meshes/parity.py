@@ -63,20 +63,25 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array
 OUTSIDE = -1
 INSIDE = 1
 MISSED = 3
-"""Result of `ray_crosses` if the perturbed line misses the face; others: 0 on the face, 1 above, -1 below, UNDECIDED.
+"""Result of `ray_crosses` if the perturbed line misses the face; other results: 0 on the face, 1 above, -1 below,
+UNDECIDED.
 """
 
 
 @inline
 def perturbed_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
-    """Return the side of the line a b, along z, on which q moved by (eps, eps^2) lies (orientation.py); 0 for a = b."""
+    """Return the side (1 left, -1 right) of the line a b, seen along z, on which q moved by (eps, eps^2) lies; 0 if a =
+    b in x, y; UNDECIDED. error: of each coordinate of q.
+    """
     side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
     return side if side != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
 @inline
 def ray_crosses(t: Facet, q: Point3, error: float) -> int:
-    """Return where the perturbed vertical line through q meets t: above q 1, below -1, at q 0; MISSED or UNDECIDED."""
+    """Return where the vertical line through q, moved by (eps, eps^2), intersects t. 1: above q, -1: below q, 0: at q;
+    MISSED or UNDECIDED.
+    """
     p_side, q_side = perturbed_side(t.p, t.q, q, error), perturbed_side(t.q, t.r, q, error)
     r_side = perturbed_side(t.r, t.p, q, error)
     has_left = p_side == 1 or q_side == 1 or r_side == 1
@@ -93,7 +98,7 @@ def ray_crosses(t: Facet, q: Point3, error: float) -> int:
 
 
 class OwnPoint(NamedTuple):
-    """A point in the own coordinates of a body, each coordinate off by at most `error`."""
+    """A point in a body's own coordinates, each off by at most `error`."""
 
     point: Point3
     error: float
@@ -101,9 +106,8 @@ class OwnPoint(NamedTuple):
 
 @inline
 def to_local_frame(p: Point3, source: Placement, target: Placement, defect: float) -> OwnPoint:
-    """Return a point of one placed body in the own coordinates of another one placed with it.
-
-    defect: `frames.defect_of` the target's rotation; the transpose replaces the inverse, with an error of 3.1 defect
+    """Return a point of the body placed by `source` in the own coordinates of the body placed by `target`. defect:
+    `placement.defect_of` the target's rotation; the transpose replaces the inverse, with an error of 3.1 defect
     relative to the vector. A rotated vector has components up to 1.74 times as large, and so has its error.
     """
     q = placed(p, source)
@@ -119,13 +123,13 @@ def to_local_frame(p: Point3, source: Placement, target: Placement, defect: floa
 
 @merged
 def _rotate_axis_last(p: Point3, axis: int) -> Point3:
-    """Return a point with its coordinates permuted cyclically so that those of an axis come last."""
+    """Return a point with its coordinates rotated cyclically so that coordinate ``axis`` comes last."""
     return p if axis == 2 else (Point3(p.y, p.z, p.x) if axis == 0 else Point3(p.z, p.x, p.y))
 
 
 @allocating
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
-    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for one point."""
+    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED: the location of a point in a mesh, by ray parity."""
     where = locate_along(own, mesh, 2, -1)
     for axis in range(2 if where == UNDECIDED else 0):  # another ray may miss the edges
         where = locate_along(own, mesh, axis, -1) if where == UNDECIDED else where
@@ -134,7 +138,7 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
 
 @allocating
 def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> int:
-    """Return `locate_point` by the ray along any axis, with one face left out."""
+    """Return as `locate_point`, by the ray along one axis; face ``left_out`` is not counted (-1: all are)."""
     q, error = own.point, own.error
     local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
@@ -167,7 +171,7 @@ def locate_vertices(
     source: MeshArrays, source_pose: PoseArrays, vertices: IntArray, mesh: MeshArrays, pose: PoseArrays,
     locations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill locations (n,) int8 of the vertices (n,) of `source` in `mesh`, each under its one pose."""
+    """Fill locations (n,) int8 of vertices (n,) of `source` in `mesh`, both bodies posed, as of `locate_point`."""
     a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
     defect = defect_of(b)
     for item in range(vertices.shape[0]):
@@ -178,14 +182,14 @@ def locate_vertices(
 
 
 SLACK = 2.0**-20
-"""Enlargement of a box in tree coordinates, for its rounding to float32."""
+"""Enlargement of a box in tree coordinates that covers its rounding to float32."""
 ABOVE_ALL = 1e6
-"""A bound in tree coordinates above all others, which are at most 2."""
+"""A number above all tree coordinates, whose magnitude is at most 2."""
 
 
 @inline
 def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
-    """Return the ends of the enlarged box from a to b, as triples of float32."""
+    """Return the low and the high end of the box from a to b, enlarged by slack, as triples of float32."""
     x, y, z = max(a.x - slack, -ABOVE_ALL), max(a.y - slack, -ABOVE_ALL), max(a.z - slack, -ABOVE_ALL)
     p, q, r = min(b.x + slack, ABOVE_ALL), min(b.y + slack, ABOVE_ALL), min(b.z + slack, ABOVE_ALL)
     return (np.float32(x), np.float32(y), np.float32(z)), (np.float32(p), np.float32(q), np.float32(r))
@@ -193,9 +197,8 @@ def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
 
 @inline
 def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
-    """Return the next face whose box meets a box, -1 if none is left, and the height of the stack.
-
-    stack (STACK,) int32: nodes, and faces as in `MeshArrays.child`; the root, 0, on entry.
+    """Return the next face whose box intersects ``box``, -1 if there is none left, and the new height of the stack.
+    stack (STACK,) int32: nodes, and faces coded as in `MeshArrays.child`; on entry the root, 0.
     """
     while n > 0:  # bound: each node and face enters once
         n -= 1
@@ -212,14 +215,15 @@ def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any])
 
 @inline
 def side_of_corner(mesh: MeshArrays, face: int, t: Facet, other: int, k: int, p: Point3) -> int:
-    """Return the side of the plane of a face on which a corner of another face lies, 0 without a sign test for a shared
-    corner."""
+    """Return the side (orient3d) of the plane of face t on which p, corner k of face ``other``, lies; 0 if t has that
+    vertex.
+    """
     return 0 if is_corner(mesh, face, other, k) else orient3d(t.p, t.q, t.r, p)
 
 
 @inline
 def update_state(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> int:
-    """Return the state of `face`, which has an area, as far as one other face of the body determines it."""
+    """Return the state (STATE_...) of `face`, which has an area, if ``other`` were the only other face of the body."""
     if mesh.axis[other] == -1:
         return STATE_CLEAN
     if mesh.axis[other] < 0:
@@ -253,14 +257,16 @@ def update_state(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> 
 
 @inline
 def is_corner(mesh: MeshArrays, face: int, other: int, k: int) -> bool:
-    """Return whether a corner of another face is also one of this face."""
+    """Return whether vertex k of face ``other`` is also a vertex of ``face``."""
     vertex, corners = mesh.triangles[other, k], mesh.triangles
     return bool(vertex == corners[face, 0] or vertex == corners[face, 1] or vertex == corners[face, 2])
 
 
 @inline
 def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return the cached state of a face; stacked without area. poses: any (n, 12), no body has a pose."""
+    """Return the state (STATE_...) of a face, computed at first use; STATE_STACKED without area. poses: any (n, 12)
+    array, unused values.
+    """
     if mesh.state[face] == STATE_UNKNOWN:
         mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
     return int(mesh.state[face])
@@ -268,7 +274,7 @@ def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @allocating
 def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return the state of a face with area as all other faces of the body determine it."""
+    """Compute the state of a face with area, from all other faces whose boxes intersect its box."""
     t = triangle_of(mesh, face)
     p, q, r = in_tree(mesh, t.p), in_tree(mesh, t.q), in_tree(mesh, t.r)
     low = Point3(min(p.x, q.x, r.x), min(p.y, q.y, r.y), min(p.z, q.z, r.z))
@@ -285,7 +291,7 @@ def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @inline
 def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: FloatArray) -> bool:
-    """Return whether a strict crossing of these two faces proves that the open interiors of two solids intersect."""
+    """Return whether a strict crossing of face i and face j proves that the open interiors of both bodies intersect."""
     a = state_of(first, i, poses)
     if a == STATE_STACKED:
         return False
@@ -301,7 +307,7 @@ def states_of(mesh: MeshArrays, faces: IntArray) -> Int8Array:
 
 
 def state_at(mesh: MeshArrays, face: int) -> int:
-    """Return the state of one face, from the cache if known."""
+    """Return the state of one face, computed at first use."""
     state = mesh.state[face]
     return int(states_of(mesh, np.array([face]))[0] if state == STATE_UNKNOWN else state)
 
@@ -315,12 +321,13 @@ def _fill_states(mesh: MeshArrays, faces: IntArray, states: Int8Array) -> None:
 
 
 SIDE_UNKNOWN: Final = 2
-"""In place of a side: the face is not clean, or another one comes near each sampled point of it."""
+"""In place of a side: the face is not clean, or other faces come near each sampled point of it."""
 
 
 @called
 def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
-    """Return one of three points within a face; its weights are (1, 1, 1), (1, 1, 2) or (2, 1, 1)."""
+    """Return a point inside a face, ``item`` 0, 1 or 2 of three, with corner weights (1, 1, 1), (1, 1, 2) or (2, 1, 1).
+    """
     t = triangle_of(mesh, face)
     u, v = 2.0 if item == 2 else 1.0, 2.0 if item == 1 else 1.0
     w = 3.0 if item == 0 else 4.0
@@ -332,8 +339,9 @@ def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
 
 @allocating
 def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return the side of a face that its body lies on, 1 that of its normal or -1; SIDE_UNKNOWN. poses: as
-    `state_of`."""
+    """Return 1 if the body lies on the side of a face to which its normal points, -1 if on the other, or SIDE_UNKNOWN;
+    cached. poses: as of `state_of`.
+    """
     if mesh.inner[face] == 0:
         mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else SIDE_UNKNOWN
     return int(mesh.inner[face])
@@ -341,6 +349,7 @@ def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @allocating
 def _side_of_clean(mesh: MeshArrays, face: int) -> int:
+    """Compute `inner_side` of a clean face by ray parity from points inside it."""
     axis, t = int(mesh.axis[face]), triangle_of(mesh, face)
     turn = orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
     for item in range(3):

@@ -37,7 +37,8 @@ from engine.types import UNDECIDED, Float32Array, FloatArray, Point2, Point3
 
 
 class PoseArrays(NamedTuple):
-    """One or many poses of a body for kernels: rotations (n, 3, 3), translations (n, 3), whether there are any."""
+    """Poses of a body for kernels: rotations (n, 3, 3), translations (n, 3); is_posed: False if the body has no pose.
+    """
 
     rotations: FloatArray
     translations: FloatArray
@@ -45,7 +46,9 @@ class PoseArrays(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """Rows of the rotation, translation, and the error of a rounded posed coordinate (0.0: exact)."""
+    """A pose ready for use: rows x, y, z of the rotation, translation, and a bound on the rounding of a coordinate (0:
+    exact).
+    """
 
     x: Point3
     y: Point3
@@ -56,7 +59,7 @@ class Placement(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """Extent of a body's coordinates: the largest magnitude, and a power of two that divides all."""
+    """Extent of a body's coordinates: the largest magnitude (reach), and a power of two that divides all (grain)."""
 
     reach: float
     grain: float
@@ -64,7 +67,7 @@ class Extent(NamedTuple):
 
 @merged
 def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Placement:
-    """Load the rotation of pose `item`, with a translation given by the caller."""
+    """Return the placement with the rotation of pose ``item`` and the given translation and error."""
     r, i = pose.rotations, item
     x, y = Point3(r[i, 0, 0], r[i, 0, 1], r[i, 0, 2]), Point3(r[i, 1, 0], r[i, 1, 1], r[i, 1, 2])
     return Placement(x, y, Point3(r[i, 2, 0], r[i, 2, 1], r[i, 2, 2]), shift, pose.is_posed, error)
@@ -72,7 +75,7 @@ def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Pl
 
 @inline
 def is_lattice_rotation(rotation: FloatArray) -> bool:
-    """Return whether a rotation only permutes axes and flips signs."""
+    """Return whether a rotation only permutes axes and flips signs: all entries 0, 1 or -1."""
     for i in range(3):
         for k in range(3):
             if rotation[i, k] != 0.0 and abs(rotation[i, k]) != 1.0:
@@ -92,8 +95,7 @@ def _largest_power_of_two(value: float) -> float:
 def place_pair(
     a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
 ) -> tuple[Placement, Placement]:
-    """Return the placements of two bodies, moved together so that, of two posed bodies, the first has no
-    translation."""
+    """Return the placements of two bodies; of two posed bodies both are moved so that the first has no translation."""
     s, t = as_point3(a_pose.translations, a_item), as_point3(b_pose.translations, b_item)
     none, apart = Point3(0.0, 0.0, 0.0), minus(t, s)
     shift, grain = largest_of(apart), min(a.grain, b.grain)
@@ -115,7 +117,7 @@ def place_pair(
 
 @merged
 def placed(p: Point3, place: Placement) -> Point3:
-    """Return the rounded posed point; the point itself if there is no pose."""
+    """Return R p + t, rounded; p itself if the body has no pose."""
     t = place.shift
     return Point3(dot(place.x, p) + t.x, dot(place.y, p) + t.y, dot(place.z, p) + t.z) if place.is_posed else p
 
@@ -128,23 +130,22 @@ def rotate(place: Placement, v: Point3) -> Point3:
 
 @merged
 def rotate_back(place: Placement, v: Point3) -> Point3:
-    """Return the product of the transpose of R with v."""
+    """Return R' v, R' the transpose of the rotation R."""
     x, y, z = column(place, 0), column(place, 1), column(place, 2)
     return Point3(dot(x, v), dot(y, v), dot(z, v))
 
 
 @merged
 def column(place: Placement, axis: int) -> Point3:
-    """Return the image of an axis."""
+    """Return column ``axis`` of the rotation: the image of that axis."""
     x, y, z = place.x, place.y, place.z
     return Point3(x.x, y.x, z.x) if axis == 0 else (Point3(x.y, y.y, z.y) if axis == 1 else Point3(x.z, y.z, z.z))
 
 
 @inline
 def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
-    """Return orient2d of the exact points behind rounded ones; UNDECIDED where `error` per coordinate could change it.
-
-    The determinant moves by at most 4 e M + 2 e^2 (four entries, each times an entry) for e twice the error.
+    """Return orient2d of points known to +- `error` a coordinate; UNDECIDED if that could change the sign. With e twice
+    the error and M the largest difference, ``|det - exact| <= 4 e M + 2 e^2`` (four entries, each times one).
     """
     if error == 0.0:
         return orient2d(a, b, c)
@@ -160,7 +161,9 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
 
 @inline
 def axis_at(axis: int, place: Placement) -> int:
-    """Return the image of a coordinate axis; caller guarantees a pose that permutes axes, or none."""
+    """Return the axis onto which a placement maps a coordinate axis; caller guarantees that it permutes axes, or no
+    pose.
+    """
     if not place.is_posed or axis < 0:
         return axis
     there = column(place, axis)
@@ -170,12 +173,13 @@ def axis_at(axis: int, place: Placement) -> int:
 WIDEST_RATIO = 2.0**60
 WIDEST_MARGIN = 1e15
 NEVER_APART = 1e20
-"""Margin of an omitted axis: far above all boxes, far below `bvh.UNUSED`, which stays apart from everything."""
+"""Margin of an axis that is not tested: far above all boxes, far below `bvh.UNUSED`, which stays apart from everything.
+"""
 
 
 @inline
 def defect_of(place: Placement) -> float:
-    """Return a bound on the entries of |R' R - I|."""
+    """Return a bound on the entries of |R' R - I|, R the rotation; 0 without a pose."""
     if not place.is_posed:
         return 0.0
     x, y = rotate_back(place, column(place, 0)), rotate_back(place, column(place, 1))
@@ -189,7 +193,9 @@ def set_frame(
     frame: Float32Array, a: Placement, a_origin: FloatArray, a_scale: float, b: Placement, b_origin: FloatArray,
     b_scale: float, defect: float,
 ) -> bool:  # fmt: skip
-    """Fill frame (22, 8) float32 with the map from tree b to tree a; return whether the trees are provably apart."""
+    """Fill frame (22, 8) float32 with the map from tree b to tree a and its margin; return whether the trees are proven
+    apart.
+    """
     ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
     there = rotate(b, origin)
     v = rotate_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))

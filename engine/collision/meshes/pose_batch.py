@@ -31,7 +31,7 @@ NO_SHARED_AREA, SAME_SIDE, OPPOSITE = 16, 20, 21
 
 @inline
 def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshArrays, place: Placement) -> int:
-    """Return how many components lie inside a mesh, without contact to it, or UNSETTLED."""
+    """Return how many components of `source` lie inside `mesh`, given that none is in contact with it, or UNSETTLED."""
     n_inside, defect = 0, defect_of(place)
     for item in range(source.components.shape[0] if mesh.has_inside else 0):
         p = as_point3(source.vertices, source.triangles[source.components[item], 0])
@@ -45,7 +45,7 @@ def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshA
 
 @inline
 def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> int:
-    """Return the relation of two bodies without contact, or UNSETTLED if only some components lie inside."""
+    """Return the relation of two bodies without contact; UNSETTLED if only some of their components lie inside."""
     in_second = n_components_inside(first, place.a, second, place.b)
     in_first = n_components_inside(second, place.b, first, place.a)
     if in_second == 0 and in_first == 0:
@@ -57,9 +57,8 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> 
 
 @called
 def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
-    """Fill the row of a pair from all its n contacts, the first of which name the witness.
-
-    Sorts the first contacts; unless a class is open, all become DECIDED with the corners in the other plane.
+    """Fill the row of a pair from all its n contacts; the first n_named name the witness. Sorts the contacts; unless a
+    class is UNDECIDED, each class becomes DECIDED + bits of corners in the other face's plane.
     """
     pairs, kinds, _ = s.contacts
     first, second = s.first, s.second
@@ -95,7 +94,7 @@ def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> No
 
 @called
 def classify_in_detail(s: dual.Search, n: int) -> None:
-    """Replace the class of each of n contacts by its detail; no change where a class is open.
+    """Replace the class of each of n contacts by its detail; if one is UNDECIDED, all stay as they are.
 
     | detail | meaning |
     |---|---|
@@ -121,7 +120,7 @@ def classify_in_detail(s: dual.Search, n: int) -> None:
 
 @merged
 def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
-    """Return `classify_contact` of two faces, UNSETTLED if one has no area."""
+    """Return `classify_contact` of faces i and j; UNSETTLED and BOTH if one has no area."""
     t, u, axis, their_axis = dual.exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
         s.descent.signs[contact.FLUSH] = 0
@@ -131,7 +130,9 @@ def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
 
 @inline
 def sort_named_first(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
-    """Sort the first N_NAMED pairs to the front: coplanar ones, then by the callers' faces, then by number."""
+    """Move the first N_NAMED of n pairs to the front, sorted: COPLANAR pairs first, then by the caller's faces, then by
+    index.
+    """
     for item in range(1, n):
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
         key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item
@@ -150,12 +151,11 @@ def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
     descent: dual.Descent, contacts: dual.Contacts, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill rows (n, N_COLUMNS) int64 for the poses (n) of the second body; still: the pose of the first.
+    """Fill rows (n, N_COLUMNS) int64 for n poses of the second body; still: the only pose of the first.
 
-    n_named: number of contacts from which the witness is chosen; without witness only relations are written, and for
-    DETAIL only the details of the contacts. descent, contacts: work space; pairs with more contacts than fit, or
-    without proof, are UNSETTLED. The contacts of the last pose stay there. n_known: number of contacts of one pose
-    already in `contacts`.
+    n_named: number of contacts from which the witness is chosen; 0: only relations are written; DETAIL: only the
+    details of the contacts. descent, contacts: work space; pairs with more contacts than fit, or without proof, are
+    UNSETTLED. The contacts of the last pose stay there. n_known: number of contacts of one pose already in `contacts`.
     """
     for item in range(rows.shape[0]):
         row = rows[item]

@@ -48,12 +48,14 @@ from engine.types import UNDECIDED, BoolArray, FloatArray, IntArray
 
 N_FIRST = 2
 N_FACES = 32
-"""Number of contacts whose face planes are tried as separating planes, the first of them in the first pass."""
+"""Number of contacts whose face planes are tried as separating planes; N_FIRST of them are tried first."""
 _SAMPLED = 16
 
 
 class Vertices(NamedTuple):
-    """Vertices (n, 3) of a body for exact signs, its placement and pose (UNPOSED where placing is exact)."""
+    """Vertices (n, 3) of a body as input of exact signs, its placement, and its pose number (UNPOSED where placing is
+    exact).
+    """
 
     points: Any
     place: Placement
@@ -62,7 +64,8 @@ class Vertices(NamedTuple):
 
 @inline
 def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
-    """Return a vertex for exact signs."""
+    """Return a vertex as input of exact signs: placed if placing is exact, else before its pose, with the pose number.
+    """
     p = as_point3(v.points, vertex)
     if v.pose == UNPOSED:
         p = placed(p, v.place)
@@ -71,8 +74,9 @@ def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
 
 @called
 def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
-    """Return the closed side (1, -1) of a plane that contains a sample of n_samples vertices, 0 if all lie on it; else
-    UNDECIDED."""
+    """Return the closed side (1, -1) of a plane that contains n_samples vertices, 0 if all lie on it; UNDECIDED
+    otherwise.
+    """
     common_side, n = 0, v.points.shape[0]
     for vertex in range(0, n, max(1, n // n_samples)):
         side = sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error)
@@ -84,7 +88,7 @@ def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_sa
 
 @called
 def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: float) -> bool:
-    """Return whether a plane has the vertices of two bodies on different closed sides, not all of them in it."""
+    """Return whether a plane separates the vertices of two bodies, which may touch it but not both lie in it."""
     for n_samples in (_SAMPLED, max(len(u.points), len(v.points))):  # most planes cut the bodies in the middle
         side = side_of_all(poses, plane, u, error, n_samples)
         if side == UNDECIDED:
@@ -97,7 +101,7 @@ def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: 
 
 @called
 def are_separated(s: Search, first: int, n_faces: int) -> bool:
-    """Return whether a plane through faces of the contacts from `first` to n_faces provably separates the bodies."""
+    """Return whether the plane of a face in contacts ``first`` .. n_faces - 1 is proven to separate the bodies."""
     poses, error, is_exact = s.descent.poses, exact_error(s), s.place.error == 0.0
     u = Vertices(s.first.vertices, s.place.a, UNPOSED if is_exact or not s.place.a.is_posed else 0)
     v = Vertices(s.second.vertices, s.place.b, UNPOSED if is_exact or not s.place.b.is_posed else 1)
@@ -114,8 +118,9 @@ def are_separated(s: Search, first: int, n_faces: int) -> bool:
 def _edge_enters_interior(
     s: Search, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, mesh: MeshArrays, face: int
 ) -> int:
-    """Return OVERLAPPING if an edge of t passes through the open face u, number `face` of its mesh, to its inner side;
-    TOUCHING if not; UNSETTLED. sides: of the corners of t at the plane of u."""
+    """Return OVERLAPPING if an edge of t passes through the open face u to the inner side of u's body; else TOUCHING or
+    UNSETTLED. sides: of the corners of t at the plane of u. face: number of u in its mesh.
+    """
     for k in range(3):
         a, b, apex = sides[k], sides[(k + 1) % 3], sides[(k + 2) % 3]
         if a == 0 and b == 0:
@@ -129,10 +134,8 @@ def _edge_enters_interior(
 
 @called
 def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPoint3) -> tuple[int, bool]:
-    """Return the relation at two coplanar faces, and whether they share an area.
-
-    OVERLAPPING: they share an area and both bodies lie on the same side; TOUCHING: not so; UNSETTLED. off: a point off
-    the plane.
+    """Return the relation that two coplanar faces prove, and whether they share an area. OVERLAPPING: they share an
+    area and both bodies lie on the same side; TOUCHING: not so; UNSETTLED. off: a point off the plane.
     """
     poses, error = s.descent.poses, exact_error(s)
     how = separation(poses, t, u, axis, error)
@@ -149,7 +152,9 @@ def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPo
 def _corners_on_face(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return a bit for each corner of t that lies on the closed face u, -1 if unknown."""
+    """Return a bit for each corner of t that lies on the closed face u, -1 if undecided; sides: of the corners at u's
+    plane.
+    """
     corners = 0
     for k in range(3):
         how = is_on_face(poses, corner(t, k), u, off, axis, error) if sides[k] == 0 else 0
@@ -161,10 +166,8 @@ def _corners_on_face(
 
 @called
 def decide_contact(s: Search, item: int) -> tuple[int, bool]:
-    """Return OVERLAPPING if a contact proves it, TOUCHING if not, UNSETTLED if open; and whether its faces share an
-    area.
-
-    Its class becomes DECIDED with the corners on the other face.
+    """Return OVERLAPPING if contact ``item`` proves it, else TOUCHING, or UNSETTLED; and whether its faces share an
+    area. Its class becomes DECIDED + bits of the corners that lie on the other face.
     """
     i, j, kinds = s.contacts.pairs[item, 0], s.contacts.pairs[item, 1], s.contacts.kinds
     if CORNER <= kinds[item] < DECIDED:
@@ -202,7 +205,7 @@ def decide_contact(s: Search, item: int) -> tuple[int, bool]:
 
 @allocating
 def relate_clean(s: Search, n: int) -> int:
-    """Return OVERLAPPING or TOUCHING if clean faces decide it from n contacts without a crossing; else UNSETTLED."""
+    """Return OVERLAPPING or TOUCHING if clean faces decide it from n contacts, none a crossing; else UNSETTLED."""
     shares = np.zeros(n, np.bool_)
     for item in range(n):
         how, shares[item] = decide_contact(s, item)
@@ -213,9 +216,8 @@ def relate_clean(s: Search, n: int) -> int:
 
 @allocating
 def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> int:
-    """Return the relation of two placed bodies as far as their n contacts decide it, or UNSETTLED.
-
-    is_free: no contact is flush or cuts an open face; the classes then hold the corners in the plane of the other face.
+    """Return OVERLAPPING or TOUCHING if the n contacts of two placed bodies decide it, else UNSETTLED. is_free: no
+    contact is flush or cuts an open face; the classes then name the corners in the plane of the other face.
     has_crossing: some contact is a crossing, but none proves overlapping.
     """
     both = s.first.has_inside and s.second.has_inside
@@ -233,12 +235,14 @@ def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> 
 
 
 DECIDED = 64
-"""Class of a contact after `decide_contact`, plus three bits a face for the corners on the other face."""
+"""Class of a contact after `decide_contact`; its low bits, three a face, name the corners on the other face."""
 
 
 @inline
 def hash_slot(known: IntArray, vertex: int) -> int:
-    """Return the slot of a key in an open-addressing table (size a power of two), or the free slot for it."""
+    """Return the slot of key ``vertex`` in an open-addressing hash table (size a power of two), or the free slot for
+    it.
+    """
     last = known.shape[0] - 1
     place = vertex & last
     while known[place] >= 0 and known[place] != vertex:  # bound: half the places are free
@@ -248,7 +252,7 @@ def hash_slot(known: IntArray, vertex: int) -> int:
 
 @allocating
 def may_be_corner(own: parity.OwnPoint, mesh: MeshArrays) -> bool:
-    """Return whether a point may be a vertex of a mesh: of the faces that meet there not all are listed as contacts."""
+    """Return whether a point may be a vertex of a mesh; not all faces that meet there need be listed as contacts."""
     local, slack, stack = in_tree(mesh, own.point), parity.SLACK + own.error / mesh.scale, np.empty(STACK, np.int32)
     box = parity.box_between(local, local, slack)
     stack[0] = 0
@@ -267,16 +271,16 @@ def may_be_corner(own: parity.OwnPoint, mesh: MeshArrays) -> bool:
 def where_faces_are(
     s: Search, own: int, n: int, shares: BoolArray, known: IntArray, is_flush: BoolArray, sharing: IntArray
 ) -> int:
-    """Return OUTSIDE, INSIDE or UNDECIDED for the faces of one body that are in contact.
+    """Return OUTSIDE, INSIDE or UNDECIDED for the faces in contact of body `own` (0, 1).
 
     | result | meaning |
     |---|---|
     | OUTSIDE | every face has points outside: its corners off the other body; so are all components without contact |
     | INSIDE | one provably lies inside, with an inside of its own body next to it |
 
-    own: column of the body in contacts (n, 2); their classes: corners on the other face, maybe others in its plane
-    (`classify_contact`, `decide_contact`). shares: (n,) whether two faces share an area, or empty. known, is_flush:
-    table (`hash_slot`) of vertices; sharing: table of faces that share an area.
+    own: column of the body in contacts (n, 2), whose classes have the corners on the other face, maybe others in its
+    plane (`classify_contact`, `decide_contact`). shares: (n,) whether two faces share an area, or empty. known,
+    is_flush: table (`hash_slot`) of vertices; sharing: table of faces that share an area.
     """
     contacts, flush, met = s.contacts
     source, mesh = (s.first, s.second) if own == 0 else (s.second, s.first)
@@ -319,9 +323,8 @@ def where_faces_are(
 def _where_within(
     source: MeshArrays, face: int, place: Placement, mesh: MeshArrays, target: Placement, defect: float
 ) -> int:
-    """Return the location of a point within a face that is off the other body, UNDECIDED if no sampled point decides.
-
-    Placing rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of its terms.
+    """Return the location in the other body of a sampled point within a face; UNDECIDED if no sample decides. Placing
+    rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of its terms.
     """
     for item in range(3):
         p = parity.point_within(source, face, item)
@@ -335,13 +338,15 @@ def _where_within(
 
 @inline
 def has_interior_beside(s: Search, source: MeshArrays, face: int) -> bool:
-    """Return whether the body is inside next to a face, except at single points."""
+    """Return whether the body has an interior next to a face: the face has an area and is not STATE_STACKED."""
     return bool(source.axis[face] >= 0 and parity.state_of(source, face, s.descent.poses) != STATE_STACKED)
 
 
 @allocating
 def relate_by_locations(s: Search, n: int, shares: BoolArray) -> int:
-    """Return OVERLAPPING or TOUCHING if the faces of both bodies in contact decide it, else UNSETTLED."""
+    """Return OVERLAPPING or TOUCHING if the locations of the faces in contact decide it, else UNSETTLED. shares: as of
+    `where_faces_are`.
+    """
     n_places = 16
     while n_places < 6 * n:
         n_places *= 2

@@ -49,13 +49,13 @@ Facet = namedtuple("Facet", "p q r")
 
 @inline
 def facet_at(points: FloatArray, i: int, j: int, k: int) -> Facet:
-    """Load three of points (n, 3)."""
+    """Return the triangle of rows i, j, k of points (n, 3)."""
     return Facet(as_point3(points, i), as_point3(points, j), as_point3(points, k))
 
 
 @inline
 def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
-    """Return the triangle, to be read under pose number `pose`, or UNPOSED."""
+    """Return the triangle with its corners tagged with a pose number, under which exact signs read them, or UNPOSED."""
     return Facet(
         PosedPoint3(t.p.x, t.p.y, t.p.z, pose),
         PosedPoint3(t.q.x, t.q.y, t.q.z, pose),
@@ -65,8 +65,7 @@ def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
 
 @inline
 def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
-    """Return the vertex (0, 1, 2) that is alone on one closed side of a plane, and that side (1 or -1).
-
+    """Return the vertex (0, 1, 2) of a triangle that is alone on one closed side of a plane, and that side (1 or -1).
     p, q, r: sides of the vertices, not all zero, not all on one strict side. The other two lie on the opposite closed
     side, and not both of them on the plane unless the lone one is off it.
     """
@@ -92,7 +91,7 @@ def is_one_side(p: int, q: int, r: int) -> bool:
 
 @inline
 def is_straddling(p: int, q: int, r: int) -> bool:
-    """Return whether vertices lie strictly on both sides."""
+    """Return whether some of three signs is 1 and some is -1: vertices lie strictly on both sides of a plane."""
     return (p == 1 or q == 1 or r == 1) and (p == -1 or q == -1 or r == -1)
 
 
@@ -104,7 +103,9 @@ def rotate_vertices(t: Facet, lone: int) -> Facet:
 
 @inline
 def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
-    """Return two triangles with the lone vertices first, each above the other's plane; sides: of t1, of t2."""
+    """Return two triangles, each with its lone vertex first and turned so that this vertex lies above the other's
+    plane. sides: of t1's vertices at the plane of t2; their_sides: of t2's vertices at the plane of t1.
+    """
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
     a, b = rotate_vertices(t1, lone1), rotate_vertices(t2, lone2)
@@ -117,7 +118,7 @@ def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[
 
 @merged
 def corner(t: Facet, index: int) -> Any:
-    """Return a corner by its number, at most 6, modulo 3."""
+    """Return corner ``index`` modulo 3 of a triangle, index at most 6."""
     return t.q if index == 1 or index == 4 else (t.r if index == 2 or index == 5 else t.p)
 
 
@@ -128,9 +129,9 @@ def corner(t: Facet, index: int) -> Any:
 def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: float) -> float:
     """Return an error bound for determinants of differences of six points, five of them given relative to the sixth.
 
-    All differences of two points are at most M = 2 m, m the largest given. A determinant of three of them is off by at
-    most 11 u P with P <= 6 M^3 for rounding (7 u P as in `orient3d_filter`; some differences are rounded twice), 18 e
-    (M + e)^2 for the error of coordinates (e: twice it), plus underflow (`placement.py`).
+    M = 2 m bounds differences of two points, m the largest given; e: twice the error of a coordinate, known to +-
+    `error`: ``|det - exact| <= 11 u 6 M^3 + 18 e (M + e)^2`` (7 u as in `orient3d_filter`; some differences are rounded
+    twice), plus underflow (`placement.py`).
     """
     m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p), largest_of(q), largest_of(r)))
     e = 2.0 * error
@@ -139,7 +140,7 @@ def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: flo
 
 @inline
 def classify_near(t1: Facet, t2: Facet, error: float) -> int:
-    """Return APART, CROSSING or UNDECIDED for two triangles of points rounded by at most `error` a coordinate."""
+    """Return APART, CROSSING or UNDECIDED for two triangles, each coordinate known to +- `error`; float64 only."""
     u, v = minus(t1.q, t1.p), minus(t1.r, t1.p)
     p2, q2, r2 = minus(t2.p, t1.p), minus(t2.q, t1.p), minus(t2.r, t1.p)
     bound = bound_near(u, v, p2, q2, r2, error)
@@ -168,7 +169,7 @@ def classify_near(t1: Facet, t2: Facet, error: float) -> int:
 
 @inline
 def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
-    """Return whether two points of one pose coincide."""
+    """Return whether two points have equal coordinates and the same pose number."""
     return p.x == q.x and p.y == q.y and p.z == q.z and p.pose == q.pose
 
 
@@ -176,7 +177,9 @@ def is_same(p: PosedPoint3, q: PosedPoint3) -> bool:
 def sign_of_four(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
 ) -> int:
-    """Return `orient3d_posed`; 0 without a test for a repeated point, or a common coordinate, of one pose."""
+    """Return the exact sign of orient3d of four posed points (`orient3d_posed`), or UNDECIDED. 0 without arithmetic if
+    two points coincide, or all share a coordinate, under one pose.
+    """
     if is_same(a, d) or is_same(b, d) or is_same(c, d) or is_same(a, b) or is_same(a, c) or is_same(b, c):
         return 0
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
@@ -189,7 +192,7 @@ def sign_of_four(
 
 @called
 def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
-    """Return the sides of the plane of t on which the corners of u lie, each as `sign_of_four`."""
+    """Return the signs of the three corners of u at the plane of t, each as of `sign_of_four`."""
     a = posed_point(poses, t.p)
     v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
     p, q, r = minus(posed_point(poses, u.p), a), minus(posed_point(poses, u.q), a), minus(posed_point(poses, u.r), a)
@@ -204,9 +207,8 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
 
 @called
 def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
-    """Return the class of two triangles that both have an area; UNDECIDED only where exponents leave the range.
-
-    poses (n, 12), error: as for `orient3d_posed`. axis: along it t1 before its pose has an area.
+    """Return the class of two triangles with area by exact signs; UNDECIDED only if exponents are out of range. poses
+    (n, 12), error: as of `orient3d_posed`. axis: along it t1, before its pose, has an area.
     """
     p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):
@@ -235,13 +237,13 @@ def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -
 
 @inline
 def projected(p: Point3, axis: int) -> Point2:
-    """Return the point without one coordinate, the two others in cyclic order."""
+    """Return the point without coordinate ``axis``, the other two in cyclic order."""
     return Point2(p.y, p.z) if axis == 0 else (Point2(p.z, p.x) if axis == 1 else Point2(p.x, p.y))
 
 
 @inline
 def off_plane_point(t: Facet, axis: int) -> PosedPoint3:
-    """Return a point off the plane of t: its first corner moved along `axis`, before its pose; may be infinite."""
+    """Return a point off the plane of t: its first corner moved along ``axis``, before its pose; maybe infinite."""
     p, size = t.p, max(largest_of(minus(t.q, t.p)), largest_of(minus(t.r, t.p)))
     value = p.x if axis == 0 else (p.y if axis == 1 else p.z)
     value = 0.5 * value if abs(value) > size else value + size  # either differs from `value`
@@ -252,7 +254,9 @@ def off_plane_point(t: Facet, axis: int) -> PosedPoint3:
 def turn_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return the orientation of a, b, c in their plane; off: a point off it, which fixes the sign within a query."""
+    """Return the orientation sign of a, b, c within their common plane. axis >= 0: of the projection along it (no
+    poses). Else seen from ``off``, a point off the plane that fixes the sign.
+    """
     if axis >= 0:
         return orient2d(projected(a, axis), projected(b, axis), projected(c, axis))
     return sign_of_four(poses, a, b, off, c, error)
@@ -260,12 +264,12 @@ def turn_in_plane(
 
 @inline
 def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
-    """Return whether an edge of t separates it from u, both in one plane.
+    """Return whether the line of an edge of t separates t from u, both in one plane.
 
     | result | meaning |
     |---|---|
     | 1 | some edge has all of u strictly outside |
-    | 0 | outside or on it |
+    | 0 | some edge has all of u outside or on it |
     | -1 | no edge separates |
     """
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
@@ -296,7 +300,7 @@ def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axi
 def passes_within(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return 1 if a segment a b in the plane of t meets its open face, 0 if not, or UNDECIDED."""
+    """Return 1 if the segment a b, in the plane of t, intersects the open face t, 0 if not, or UNDECIDED."""
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     if turn == UNDECIDED:
         return UNDECIDED
@@ -317,7 +321,7 @@ def passes_within(
 
 @called
 def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
-    """Return 1 if a point in the plane of t lies on the closed face, 0 if not, or UNDECIDED."""
+    """Return 1 if p, in the plane of t, lies on the closed face t, 0 if not, or UNDECIDED."""
     result, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     for edge in range(3):
         side = turn_in_plane(poses, corner(t, edge), corner(t, edge + 1), p, off, axis, error)
@@ -330,8 +334,9 @@ def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, ax
 
 @inline
 def separation(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
-    """Return the relation of two coplanar triangles with area: 1 apart, 0 only their borders meet, -1 interiors
-    intersect."""
+    """Return 1 if two coplanar triangles with area are disjoint, 0 if only their borders meet, -1 if their interiors
+    do. UNDECIDED if a sign is. axis: as of `classify`.
+    """
     off = off_plane_point(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):
         return UNDECIDED

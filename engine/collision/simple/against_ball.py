@@ -43,7 +43,9 @@ _SPREAD = 64
 
 @inline
 def _box_distance(t: Facet, center: Point3, slack: float) -> float:
-    """Return a lower bound on the squared distance of a triangle's box, as `box_distance_bounds`."""
+    """Return a lower bound on the squared distance of a triangle's box from the centre. slack: error of coordinates; as
+    of `box_distance_bounds`.
+    """
     square = 0.0
     for c, p, q, r in (
         (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),
@@ -56,9 +58,9 @@ def _box_distance(t: Facet, center: Point3, slack: float) -> float:
 
 @inline
 def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
-    """Return 1 if a triangle provably enters the open ball, 0 if it provably misses the closed one; else UNSETTLED.
-
-    error: corners relative to the centre are off by its error and a rounding, distances by less than twice that.
+    """Return 1 if a triangle provably has a point in the open ball, 0 if it provably misses the closed ball, else
+    UNSETTLED. error: corners relative to the centre are off by its error and a rounding, distances by less than twice
+    that.
     """
     t, none = relative_to(own.point, t), Point3(0.0, 0.0, 0.0)
     center = Facet(none, none, none)
@@ -74,11 +76,9 @@ def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
 def _surface_against_ball(
     own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray
 ) -> tuple[int, int]:
-    """Classify the surface of a mesh against a ball as far as the filter proves; return the relation and a witness
-    face.
-
-    DISJOINT, TOUCHING (a face enters) or UNSETTLED. The witness, if requested, is the entering face with the nearest
-    box, of equal ones the first.
+    """Return the relation of a mesh's faces to a ball, and a witness face (-1 for none). DISJOINT, TOUCHING (a face
+    enters the open ball) or UNSETTLED. The witness, if is_named, is the entering face with the nearest box, the lowest
+    of equal ones.
     """
     center, error = own
     sizes = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
@@ -114,7 +114,7 @@ def _surface_against_ball(
 
 @inline
 def _ball_contains_vertex(vertex: int, own: parity.OwnPoint, radius: float, mesh: MeshArrays) -> int:
-    """Return 1 if a vertex of a mesh provably lies in the open ball, 0 if provably not, else UNSETTLED."""
+    """Return 1 if vertex ``vertex`` of a mesh provably lies in the open ball, 0 if provably not, else UNSETTLED."""
     v = minus(as_point3(mesh.vertices, vertex), own.point)
     size = np.sqrt(dot(v, v))
     slack = 2.0**-49 * (size + radius) + 2.0 * own.error + 2.0**-500
@@ -123,9 +123,8 @@ def _ball_contains_vertex(vertex: int, own: parity.OwnPoint, radius: float, mesh
 
 @inline
 def _ball_contains_mesh(own: parity.OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
-    """Return 1 if all vertices of a mesh provably lie in the open ball, 0 if one provably does not, else UNSETTLED.
-
-    A sample spread over the mesh is tested first, since neighbours give the same result.
+    """Return 1 if all vertices of a mesh provably lie in the open ball, 0 if one provably does not, else UNSETTLED. A
+    sample spread over the mesh is tested first, since neighbours give the same result.
     """
     n, result = mesh.vertices.shape[0], 1
     for step in (n // _SPREAD + 1, 1):
@@ -140,6 +139,7 @@ def _ball_contains_mesh(own: parity.OwnPoint, radius: float, mesh: MeshArrays, f
 
 @inline
 def _relate(own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
+    """Return the relation of a mesh (first) and a ball, or UNSETTLED, and a witness triangle, -1 for none."""
     relation, triangle = _surface_against_ball(own, radius, mesh, is_named, flag)
     if relation == DISJOINT:
         where = parity.locate_point(own, mesh) if mesh.has_inside else parity.OUTSIDE
@@ -158,11 +158,9 @@ def _relate(own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: boo
 def relate_balls(
     mesh: MeshArrays, centers: FloatArray, radius: float, is_named: bool, results: IntArray, flag: FlagArray
 ) -> None:
-    """Fill results (n, 2) int64 with the relation of a mesh (first) and a ball about each of centers, or UNSETTLED, and
-    a witness triangle.
-
-    centers (n, 4): a point and the error of its coordinates. The witness enters the ball: for overlapping, unless
-    even-odd cancels it, or touching; it is the one that names the contact if `is_named`.
+    """Fill results (n, 2) int64 with the relation of a mesh (first) and a ball about each centre, or UNSETTLED, and a
+    witness. centers (n, 4): a point and the error of its coordinates. The witness is a triangle that enters the ball:
+    proof of overlapping, unless even-odd cancels it, or of touching; if `is_named`, the one that the answer names.
     """
     for row in range(centers.shape[0]):
         if flag[0] != 0:
@@ -173,7 +171,7 @@ def relate_balls(
 
 
 Moves = tuple[FloatArray, FloatArray] | None
-"""Rotations (n, d, d) and translations (n, d); None for none."""
+"""Rotations (n, d, d) and translations (n, d) of a body, None for no pose."""
 
 
 def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
@@ -192,6 +190,7 @@ def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> 
 
 
 def _as_arrays(pose: Pose | None) -> Moves:
+    """Return a pose as arrays of one rotation and one translation, None for None."""
     return None if pose is None else (pose.rotation[None], pose.translation[None])
 
 
@@ -224,7 +223,9 @@ def centers_in_frame(ball: Sphere, body_poses: Moves, ball_poses: Moves) -> Floa
 
 
 def _is_ball_clear_of_box(body: Solid, center: list[float], radius: float) -> bool:
-    """Return whether a ball provably misses the box around a body; three roundings of 2^-53 are below 2^-50."""
+    """Return whether a ball provably misses the box around a body; three roundings of 2^-53 are below 2^-50. center:
+    coordinates in the body's frame, then a bound on their error.
+    """
     *center, error = center  # the last is how far the others may be off
     reach = radius * (1.0 + 2.0**-50) + 2.0 * error
     low, high, _ = own_box(body)
@@ -235,9 +236,8 @@ def _is_ball_clear_of_box(body: Solid, center: list[float], radius: float) -> bo
 
 
 def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> Collision | None:
-    """Return the relation of a mesh (first) and a ball with its witness, None if floats do not prove it.
-
-    center: x, y, z in the mesh's coordinates, and a bound on the error of each.
+    """Return the relation of a mesh (first) and a ball with its witness, None if floats do not prove it. center: x, y,
+    z in the mesh's coordinates, then a bound on the error of each.
     """
     mesh, results = mesh_body_of(body), np.empty((1, 2), np.int64)
     entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, results, work.budget.flag)
@@ -249,7 +249,7 @@ def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> C
 
 
 def named(mesh: MeshBody, relation: int, triangle: int) -> Collision:
-    """Return the answer for a result of `relate_balls`."""
+    """Return the answer, with its witness, for a relation and witness triangle of `relate_balls`."""
     if relation in (OVERLAPPING, TOUCHING):
         face = int(mesh.faces[triangle])
         return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
@@ -260,6 +260,7 @@ _WITHIN = {DISJOINT: NO_CONTACT, FIRST_INSIDE_SECOND: FIRST_WITHIN, SECOND_INSID
 
 
 def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
+    """Return the exact relation of a body (first) and a ball (second) by rational distances, nearest faces first."""
     pose, ball_pose = poses
     center, limit = image_point(ball.center, ball_pose), Fraction(ball.radius) ** 2
     boundary = boundary_of(body, pose, work)
@@ -294,21 +295,20 @@ def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collis
 
 
 def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
-    """Return the faces whose lower bounds do not exceed a squared distance, nearest first."""
+    """Return the faces whose squared lower bound `nearest` may be at most `limit`, nearest first."""
     near = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
     return near[np.argsort(nearest[near], kind="stable")]
 
 
 def _any_part_enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
-    """Return whether some live part of these faces is nearer to the centre than a squared distance."""
+    """Return whether some live part of these faces has a squared distance below `limit` from the centre."""
     return len(faces) > 0 and boundary.has_live(faces, lambda corners: simplex_distance(center, corners) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
-    """Return whether a ball that no live part reaches into, at most walls that cancel, lies inside the body.
-
-    Off those walls the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve
-    (t, t^2, t^3) from the centre, which meets a plane at most three times: one of them is on no wall.
+    """Return whether a ball into which no live part reaches, only walls that cancel, lies inside the body. Off those
+    walls the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve (t, t^2,
+    t^3) from the centre, which meets a plane at most three times: one of them is on no wall.
     """
     location = rational_location(center, body, pose, work.budget.check)
     if location != Location.BOUNDARY:
@@ -322,7 +322,9 @@ def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: flo
 
 
 def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, work: Work) -> bool:
-    """Return whether every vertex lies strictly inside the ball; the farthest by float64 bounds are tested first."""
+    """Return whether every vertex lies strictly inside the ball, farthest first by float64 bounds; limit: squared
+    radius.
+    """
     n = int(boundary.ends.max()) + 1 if len(boundary.ends) else 0
     some = boundary.floats(np.arange(4) * n // 4)
     if (boundary.bounds(center, some, some)[0] > rounded(limit) * (1.0 + 2.0**-50)).any():
@@ -339,10 +341,9 @@ def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, wo
 
 @np.errstate(over="ignore", invalid="ignore")
 def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Parts:
-    """Return which of a body (first) and a ball or disc (second) that overlap has a part outside the other.
-
-    The ball has one exactly if a live part of the body's boundary enters the open ball: else the ball is all inside.
-    The body has one exactly if some point of its live boundary, and then a vertex, is outside the ball.
+    """Return which of a body (first) and a ball (second) that overlap has a part outside the other. The ball has one
+    exactly if a live part of the body's boundary enters the open ball: else the ball is all inside. The body has one
+    exactly if some point of its live boundary, and then a vertex, is outside the ball.
     """
     center, limit = image_point(ball.center, poses[1]), Fraction(ball.radius) ** 2
     boundary = boundary_of(body, poses[0], work)
@@ -362,4 +363,5 @@ def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Pa
 
 
 def _farthest(center: Vector, corners: tuple[Vector, ...]) -> Fraction:
+    """Return the largest squared distance of a corner from the centre."""
     return max(squared_length(difference(p, center)) for p in corners)

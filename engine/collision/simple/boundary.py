@@ -33,7 +33,7 @@ from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Location
 
 
 def box_distance_bounds(point: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds of the squared distance from `point` to the content of the boxes ``(n, d)``.
+    """Return lower and upper bounds on the squared distance of `point` from anything that fills the boxes ``(n, d)``.
 
     The lower bound is the distance to the box, the upper one that to its farthest corner, both widened by 2^-48 of
     themselves and 2^-1000: at most d + 3 roundings of relative size u enter each, and d underflows of 2^-1074. Overflow
@@ -54,7 +54,7 @@ _ALL = slice(None)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boundary:
-    """Interface of both kinds of boundaries.
+    """Faces of a mesh or edges of an outline under a pose, as the tests of balls and half-spaces read them.
 
     | field | meaning |
     |---|---|
@@ -63,7 +63,7 @@ class Boundary:
     | near | superset of the faces within a radius of a point, ascending |
     | exact | position of a vertex |
     | number, number_at | the caller's number of a face, and of one at a vertex |
-    | signs | of a plane at each vertex |
+    | signs | side of each vertex at a plane |
     | live | live parts of faces, as corners of triangles; as ends of edges, maybe with others |
     | is_inside | whether a point on no face is inside |
     | has_inside | False for surfaces and flat boxes |
@@ -86,14 +86,14 @@ class Boundary:
         return tuple(self.exact(vertex) for vertex in self.ends[face].tolist())
 
     def face_bounds(self, center: Vector, faces: IntArray | slice = _ALL) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the squared distances from a point to the content of the boxes of faces."""
+        """Return lower and upper bounds on the squared distances of a point from faces, by their boxes."""
         ends = self.ends[faces]
         points = self.floats(ends.reshape(-1))
         corners = points.reshape(*ends.shape, points.shape[1]).transpose(1, 0, 2)  # numpy is slow along short axes
         return self.bounds(center, reduce(np.minimum, corners), reduce(np.maximum, corners))
 
     def bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return bounds of the squared distances from a point to the content of boxes of rounded posed coordinates."""
+        """Return bounds as `box_distance_bounds` for boxes low, high of rounded posed coordinates."""
         around = np.array([rounded(value) for value in center])
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
@@ -103,7 +103,7 @@ class Boundary:
         return np.flatnonzero(reduce(np.logical_or, is_chosen[self.ends.T]))
 
     def has_live(self, faces: IntArray, condition: Callable[[tuple[Vector, ...]], bool]) -> bool:
-        """Return whether a condition on its corners holds for a live part of these faces."""
+        """Return whether the condition holds for the corners of some live part of these faces."""
         return any(map(condition, self.live(faces.tolist())))
 
 
@@ -113,6 +113,7 @@ def boundary_of(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
 
 def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
+    """Build the boundary of a polyhedron, surface or 3D box."""
     mesh, image = mesh_body_of(body), partial(image_point, pose=pose)
     vertices, triangles = mesh.arrays.vertices, mesh.arrays.triangles
     error = 0.0
@@ -147,6 +148,7 @@ def _mesh_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
 
 def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
+    """Build the boundary of a polygon, triangle or box of the plane."""
     outline = outline_of(body, pose, work.budget)
 
     def live(edges: list[int]) -> Iterator[tuple[Vector, ...]]:
@@ -166,7 +168,7 @@ def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
 
 def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:
-    """Return the exact sign of the plane at the image of each of ``(n, 3)`` points.
+    """Return the exact side (-1, 0, 1) at a plane of the image of each of ``(n, 3)`` points under a pose.
 
     The function is pulled back: with N = n R and D = n . t + d, both rational, it is N . p + D. Scaled so that the
     largest of N and D is about 1, their rounded values have an error of u each (or 2^-1075 where they are denormal),
@@ -189,8 +191,9 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
 
 
 def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImage, FloatArray, float]:
-    """Return the function of unposed points whose value is that of a plane at their images; and the same rounded,
-    scaled to a largest magnitude of about 1."""
+    """Return (N, D), exact, with N . p + D the plane's value at the image of p; then N and D rounded, the largest
+    scaled to 1.
+    """
     normal, offset = plane
     if pose is not None:
         offset += dot(normal, as_vector(pose.translation.tolist()))
@@ -209,9 +212,8 @@ def segment_distance(point: Sequence[Any], a: Sequence[Any], b: Sequence[Any]) -
 
 
 def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
-    """Return the squared distance from `point` to the closed segment or triangle of these corners, degenerate or not.
-
-    Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge; in integers.
+    """Return the squared distance of `point` from the closed segment or triangle of these corners, degenerate or not;
+    exact. Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge; in integers.
     """
     d, (numbers, scale) = len(point), common_integers([*point, *chain(*corners)])
     q, *ends = [tuple(numbers[at : at + d]) for at in range(0, len(numbers), d)]
@@ -225,7 +227,9 @@ def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
 
 
 def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vector, ...]]:
-    """Yield triangles, in own coordinates, that fill the live part of a face; for a whole face the face itself."""
+    """Yield triangles, unposed, that fill the part of a face that even-odd does not cancel; the face itself if none
+    does.
+    """
     if mesh.arrays.axis[face] == NO_AREA:
         return
     if state_at(mesh.arrays, face) != STATE_STACKED:
@@ -241,7 +245,7 @@ def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vect
 
 @kernel
 def first_triangle_at(mesh: MeshArrays, vertex: int) -> int:
-    """Return the first triangle with a vertex."""
+    """Return the first triangle with a given vertex, -1 if there is none."""
     for triangle in range(mesh.triangles.shape[0]):
         t = triangle
         if mesh.triangles[t, 0] == vertex or mesh.triangles[t, 1] == vertex or mesh.triangles[t, 2] == vertex:

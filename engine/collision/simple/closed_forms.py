@@ -39,13 +39,14 @@ FORMS: Final = ("aabb", "sphere")
 
 
 def form_of(solid: Solid) -> FloatArray | None:
-    """Return a box that is not flat or a ball as kernels take it, None for others."""
+    """Return the N_NUMBERS numbers of a ball or a box that is not flat, None for other solids; cached."""
     if solid.type not in FORMS:
         return None
     return solid.prepared("form", lambda: _form(solid))
 
 
 def _form(solid: Solid) -> FloatArray | None:
+    """Build the numbers of a ball or a box that is not flat, None for other solids."""
     d, form = solid.dimension, np.zeros(relations.N_NUMBERS)
     if isinstance(solid, Sphere):
         form[:d] = form[relations.HIGH : relations.HIGH + d] = solid.center
@@ -58,7 +59,7 @@ def _form(solid: Solid) -> FloatArray | None:
 
 
 def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:
-    """Return a function that tries `relate_forms` first and calls `otherwise` for what is left open."""
+    """Return a pair function that tries `relate_forms`, and calls `otherwise` where that is undecided."""
 
     def collide_forms(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
         d = first.dimension
@@ -71,7 +72,9 @@ def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:
 def relation_closed_form(
     first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: result.Work
 ) -> result.Collision | None:
-    """Return the relation of a box and a box or ball, or of two balls, by `relate_forms`; None if it is incomplete."""
+    """Return the relation of a box or ball and a box or ball by `relate_forms`; None if undecided or without its
+    witness.
+    """
     form, other, d = form_of(first), form_of(second), first.dimension
     if form is None or other is None:
         return None
@@ -92,7 +95,7 @@ _BY_BALL = result.NO_CONTACT, result.FIRST_WITHIN, result.SECOND_WITHIN, result.
 
 @lru_cache(4096)
 def _named(code: int) -> result.Collision:
-    """Return the answer for the code of two boxes."""
+    """Return the answer encoded by `relate_forms` for two boxes."""
     relation, kind = code & _RELATION, code >> relations.KIND_AT & _RELATION
     if relation < OVERLAPPING:
         return _BY_BALL[relation]
@@ -101,8 +104,7 @@ def _named(code: int) -> result.Collision:
 
 
 def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the exact relation of a box (2D or 3D) or a ball and a ball, in rationals; a posed box is any body.
-
+    """Return the exact relation of a box or ball (first) and a ball, in rationals. A posed box is treated as any body.
     Flat boxes and balls of radius 0 have no interior and never overlap.
     """
     center, r, s = image_point(ball.center, poses[1]), Fraction(ball.radius), Fraction(0)
@@ -129,9 +131,8 @@ def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: result.Poses,
 def collide_half_spaces(
     first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work
 ) -> result.Collision:
-    """Return the exact relation of two half-spaces (half-planes in 2D).
-
-    Equal ones overlap; opposite ones with a common plane touch. One is inside if its plane lies strictly inside.
+    """Return the exact relation of two half-spaces (half-planes in 2D). Equal ones overlap; opposite ones with a common
+    plane touch. One is inside if its plane lies strictly inside.
     """
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
@@ -158,15 +159,15 @@ def collide_half_space_sphere(
 
 
 _Function = tuple[FloatArray, FloatArray, float, float]
-"""Linear function of points: weights of the coordinates, their error sizes, an offset, and its size."""
+"""A linear function of points: weights of the coordinates, sizes that bound their errors, offset, and its size."""
 _FEW_UNSURE = 16
-"""Number of vertices whose side of a plane is decided one by one; more are decided in one call."""
+"""Most vertices whose side of a plane is decided exactly one by one; for more, in one call."""
 _BLOCK = 64
 _MANY = 64 * _BLOCK
 
 
 def collide_half_space_body(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the exact relation of a half-space (first) and a body with vertices (second)."""
+    """Return the exact relation of a half-space (first) and a body with faces or edges (second)."""
     function = _function_in_frame(space, poses)
     if (side := _side_of_box(function, body)) != 0:
         return result.SECOND_WITHIN if side > 0 else result.NO_CONTACT
@@ -190,10 +191,9 @@ def collide_half_space_body(space: HalfSpace, body: Solid, poses: result.Poses, 
 def _by_scan(
     function: _Function, space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work
 ) -> result.Collision | None:
-    """Return the relation of a half-space and a mesh if floats decide the sides of nearly all vertices, else None.
-
-    The witness is the face at the first vertex beyond the plane, or on it. Nothing cancels, so the open interior is
-    next to it.
+    """Return the relation of a half-space and a mesh if floats decide the sides of nearly all vertices, else None. The
+    witness is the face at the first vertex beyond the plane, or on it. Nothing cancels, so the open interior is next to
+    it.
     """
     mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
     normal, sizes, offset, size = function
@@ -228,10 +228,9 @@ def _by_scan(
 
 @inline
 def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
-    """Return 1 or -1 if proven, else 0.
-
-    Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three
-    products and a number by 2^-50 of the sum of magnitudes more.
+    """Return 1 or -1 if the side of a vertex at a plane is proven, else 0; plane: as of `scan_sides`. Each weight may
+    be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three products and a number
+    by 2^-50 of the sum of magnitudes more.
     """
     p = as_point3(mesh.vertices, vertex)
     around = Point3(abs(p.x), abs(p.y), abs(p.z))
@@ -246,8 +245,8 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
     """Scan the vertices of a mesh until one is provably beyond a plane and one provably before it.
 
     plane: (3, 3), the weights of the coordinates; their sizes, which bound their errors; the offset and its size.
-    Returns: the first vertex beyond, the first before (-1 if there is none), and the number of unsure vertices passed,
-    the first of which are listed in `unsure` (n,) int64; one more than fit if the flag was set.
+    Returns the first vertex beyond, the first before (-1 if there is none), and the number of undecided vertices
+    passed, the first of which are listed in `unsure` (n,) int64; one more than fit if the flag was set.
     """
     beyond, before, n_unsure, n = -1, -1, 0, mesh.vertices.shape[0]
     for start in range(0, n, _BLOCK):  # many vertices in one pass, without branches
@@ -277,10 +276,9 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
 
 
 def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
-    """Return the linear function of a half-space in the frame of a body, rounded.
-
-    Under a pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of
-    2^-53 of their magnitudes, whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals.
+    """Return the linear function of a half-space in the frame of a body, rounded, with bounds. Under a pose of the body
+    a weight is the sum of three products, the offset one of four numbers: seven roundings of 2^-53 of their magnitudes,
+    whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals.
     """
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
@@ -296,10 +294,9 @@ def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
 
 
 def _side_of_box(function: _Function, body: Solid) -> int:
-    """Return the side of a plane, 1 or -1, on which the box around a body provably lies, 0 if it may meet the plane.
-
-    error: the extremes of dot(n, p) + d over a box are sums of products of its bounds: at most seven roundings of 2^-53
-    of the sum of magnitudes, and as much for the errors of weights and offset, far below 2^-48 of it.
+    """Return the side (1, -1) of a plane on which the box around a body provably lies, 0 if undecided. error: the
+    extremes of dot(n, p) + d over a box are sums of products of its bounds: at most seven roundings of 2^-53 of the sum
+    of magnitudes, and as much for the errors of weights and offset, far below 2^-48 of it.
     """
     weights, sizes, offset, size = function
     low, high, _ = own_box(body)
@@ -314,12 +311,12 @@ def _side_of_box(function: _Function, body: Solid) -> int:
 
 
 def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
-    """Return whether some live part of these faces lies on one side, 1 or -1, of a plane."""
+    """Return whether some live part of these faces has a point on side 1 or -1 of a plane; exact."""
     return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 
 def half_space_body_parts(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return which of a half-space and a body with vertices (second) that overlap has a part outside the other."""
+    """Return which of a half-space and a body with faces or edges that overlap has a part outside the other."""
     boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
     signs = boundary.signs(plane)
     sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)
@@ -328,14 +325,15 @@ def half_space_body_parts(space: HalfSpace, body: Solid, poses: result.Poses, wo
 
 
 def sphere_sphere_parts(first: Sphere, second: Sphere, poses: result.Poses, work: result.Work) -> result.Parts:
+    """Return which of two overlapping balls has a part outside the other."""
     between = squared_length(minus(image_point(first.center, poses[0]), image_point(second.center, poses[1])))
     r, s = Fraction(first.radius), Fraction(second.radius)
     return result.Parts(r > s or between > (s - r) ** 2, s > r or between > (s - r) ** 2, True)
 
 
 def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return the parts of overlapping half-spaces: they are equal, or their planes cross, or each contains the other's
-    plane."""
+    """Return which of two overlapping half-spaces has a part outside the other: neither if they are equal, else both.
+    """
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]
@@ -344,7 +342,7 @@ def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: result.Poses, 
 
 
 def half_space_sphere_parts(space: HalfSpace, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return the parts of a half-space and a ball; a ball that overlaps a half-space reaches its plane."""
+    """Return which of a half-space and a ball that overlap has a part outside the other; their boundaries meet."""
     plane = image_half_space(space, poses[0])
     height, reach = value_at(plane, image_point(ball.center, poses[1])), squared_length(plane[0])
     return result.Parts(True, height < 0 or height**2 < Fraction(ball.radius) ** 2 * reach, True)

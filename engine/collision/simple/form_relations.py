@@ -22,22 +22,22 @@ HIGH: Final = 3
 RADIUS: Final = 6
 IS_BALL: Final = 7
 N_NUMBERS: Final = 8
-"""Numbers of a form: low and high on three axes, the radius, and whether it is a ball (1.0)."""
+"""Numbers of a box or ball: low corner (3), high corner (3), radius, and 1.0 if it is a ball."""
 KIND_AT: Final = 3
 FACE_AT: Final = 6
 THEIR_FACE_AT: Final = 9
-"""Bit positions, above the relation, of the kind of the contact and the faces of two boxes."""
+"""Bit positions in a code, above the relation, of the kind of contact and of the faces of two boxes."""
 _LARGEST: Final = 2.0**1022
 _N_PAIRS: Final = 24
 _N_RANKS: Final = 12
 _THEIRS: Final = 6
-"""Ranks: low and high of the first on three axes each, then of the second."""
+"""Ranks of bounds: low and high of the first body on three axes each, then of the second."""
 _N_COORDINATE: Final = 32  # 2 components for each of 3 products of either body, two translations, a radius
 _N_TOTAL: Final = 1100  # as in `posed.py`
 
 
 class Placed(NamedTuple):
-    """A form with its rotation (d, d) and translation (d,)."""
+    """Numbers of a box or ball, with its rotation (d, d) and translation (d,)."""
 
     form: Any
     turn: Any
@@ -46,7 +46,9 @@ class Placed(NamedTuple):
 
 @inline
 def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
-    """Return the axis that a rotation maps to another one, and with which sign; -1 if it mixes axes."""
+    """Return m and +-1 if row ``axis`` of a rotation has its only nonzero entry +-1 in column m; -1, 0.0 if it has
+    others.
+    """
     source, factor = -1, 0.0
     for m in range(turn.shape[0]):
         if turn[axis, m] != 0.0:
@@ -58,7 +60,7 @@ def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
 
 @inline
 def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
-    """Return the bound of a box on one side of an axis as a lattice rotation places it."""
+    """Return the bound (side 0 low, 1 high) on an axis of a box turned by a lattice rotation."""
     source, factor = source_of(turn, axis)
     return factor * form[source + (HIGH if (side == 1) == (factor > 0.0) else 0)]
 
@@ -68,7 +70,9 @@ def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
 
 @inline
 def _place(a: Placed, w: Any, first: int) -> bool:
-    """Write the bounds of a placed box as pairs, low and high of each axis; return whether it still is a box."""
+    """Write the bounds of a posed box as exact sums of two doubles; return False if the pose mixes axes, or out of
+    range. Bounds: low and high of each axis, from w[first] on.
+    """
     form, turn, move = a
     for axis in range(turn.shape[0]):
         if source_of(turn, axis)[0] < 0:
@@ -83,7 +87,8 @@ def _place(a: Placed, w: Any, first: int) -> bool:
 
 @inline
 def _rank(w: Any, d: int, ranks: Any) -> None:
-    """Write for each bound the number of smaller ones of the four on its axis: by rounded sums, then by errors."""
+    """Write for each bound how many of the four bounds on its axis are smaller; pairs are compared lexicographically.
+    """
     for axis in range(d):
         for i in range(4):
             ranks[3 * i + axis] = 0.0
@@ -94,7 +99,7 @@ def _rank(w: Any, d: int, ranks: Any) -> None:
 
 
 def relate_boxes(low: Any, high: Any, their_low: Any, their_high: Any) -> int:
-    """Return the relation of two closed boxes of any dimension, flat ones too."""
+    """Return the relation of two closed boxes of any dimension, flat ones too; corners may be ranks."""
     meet = solid = i_within = j_within = interiors = True
     for axis in range(len(low)):
         a0, a1, b0, b1 = low[axis], high[axis], their_low[axis], their_high[axis]
@@ -117,7 +122,7 @@ _relate = inline(relate_boxes)
 def relate_box_pairs(
     low: FloatArray, high: FloatArray, is_box: BoolArray, pairs: IntArray, relations: Int8Array
 ) -> None:
-    """Fill relations (n,) int8 for the pairs (n, 2) of which both are unposed boxes."""
+    """Fill relations (n,) int8 for those pairs (n, 2) of which both bodies are unposed boxes."""
     for item in range(pairs.shape[0]):
         i, j = pairs[item, 0], pairs[item, 1]
         if is_box[i] and is_box[j]:
@@ -126,23 +131,22 @@ def relate_box_pairs(
 
 @inline
 def _face(turn: FloatArray, axis: int, side: int) -> int:
-    """Return the face of a box that a pose maps to one side of an axis."""
+    """Return the face of a box that a lattice rotation maps to side 0 (low) or 1 (high) of an axis."""
     source, factor = source_of(turn, axis)
     return 2 * source + (side if factor > 0.0 else 1 - side)
 
 
 @inline
 def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
-    """Return whether a rank lies strictly between those of the bounds of a body."""
+    """Return whether a rank lies strictly between those of the bounds of a body (0, 1) on an axis."""
     return bool(ranks[_THEIRS * body + axis] < rank < ranks[_THEIRS * body + 3 + axis])
 
 
 @called
 def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
-    """Return kind and faces of a contact of two boxes of space that overlap, or UNSETTLED.
-
-    Faces in one plane on one side share an area. If there are none, an edge of one box passes through a face of the
-    other: on each axis either both ends of one box lie within the other, or one of each.
+    """Return kind, and faces << 3 and << 6, of a contact of two boxes of space that overlap, or UNSETTLED. Faces in one
+    plane on one side share an area. If there are none, an edge of one box passes through a face of the other: on each
+    axis either both ends of one box lie within the other, or one of each.
     """
     for face in range(6):
         axis, side = face >> 1, face & 1
@@ -165,10 +169,8 @@ def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 
 @inline
 def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
-    """Return kind and faces of the contact of two boxes of space that touch.
-
-    They share a part of a face, an edge or a vertex, by the number of axes on which they only touch; faces: on the
-    first of these.
+    """Return kind, and faces << 3 and << 6, of the contact of two boxes of space that touch. They share a part of a
+    face, an edge or a vertex, by the number of axes on which they only touch; faces: on the first of these.
     """
     n, faces = -1, 0
     for axis in range(3):
@@ -182,7 +184,7 @@ def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 
 @inline
 def _axis(a: Placed, k: int) -> Point3:
-    """Return the image of an axis under the pose."""
+    """Return the image of axis k under the pose."""
     return Point3(a.turn[0, k], a.turn[1, k], a.turn[2, k])
 
 
@@ -197,8 +199,8 @@ def _middle(a: Placed) -> Point3:
 
 @called
 def _has_separating_axis(a: Placed, b: Placed) -> bool:
-    """Return whether a direction provably separates two posed boxes of space: an axis of either, or a cross product of
-    two.
+    """Return whether a face normal of either box, or a cross product of two, provably separates two posed boxes of
+    space.
 
     Along a direction d, as computed, a box reaches from its centre by half its sides times |d . axis|. With S for the
     magnitudes of translations and 3.1 times those of coordinates, as the entries of a column of a rotation add up to at
@@ -226,7 +228,7 @@ def _has_separating_axis(a: Placed, b: Placed) -> bool:
 
 @inline
 def _relate_boxes(a: Placed, b: Placed) -> int:
-    """Return the code of two boxes, UNSETTLED if one has a pose off the lattice."""
+    """Return the code of two posed boxes; if a pose mixes axes, DISJOINT by a separating axis, or UNSETTLED."""
     w, ranks, d = workspace(_N_PAIRS), workspace(_N_RANKS), a.turn.shape[0]
     if not (_place(a, w, 0) and _place(b, w, 12)):
         return DISJOINT if d == 3 and _has_separating_axis(a, b) else UNSETTLED
@@ -244,7 +246,9 @@ def _relate_boxes(a: Placed, b: Placed) -> int:
 
 @inline
 def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: float) -> int:
-    """Add +-1 times a bound of a placed box, or a coordinate of a placed centre, to an expansion."""
+    """Add ``factor`` (+-1) times a bound of a posed box, or a coordinate of a posed ball's centre, to expansion e.
+    Returns the number of components. side: 0 low, 1 high.
+    """
     form, turn, move = a
     if form[IS_BALL] == 0.0:
         n = grow(e, n, factor * bound_at(form, turn, axis, side))
@@ -256,7 +260,8 @@ def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: fl
 
 @inline
 def _are_safe(a: Placed) -> bool:
-    """Return whether expansions of degree four are exact for a form, and no box has a pose off the lattice."""
+    """Return whether expansions of degree four are exact for a posed box or ball, and the pose of a box mixes no axes.
+    """
     form, turn, move = a
     safe = is_safe(form[RADIUS])
     for axis in range(turn.shape[0]):
@@ -269,10 +274,8 @@ def _are_safe(a: Placed) -> bool:
 
 @inline
 def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
-    """Set the expansion e to how far the centre of a ball lies beyond a placed box (or the centre of a placed ball)
-    along an axis, negative if it does not; return its number of components.
-
-    side: 0 beyond the low bound, 1 beyond the high one.
+    """Set expansion e to how far a ball's centre lies beyond a bound of a box (or another centre) along an axis.
+    Negative if it does not. side: 0 the low bound, 1 the high one. Returns the number of components.
     """
     factor = 1.0 if side == 0 else -1.0
     n = _grow_coordinate(e, 0, a, axis, side, factor)
@@ -281,7 +284,9 @@ def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
 
 @called
 def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
-    """Return the sign of (nearest or farthest distance from the ball's centre)^2 - (its radius + factor radius)^2."""
+    """Return the exact sign of distance^2 - (ball's radius + factor a's radius)^2. Distance: from the ball's centre to
+    the nearest point of box a (or a's centre), the farthest if is_far.
+    """
     total, n = workspace(_N_TOTAL), 0
     below, above, both = workspace(_N_COORDINATE), workspace(_N_COORDINATE), workspace(_N_COORDINATE)
     for axis in range(a.turn.shape[0]):
@@ -302,7 +307,7 @@ def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
 
 @called
 def _is_within(a: Placed, ball: Placed) -> bool:
-    """Return whether a ball lies within the open interior of a box."""
+    """Return whether a ball lies in the open interior of a box; exact."""
     e = workspace(_N_COORDINATE)
     for axis in range(a.turn.shape[0]):
         for side in range(2):
@@ -314,7 +319,7 @@ def _is_within(a: Placed, ball: Placed) -> bool:
 
 @inline
 def _relate_to_ball(a: Placed, ball: Placed) -> int:
-    """Return the relation of a box or ball (first) and a ball, or UNSETTLED."""
+    """Return the relation of a box or ball (first) and a ball (second), exact, or UNSETTLED."""
     r, s, is_ball = ball.form[RADIUS], a.form[RADIUS], a.form[IS_BALL] != 0.0
     if not (_are_safe(a) and _are_safe(ball)):
         return UNSETTLED
@@ -334,10 +339,9 @@ def relate_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray,
 ) -> int:  # fmt: skip
-    """Return the code of two forms, the first a box if one is, each with rotation (d, d) and translation (d,).
-
-    The code is the relation; for two intersecting boxes of space with the kind of their contact and their faces above
-    it. UNSETTLED if not decided.
+    """Return the code of a box or ball and a box or ball, each with rotation (d, d) and translation (d,); if one is a
+    box, the first. The code is the relation; for two intersecting boxes of space, with the kind of contact and the
+    faces in higher bits. UNSETTLED if undecided.
     """
     a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)
     return _relate_boxes(a, b) if other[IS_BALL] == 0.0 else _relate_to_ball(a, b)

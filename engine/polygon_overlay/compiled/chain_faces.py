@@ -68,7 +68,7 @@ Faces = namedtuple("Faces", "cycle joined regions inside state fan")
 
 @merged
 def _following(chains: Chains, stars: Stars, half: int) -> int:
-    """Return the next half-chain around the face of ``half``."""
+    """Return the half-chain after ``half`` around the face to its left (numbers 2 c, 2 c + 1: see chains.py)."""
     across = across_end(chains, half)
     if across >= 0:
         return to_the_left(across, half)
@@ -78,7 +78,9 @@ def _following(chains: Chains, stars: Stars, half: int) -> int:
 
 @inline
 def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int, stop: FlagArray) -> int:
-    """Fill ``cycle``, by half-chain; return the number of cycles."""
+    """Number the cycles of half-chains around faces: write the cycle of each half-chain, -1 unless it represents
+    itself. Returns the number of cycles.
+    """
     cycle[: 2 * n_chains] = -1
     n_cycles = 0
     for first in range(2 * n_chains):
@@ -99,7 +101,9 @@ def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int
 
 @inline
 def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
-    """Return whether edge e is nearer to v than f, straight up and a step to the right; both are above v there."""
+    """Return whether a ray from vertex v straight up meets edge e before edge f. The ray runs an infinitesimal step to
+    the right of v; caller guarantees that it meets both. Exact.
+    """
     x = edges.x
     a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
     c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
@@ -112,7 +116,9 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
 
 @inline
 def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
-    """Return the sign of the height of ab above v minus that of cd; ``height(ab) = -orient(a, b, v) / (x_b - x_a)``."""
+    """Return the exact sign of ``height(ab) - height(cd)`` at the x of vertex v; caller guarantees x_a < x_b, x_c <
+    x_d. ``height(ab) = -orient(a, b, v) / (x_b - x_a)``, above v.
+    """
     x = edges.x
     first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
     n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)
@@ -129,7 +135,9 @@ def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> in
 
 @merged
 def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
-    """Return e if it is above v and below ``nearest``, else ``nearest``."""
+    """Return edge e if the ray up from vertex v meets it before edge ``nearest`` (NOTHING: none so far), else
+    ``nearest``.
+    """
     x = edges.x
     b = edges.after[e]
     if (x[e] <= x[v]) == (x[b] <= x[v]):  # it does not pass from there to the right of there
@@ -142,9 +150,9 @@ def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 @inline
 def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -> int:
-    """Return the edge next above vertex v, a step to its right, or NOTHING.
-
-    tree: of n edges numbered ``names``. Caller guarantees that no edge begins at v or passes it to the right.
+    """Return the first edge that a ray from vertex v straight up meets, a step to the right of v, or NOTHING. tree:
+    over the boxes of n edges, box k that of edge ``names[k]``. Caller guarantees that v is the last vertex (x, then y)
+    of its component, so that no edge of it passes to the right of v.
     """
     nearest = NOTHING
     n_leaves = leaves_of(n)
@@ -168,7 +176,9 @@ def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -
 
 @inline
 def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, chains: Chains, e: int, v: int) -> int:
-    """Return the half-chain whose face is below edge e, right of vertex v. points: forest of united points."""
+    """Return the half-chain along edge e whose left face lies below e, a step to the right of vertex v. points:
+    union-find forest of equal points.
+    """
     x = edges.x
     runs_right = x[e] < x[edges.after[e]]
     chain, before = chains.at[e], NOTHING
@@ -190,17 +200,23 @@ def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, c
 
 _ENCLOSES: Final = 1
 _IS_UNKNOWN: Final = 2
-"""States of a component: its box contains another's; the edge above it is not known yet."""
+"""Bits of the state of a component: its box contains another component's box; the edge above it is still to be
+computed.
+"""
 
 Components = namedtuple("Components", "highest number state")
-"""By component: highest, its last vertex (x, then y); state. number: by ring its component."""
+"""Connected components of rings. highest, state: by component its last vertex (x, then y) and the bits above; number:
+by ring its component.
+"""
 
 
 @inline
 def _find_components(
     edges: Edges, tops: IntArray, rings: IntArray, n: int, components: Components, boxes: FloatArray
 ) -> int:
-    """Fill ``components`` and the box of each; return their number."""
+    """Group rings into connected components: fill ``components`` and the box of each component; return their number.
+    tops: by ring its last vertex (x, then y). rings: union-find forest of connected rings. n: number of vertices.
+    """
     x, y, highest, number = edges.x, edges.y, components.highest, components.number
     n_components, at = 0, 0
     while at < n:  # bound: each turn passes one ring
@@ -226,7 +242,8 @@ def _find_components(
 
 @inline
 def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree) -> None:
-    """Mark the components whose boxes contain that of component k, and k if there are any."""
+    """Set _ENCLOSES on each component whose box contains the box of component k, and _IS_UNKNOWN on k if there is one.
+    """
     stack, n_leaves, boxes, state = tree.stack, leaves_of(n), tree.boxes, components.state
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -248,7 +265,9 @@ def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree)
 
 @inline
 def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Int32Array) -> int:
-    """Fill ``names`` and ``boxes`` with the edges of all components that enclose another; return their number."""
+    """Write to ``names`` the edges of all components marked _ENCLOSES, and to ``tree.boxes`` their boxes; return how
+    many.
+    """
     x, y, boxes = edges.x, edges.y, tree.boxes
     m = 0
     for e in range(n):
@@ -264,10 +283,9 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 
 @inline
 def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int], stop: FlagArray) -> None:
-    """Join the outer cycle of each component of rings to the face it lies in.
-
-    w: the `Workspace`, whose tree is scratch but for its marks (RUN: edges that stand for many, never next above
-    another component). names: scratch by point. sizes: the numbers of vertices, cycles and runs.
+    """Unite, in ``faces.joined``, the outer cycle of each component with a cycle of the face that the component lies
+    in. w: the `Workspace`; its tree is overwritten, but for the marks. names: scratch by point. sizes: the numbers of
+    vertices, cycles and RUN edges.
     """
     n, n_cycles, n_runs = sizes
     given, tree, faces, components, stars = w.given, w.tree, w.faces, w.components, w.stars

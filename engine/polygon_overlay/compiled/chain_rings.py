@@ -64,12 +64,16 @@ Rings = namedtuple("Rings", "point edge meets offset region")
 """
 
 Walk = namedtuple("Walk", "path place")
-"""Scratch. path: the half-chains of a walk; place: by node where rings meet, its place on the path."""
+"""Scratch of a walk. path: its half-chains in order; place: by node where rings meet, its index in ``path``, -1 if not
+on it.
+"""
 
 
 @inline
 def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) -> None:
-    """Fill ``state`` from ``inside``."""
+    """Write the bits BOUNDS and INSIDE of each half-chain to ``faces.state``, from the parts of its two faces
+    (``inside``).
+    """
     cycle, inside, state = faces.cycle, faces.inside, faces.state
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -85,10 +89,9 @@ def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) 
 def join_regions(
     chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: FlagArray
 ) -> None:
-    """Unite faces that no boundary chain separates into regions; fill ``faces.fan`` with the boundary half-chains that
-    leave each node that is not simple. ``faces.state`` is what `mark_boundary` wrote.
-
-    is_named: unite faces outside the result too. sizes: the numbers of chains, simple nodes and nodes.
+    """Unite faces that no boundary chain separates into regions, and count the boundary chains of nodes in
+    ``faces.fan``. ``faces.state`` is the result of `mark_boundary`. is_named: unite faces outside the result too.
+    sizes: the numbers of chains, simple nodes and all nodes.
     """
     n_chains, n_simple, n_nodes = sizes
     cycle, state = faces.cycle, faces.state
@@ -110,7 +113,7 @@ def join_regions(
 
 @merged
 def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
-    """Return whether more than two boundary chains end where the boundary half-chain ``half`` begins."""
+    """Return whether more than two boundary chains meet in the node where the boundary half-chain ``half`` begins."""
     across = across_end(chains, half ^ 1)
     if across < 0:
         return faces.fan[origin(chains, half)] > 2
@@ -120,7 +123,9 @@ def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
 
 @merged
 def _next_boundary_edge(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
-    """Return the boundary half-chain after ``half`` around the region to its left, and whether it `_is_forked`."""
+    """Return the boundary half-chain that follows ``half`` around the region to its left, and whether rings meet there.
+    The second result is `_is_forked` of the first.
+    """
     state, across = faces.state, across_end(chains, half)
     if across >= 0:
         left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
@@ -137,7 +142,7 @@ def _next_boundary_edge(chains: Chains, stars: Stars, faces: Faces, half: int) -
 
 @merged
 def emit_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets: int) -> int:
-    """Write a point where the boundary turns; return the number of points then."""
+    """Append a point to ``rings`` at index ``at`` if the boundary turns there; return the index after it."""
     if not turns:
         return at
     rings.point[at], rings.edge[at], rings.meets[at] = point, edge, meets
@@ -146,7 +151,9 @@ def emit_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets:
 
 @merged
 def emit_vertex(edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, at: int) -> int:
-    """Write an input vertex from which the boundary continues along ``edge``; returns as `emit_point`."""
+    """Append input vertex v, from which the boundary follows ``edge``, if the boundary turns at v; return the next
+    index.
+    """
     turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
     return emit_point(rings, at, v, edge, turns, marks[edge] & RUN)
 
@@ -156,7 +163,9 @@ def _emit_ring(
     edges: Edges, chains: Chains, points: Int32Array, state: FlagArray, marks: FlagArray, path: Int32Array, first: int,
     last: int, rings: Rings, n_points: int, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Write the points of the ring ``path[first:last]`` (half-chains), without straight ones; return their number."""
+    """Append the points of the ring of half-chains ``path[first:last]`` where it turns; return the number of points
+    then. sizes: as of `walk_rings`.
+    """
     _, _, n, n_simple = sizes
     edge = leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
@@ -183,10 +192,11 @@ def walk_rings(
     edges: Edges, chains: Chains, stars: Stars, faces: Faces, marks: FlagArray, walk: Walk, rings: Rings,
     flood: FloodFill, is_named: bool, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write all boundary rings, and the regions beyond them if rings are named; return the numbers of rings and points.
+    """Trace the boundary rings of all regions inside; return the numbers of rings and points, written to ``rings``.
 
-    marks: by edge, BENT where the boundary certainly turns at its first vertex, RUN where it stands for many.
-    sizes: the numbers of chains, nodes, vertices and simple nodes.
+    is_named: record in ``flood`` the regions on the other side of each ring, too. marks: by edge, BENT if the boundary
+    certainly turns at its first vertex, RUN if it replaces several. sizes: the numbers of chains, nodes, vertices and
+    simple nodes.
     """
     n_chains, n_nodes, _, _ = sizes
     state, path, place = faces.state, walk.path, walk.place
@@ -232,7 +242,9 @@ def walk_rings(
 def has_only_proper_crossings(
     given: Given, events: Events, contacts: Contacts, n_rings: int, selected: FlagArray
 ) -> bool:
-    """Return whether the pair is two simple rings that cross in simple nodes, and `walk_crossings` applies."""
+    """Return whether two simple rings meet in proper crossings only and `walk_crossings` applies to the ``selected``
+    labels.
+    """
     if (
         n_rings != 2
         or contacts.n_exact > 0
@@ -258,9 +270,8 @@ def _follow_to_crossing(
     edges: Edges, events: Events, along: Along, place: Int32Array, marks: FlagArray, event: int, is_forward: bool,
     rings: Rings, n: int, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write the crossing of an event and the vertices up to the next crossing of its ring.
-
-    Returns the event of that crossing, and the number of points then.
+    """Append a crossing, and the vertices of its ring up to the next crossing; return that crossing's event and the
+    number of points. event: on the edge that the walk follows. place: by event its index in ``along.order``.
     """
     edge, at = events.edge[event], place[event]
     n = emit_point(rings, n, events.point[event], edge, True, 0)
@@ -281,9 +292,9 @@ def walk_crossings(
     given: Given, events: Events, along: Along, place: Int32Array, marks: FlagArray, selected: FlagArray,
     n_crossings: int, rings: Rings, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Write the boundary rings where `has_only_proper_crossings`; return the numbers of rings and points.
-
-    Crossing c has the events 2 c, of its first edge, and 2 c + 1. place: scratch by event. events.turn is used up.
+    """Trace the boundary rings of two simple rings that only cross properly; return the numbers of rings and points.
+    Crossing c has the events 2 c, on its first edge, and 2 c + 1. place: scratch by event. ``events.turn`` is
+    overwritten.
     """
     edges, ring = given.edges, given.edges.ring
     for k in range(2 * n_crossings):

@@ -34,7 +34,7 @@ NOT_YET: Final = -1
 """Placeholder of a chain that is not known yet."""
 
 Chains = namedtuple("Chains", "tail head first last mask representative twin at across")
-"""The stretches of rings between nodes.
+"""The stretches of rings between nodes; half-chain 2 c is chain c along its ring, 2 c + 1 is chain c backwards.
 
 | field | by | meaning |
 | --- | --- | --- |
@@ -57,20 +57,20 @@ Stars = namedtuple("Stars", "node_of point starts ends half place")
 """
 
 Loose = namedtuple("Loose", "half masks dx dy")
-"""Half-chains that leave nodes that are not simple, ascending, before they are sorted into stars. Scratch: masks, by
-chain before chains are united; dx, dy: directions of a star's half-chains, float64.
+"""Half-chains that leave nodes with a star, ascending, not yet sorted. Scratch: masks, by chain, before coinciding
+chains are united; dx, dy: the directions of one star's half-chains, float64.
 """
 
 
 @merged
 def is_representative(chains: Chains, chain: int) -> bool:
-    """Return whether a chain represents itself."""
+    """Return whether a chain represents itself, so coincides with no chain of a lower number."""
     return chains.representative[chain] == 2 * chain
 
 
 @merged
 def representative_of(chains: Chains, half: int) -> int:
-    """Return the half-chain that represents `half`."""
+    """Return the half-chain that stands for ``half`` and all half-chains that coincide with it."""
     return chains.representative[half >> 1] ^ (half & 1)
 
 
@@ -82,32 +82,38 @@ def origin(chains: Chains, half: int) -> int:
 
 @merged
 def across_end(chains: Chains, half: int) -> int:
-    """Return ``across`` of the node where a half-chain ends."""
+    """Return ``chains.across`` of the node where half-chain ``half`` ends: negative unless that node is simple."""
     return chains.across[((half ^ 1) + 1) >> 1]
 
 
 @merged
 def to_the_left(across: int, half: int) -> int:
-    """Return the half-chain that leaves a simple node to the left of one that ends there."""
+    """Return the half-chain that leaves a simple node to the left of ``half``, which ends there. across: `across_end`
+    of ``half``.
+    """
     return (across & ~1) - 1 + ((across ^ half) & 1)
 
 
 @merged
 def place_before(chains: Chains, stars: Stars, at: int, half: int) -> int:
-    """Return the place before ``at`` in the star of the node where half-chain ``half`` begins, cyclically."""
+    """Return the index in ``stars.half`` of the half-chain before index ``at``, cyclically, around the origin of
+    ``half``.
+    """
     node = origin(chains, half)
     return (at if at > stars.starts[node] else stars.ends[node]) - 1
 
 
 @merged
 def leaving_edge(chains: Chains, half: int) -> int:
-    """Return the edge along which a half-chain leaves its node."""
+    """Return the edge along which a half-chain leaves its origin: the first edge of its chain, or the last if it runs
+    back.
+    """
     return chains.last[half >> 1] if half & 1 else chains.first[half >> 1]
 
 
 @merged
 def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
-    """Return the number of the node at a united point, and the number of nodes then."""
+    """Return the node at a point, made now if there is none, and the number of nodes then."""
     if stars.node_of[point] < 0:
         stars.node_of[point] = n_nodes
         stars.point[n_nodes], stars.starts[n_nodes], stars.ends[n_nodes] = point, NOT_YET, 0
@@ -117,7 +123,8 @@ def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
 
 @merged
 def _link_crossing(events: Events, chains: Chains, stars: Stars, point: int, crossing: int, chain: int, e: int) -> None:
-    """Record that a chain leaves a simple node along edge e."""
+    """Record that chain ``chain`` leaves a simple node along edge e; the second call of a node fills ``chains.across``.
+    """
     other = stars.node_of[point]
     if other < 0:  # here for the first time
         stars.node_of[point] = chain
@@ -136,10 +143,11 @@ def build_chains(
     given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Int32Array,
     sizes: tuple[int, int, int], stop: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Cut every ring at its nodes, from its top vertex on; return the numbers of nodes, chains and loose half-chains.
+    """Cut every ring at its nodes into chains, from its top vertex on; return the numbers of nodes, chains and loose
+    half-chains.
 
-    unions.is_node: tops included. stars.node_of: -1 on entry. ``loose`` receives the half-chains that leave nodes that
-    are not simple, whose stars begin NOT_YET. sizes: the numbers of vertices, rings and crossings.
+    ``unions.is_node`` includes the tops; ``stars.node_of`` is -1 everywhere. ``loose`` receives the half-chains that
+    leave nodes with a star; ``stars.starts`` of these is NOT_YET. sizes: the numbers of vertices, rings and crossings.
     """
     edges, (n, n_rings, n_crossings) = given.edges, sizes
     n_nodes, n_chains, n_loose = n_crossings, 0, 0
@@ -192,7 +200,7 @@ def build_chains(
 
 @inline
 def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
-    """Return 0 for directions from straight up, counter-clockwise, to before straight down; 1 for the others."""
+    """Return 0 if an edge (reversed if is_back) points up or to the left, 1 if it points down or to the right."""
     x, y = edges.x, edges.y
     a, b = edge, edges.after[edge]
     if is_back:
@@ -204,7 +212,9 @@ def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
 
 @called
 def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
-    """Return -1, 0 or 1: half-chain g leaves before, with or after h, counter-clockwise from straight up."""
+    """Return -1, 0 or 1: half-chain g leaves its node before, with or after h, counter-clockwise from straight up.
+    Exact.
+    """
     e, f = leaving_edge(chains, g), leaving_edge(chains, h)
     half_g, half_h = _half_turn(edges, e, g & 1), _half_turn(edges, f, h & 1)
     if half_g != half_h:
@@ -215,9 +225,9 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 
 @called
 def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, last: int, masks: IntArray) -> int:
-    """Replace coinciding half-chains by the lowest, their representative; return where the star then ends.
-
-    The other end of coinciding chains has the same chains in one direction, so it chooses the same representative.
+    """Replace coinciding half-chains of the sorted ``star[first:last]`` by their lowest chain; return the new end.
+    ``chains.mask`` of that chain becomes the exclusive or of ``masks``. The node at the other end chooses the same
+    chain.
     """
     n_unique = at = first
     while at < last:  # bound: each turn passes one group
@@ -247,7 +257,9 @@ def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, las
 def _group_loose(
     chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
-    """Bucket the loose half-chains by node, in any order."""
+    """Bucket the loose half-chains by their origin: fill ``stars.half``, ``starts`` and ``ends``, unsorted within a
+    node.
+    """
     starts, ends = stars.starts, stars.ends
     for k in range(n_loose):
         if k & POLL == 0 and stop[0]:
@@ -271,7 +283,9 @@ def _group_loose(
 
 @inline
 def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, first: int, last: int) -> bool:
-    """Sort the half-chains ``star[first:last]`` by direction; return whether two have the same direction."""
+    """Sort the half-chains ``star[first:last]`` of a node counter-clockwise; return whether two have the same
+    direction.
+    """
     x, y, dx, dy = edges.x, edges.y, loose.dx, loose.dy
     has_twins = False
     for k in range(first, last):
@@ -306,7 +320,9 @@ def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, fir
 def build_stars(
     edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
-    """Fill the stars of the nodes from n_simple on; of coinciding chains only the representative stays."""
+    """Fill the stars of nodes n_simple .. n_nodes - 1, sorted counter-clockwise, one representative for coinciding
+    chains.
+    """
     _group_loose(chains, stars, loose, n_simple, n_nodes, n_loose, stop)
     star = stars.half
     for node in range(n_simple, n_nodes):

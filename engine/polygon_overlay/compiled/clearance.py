@@ -77,17 +77,19 @@ from engine.types import FlagArray, FloatArray, Int32Array, Point2
 
 CUT_BOUND: Final = 40.0 * U2
 LOST: Final = -1.0
-"""Error value: the double could not be determined."""
+"""Error bound of a coordinate of which the nearest double is not determined: the pair takes the exact fallback."""
 _NOT_YET: Final = -2.0
-"""Error value of a crossing that is not rounded yet."""
+"""Error bound of a crossing that is not rounded yet."""
 
 Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
-"""By point of rings: its doubles, and whether rounding moved it, uint8; by crossing its doubles and error."""
+"""x, y, moved: by point of rings, its nearest doubles, and 1 if they differ from the point (uint8); crossing_x,
+crossing_y, error: by crossing, its nearest doubles and a bound of its displacement.
+"""
 
 
 class _Cut(NamedTuple):
-    """Two crossing edges, the weights of the ends of the first as positive double-doubles, their sum, and a bound of
-    the relative error of a coordinate.
+    """Crossing of edges e and f: the weights a, b of the ends of e as positive double-doubles, their sum, and a bound
+    of the relative error of a coordinate.
     """
 
     e: int
@@ -103,15 +105,14 @@ class _Cut(NamedTuple):
 
 @merged
 def _abs2(h: float, low: float) -> tuple[float, float]:
-    """Return the magnitude of a double-double."""
+    """Return the absolute value of the double-double h + low."""
     return (h, low) if h >= 0.0 else (-h, -low)
 
 
 @called
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
-    """Return the doubles nearest to the crossing of edges e and f, and a bound of the error of each.
-
-    Error 0: the coordinate is exactly that double. Error LOST: needs the exact fallback.
+    """Return x, y of the doubles nearest to the crossing of edges e and f, and a bound of the rounding error of each.
+    Error bound 0: that double is the coordinate itself. LOST: the nearest double is not determined.
     """
     ends, others = _ends_of(edges, e), _ends_of(edges, f)
     (x, has_x), (y, has_y) = common_places(ends, others)
@@ -130,13 +131,15 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
 
 @merged
 def _ends_of(edges: Edges, e: int) -> Ends:
-    """Return the coordinates of both ends of an edge."""
+    """Return x and y of the first end of edge e, then of its second end."""
     return edges.x[e], edges.y[e], edges.x[edges.after[e]], edges.y[edges.after[e]]
 
 
 @merged
 def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[float, bool]]:
-    """Return by axis the constant coordinate of one of two edges, and whether there is one."""
+    """Return (x, has_x), (y, has_y): the x of a vertical edge and the y of a horizontal one, if one of two edges is
+    such.
+    """
     ax, ay, bx, by = first
     cx, cy, dx, dy = second
     return ((ax if ax == bx else cx), (ax == bx) | (cx == dx)), ((ay if ay == by else cy), (ay == by) | (cy == dy))
@@ -144,9 +147,8 @@ def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[
 
 @merged
 def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, float]:
-    """Return the weights of the ends of an edge as positive double-doubles, and 2.5 r, r their relative error.
-
-    Expansions give them where the bound of one is above a thousandth of it, if exponents allow.
+    """Return |orient| of both ends of an edge against the line of ``others`` as double-doubles, and 2.5 r. r bounds the
+    relative error of both. Expansions compute them where r would exceed 0.001, if exponents allow.
     """
     ax, ay, bx, by = ends
     cx, cy, dx, dy = others
@@ -167,7 +169,7 @@ def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, fl
 
 @called
 def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, float]:
-    """Return the weight of a point, from an expansion, as a positive double-double."""
+    """Return |orient(c, d, (x, y))|, c and d the ends ``others``, as a double-double, from an expansion."""
     e = workspace(16)
     h, low = leading(e, exact_cross(others, (others[0], others[1], x, y), e))
     return _abs2(h, low)
@@ -175,7 +177,7 @@ def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, flo
 
 @inline
 def leading(e: Any, n: int) -> tuple[float, float]:
-    """Return the two leading components of an expansion."""
+    """Return the sum of an expansion of n components as a double-double: its two leading components."""
     n = compress(e, n)
     if n == 0:
         return 0.0, 0.0
@@ -184,7 +186,9 @@ def leading(e: Any, n: int) -> tuple[float, float]:
 
 @merged
 def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
-    """Return the double nearest to one coordinate, and its error bound; p and q are those of the ends of e."""
+    """Return the double nearest to one coordinate of a crossing, and its error bound; as of `round_crossing`. axis: 0
+    for x, 1 for y. p, q: that coordinate of the ends of edge e.
+    """
     rh, rl = dd_scale(cut.bh, cut.bl, p)
     sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)
@@ -197,7 +201,8 @@ def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple
 
 @called
 def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
-    """Return the result of `_coordinate` by exact signs around h."""
+    """Return as `_coordinate`, decided by exact signs; h: a double near the coordinate, bound: of its distance from it.
+    """
     if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
         h = _from_expansions(edges, e, f, axis)
     side = crossing_against(edges, e, f, axis, h, 0.0)
@@ -223,7 +228,9 @@ def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: flo
 
 @called
 def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
-    """Return a coordinate of a crossing with an error below one unit in its last place."""
+    """Return a coordinate (axis 0 or 1) of the crossing of edges e and f, with an error below one unit in its last
+    place.
+    """
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb = workspace(16), workspace(16)
@@ -249,7 +256,9 @@ def round_points(
     edges: Edges, events: Events, points: Int32Array, n: int, n_crossings: int, n_points: int, rounded: Rounded,
     stop: FlagArray,
 ) -> float:  # fmt: skip
-    """Round the points of all rings, vertices and crossings; return the largest displacement of a point, or LOST."""
+    """Round the ``points`` of all rings (vertices below n, crossing c as n + c) into ``rounded``. Returns the largest
+    displacement of a point, or LOST.
+    """
     x, y, error = edges.x, edges.y, rounded.error
     error[:n_crossings] = _NOT_YET
     farthest = 0.0
@@ -274,14 +283,13 @@ def round_points(
 
 CLEARANCE: Final = 64.0 * 2.0**-52
 MARGIN: Final = 16.0 * 2.0**-52
-"""The margins before rounding, and after it, in units of the largest coordinate."""
+"""The margins before rounding (CLEARANCE) and after it (MARGIN), as multiples of the largest coordinate."""
 
 
 @inline
 def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: float, margin: float) -> bool:
-    """Return whether the nodes next to vertex v are away from the other edge there.
-
-    share_before, share_after: the fraction of the edge before v, and after it, up to the next node.
+    """Return whether the next node on either edge at vertex v is further than the margin from the other of these edges.
+    share_before, share_after: the part of the edge before v, and of that after v, that lies between v and that node.
     """
     x, y = edges.x, edges.y
     p, q = edges.before[v], edges.after[v]
@@ -294,9 +302,8 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 @inline
 def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: FlagArray) -> bool:
-    """Return whether the first and the last event of every edge are away from the adjacent edges.
-
-    along: by sort_events.
+    """Return whether, at every vertex, the next events on its two edges are further than the margin from the other
+    edge. along: filled by `sort_events`. False also if ``stop`` is set.
     """
     starts, keys = along.starts, along.keys
     for e in range(n):
@@ -320,7 +327,9 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: F
 
 @merged
 def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Return whether the edges ab and cd cannot touch, or fold, while they move to their rounded places."""
+    """Return whether edges ab and cd, which are rounded, are proven neither to touch nor to fold while their ends move.
+    points: equal numbers are one point. square: the margin, squared.
+    """
     if points[a] == points[d]:
         c, d = d, c
     elif points[b] == points[c]:
@@ -336,7 +345,9 @@ def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, 
 
 @inline
 def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: FlagArray) -> bool:
-    """Return whether rounding made a point, where rings do not meet, collinear with its neighbours."""
+    """Return whether rounding made a point collinear with both neighbours in its ring; points where rings meet are
+    exempt.
+    """
     x, y, moved = rounded.x, rounded.y, rounded.moved
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
@@ -356,9 +367,9 @@ def certify(
     rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Int32Array, heads: Int32Array,
     stop: FlagArray,
 ) -> bool:  # fmt: skip
-    """Return whether the rings are proven valid after rounding: no two edges nearer than the margin that do not meet.
-
-    n: points of ``rings``. tree, tails, heads: scratch of that size. Edges left out (RUN) are away from all that moves.
+    """Return whether floats prove the rounded rings valid: no edges without a common point are within MARGIN of each
+    other. n: number of points in ``rings``. tree, tails, heads: scratch of that size. Edges marked RUN are not tested;
+    nothing that moves is near them.
     """
     x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0

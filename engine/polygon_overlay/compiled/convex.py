@@ -32,15 +32,17 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import FlagArray, FloatArray, Int32Array
 
 GENERAL: Final = -1
-"""Result value: the pair takes the general path."""
+"""Result value: the filter decides nothing, and the pair takes the general path."""
 _NONE: Final = -1
 
 Passages = namedtuple("Passages", "enters leaves")
-"""By edge: the edge of the other polygon at which it enters that polygon, and leaves it, or _NONE."""
+"""By edge: the edge of the other polygon through which it enters that polygon, and the one through which it leaves, or
+_NONE.
+"""
 
 Points = namedtuple("Points", "x y firsts seconds")
-"""Points of the result: doubles and sources (an input vertex and -1, or two edges, first the one along which the result
-continues).
+"""Points of the result. x, y: doubles; firsts, seconds: v and -1 for input vertex v, two edges for their crossing, that
+along which the result continues first.
 """
 
 
@@ -95,10 +97,9 @@ def _lowest_vertex(vertices: FloatArray) -> int:
 def load_convex(
     vertices: FloatArray, base: int, edges: Edges, origins: Int32Array, start: int, stop: FlagArray
 ) -> tuple[int, int]:  # fmt: skip
-    """Load a ring to ``start``, counter-clockwise from its smallest vertex, which is repeated at its end.
-
-    Returns its largest vertex (x, then y), or GENERAL if it is not strictly convex; and 1 or -1, along or against the
-    ring as given.
+    """Write a ring to ``edges`` from ``start`` on: counter-clockwise, from its smallest vertex (x, then y), repeated at
+    the end. Returns the index of its largest vertex, GENERAL unless it is proven strictly convex; and 1, or -1 if
+    reversed. origins: receives ``base`` + the index of each vertex.
     """
     size = vertices.shape[0]
     low = _lowest_vertex(vertices)
@@ -123,7 +124,9 @@ def load_convex(
 
 @inline
 def _record_crossing(edges: Edges, e: int, f: int, passages: Passages) -> int:
-    """Record the crossing of two edges, if they cross; return the number of crossings, or GENERAL."""
+    """Write the crossing of edges e and f to ``passages``; return 1 if they cross, 0 if proven not to, GENERAL if
+    undecided.
+    """
     x, y = edges.x, edges.y
     to_f = turns(x, y, e, e + 1, f, f + 1)
     nearest_f = smaller_turn(to_f)
@@ -147,9 +150,8 @@ def _record_crossing(edges: Edges, e: int, f: int, passages: Passages) -> int:
 def _find_passages(
     edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: FlagArray
 ) -> int:  # fmt: skip
-    """Record the crossings of two chains, walked from left to right; return their number, or GENERAL.
-
-    i, j: the leftmost vertex of each; a lower chain has step 1, an upper one -1.
+    """Write the crossings of two x-monotone chains to ``passages``; return their number, or GENERAL. i, j: leftmost
+    vertex of each chain, i_end, j_end its last, i_step, j_step: 1 for a lower chain, -1 for an upper one.
     """
     x, y = edges.x, edges.y
     while i != i_end and x[i + i_step] < x[j]:
@@ -181,7 +183,9 @@ def _find_passages(
 
 @inline
 def _locate_vertex(edges: Edges, first: int, last: int, v: int) -> int:
-    """Return 1, -1 or 0: vertex v is inside, outside, or undecided, in the convex ring of edges first .. last - 1."""
+    """Return 1, -1 or 0: vertex v is proven inside the convex ring of edges first .. last - 1, proven outside, or
+    undecided.
+    """
     x, y = edges.x, edges.y
     side = 1
     for i in range(first, last):
@@ -207,7 +211,7 @@ def _add_vertices(edges: Edges, origins: Int32Array, first: int, last: int, poin
 def _add_stretch(
     edges: Edges, origins: Int32Array, e: int, f: int, first: int, last: int, points: Points, n: int
 ) -> int:  # fmt: skip
-    """Append the vertices between two points on edges e and f of the ring first .. last - 1; return the number of
+    """Append the vertices of the ring first .. last - 1 from edge e, counter-clockwise, to edge f; return the number of
     points.
     """
     if f >= e:
@@ -218,8 +222,8 @@ def _add_stretch(
 
 @inline
 def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: Points, n: int) -> float:
-    """Write the crossing of two edges to place n; return its displacement by rounding, infinity if it is not
-    determined.
+    """Write the rounded crossing of edges e and f as point n; return a bound of its displacement, infinity if
+    undetermined.
     """
     x, y, ex, ey = round_crossing(edges, e, f)
     points.x[n], points.y[n], points.firsts[n], points.seconds[n] = x, y, e_name, f_name
@@ -233,11 +237,12 @@ def _walk(
     edges: Edges, origins: Int32Array, n: int, second: int, end: int, is_reversed: int, is_second_reversed: int,
     passages: Passages, points: Points, stop: FlagArray,
 ) -> tuple[int, float]:  # fmt: skip
-    """Trace the result; return the number of points, or GENERAL, and their largest displacement.
+    """Trace the boundary of the intersection into ``points``; return its number of points, or GENERAL, and their
+    largest displacement.
 
-    The first polygon is followed while it is inside the second; the second from where the first leaves it to where it
-    enters again. Edges 0 .. n - 1 and second .. end - 1; at least one crossing. is_reversed, is_second_reversed: 1 if
-    the ring was given clockwise, so that its edges began with their ends.
+    The walk follows the first polygon (edges 0 .. n - 1) inside the second, and the second (edges second .. end - 1)
+    from where the first leaves it to where it enters again. There is a crossing. is_reversed, is_second_reversed: 1 if
+    the ring was given clockwise, so that an edge has the number of its end.
     """
     enters, leaves = passages.enters, passages.leaves
     start = 0
@@ -281,10 +286,9 @@ def _walk(
 def intersect_convex(
     subject: FloatArray, clip: FloatArray, given: Given, passages: Passages, points: Points, stop: FlagArray
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Intersect two convex rings: return the number of points, the first one, and the largest displacement; or GENERAL.
-
-    points: filled, counter-clockwise; vertices by their numbers, those of clip after those of subject. given and
-    passages have room for two more than all vertices, points for four times as many.
+    """Intersect two convex rings; return the number of points or GENERAL, the index of the smallest one (x, then y),
+    and the largest displacement by rounding. points: filled counter-clockwise; vertices of ``clip`` are numbered after
+    those of ``subject``. given and passages have room for two more than all vertices, points for four times as many.
     """
     edges, origins, x, y = given.edges, given.origins, points.x, points.y
     n = subject.shape[0]

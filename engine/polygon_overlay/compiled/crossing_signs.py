@@ -28,7 +28,7 @@ from engine.types import Point2
 
 WEIGHT_BOUND: Final = 32.0 * U2
 WEIGHT_ROOM: Final = 16
-"""Components of a weight: the product of two differences of two components each, twice."""
+"""Most components of a weight: two products of two differences, each of two components."""
 
 Edges = namedtuple("Edges", "x y after before ring")
 """Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``.
@@ -42,7 +42,7 @@ Ends = tuple[float, float, float, float]
 
 @merged
 def orient(edges: Edges, a: int, b: int, c: int) -> int:
-    """Return the exact sign of orient(a, b, c) of three vertices."""
+    """Return the exact sign of orient2d(a, b, c) of three vertices: 1 for a left turn."""
     x, y = edges.x, edges.y
     left = (x[a] - x[c]) * (y[b] - y[c])
     right = (y[a] - y[c]) * (x[b] - x[c])
@@ -57,7 +57,7 @@ def orient(edges: Edges, a: int, b: int, c: int) -> int:
 
 @called
 def _exact_orient(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> int:
-    """Return the sign of orient2d by an expansion."""
+    """Return the sign of orient2d(a, b, c), computed with an expansion."""
     if ((ax == cx) & (ay == cy)) | ((bx == cx) & (by == cy)):  # case: borders that polygons share
         return 0
     return orient2d_exact(Point2(ax, ay), Point2(bx, by), Point2(cx, cy))
@@ -65,7 +65,7 @@ def _exact_orient(ax: float, ay: float, bx: float, by: float, cx: float, cy: flo
 
 @merged
 def turn_of_edges(edges: Edges, e: int, f: int) -> int:
-    """Return the exact sign of the cross product of the directions of the edges e and f."""
+    """Return the exact sign of the cross product of the directions of edges e and f: 1 if f points to the left of e."""
     x, y = edges.x, edges.y
     b, d = edges.after[e], edges.after[f]
     left = (x[b] - x[e]) * (y[d] - y[f])
@@ -83,7 +83,7 @@ def turn_of_edges(edges: Edges, e: int, f: int) -> int:
 
 @called
 def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
-    """Return the sign of ``(b - a) x (d - c)`` by an expansion."""
+    """Return the sign of ``(b - a) x (d - c)``, a, b, c, d being vertices, computed with an expansion."""
     x, y = edges.x, edges.y
     if (x[a] == x[d]) & (y[a] == y[d]) & (x[b] == x[c]) & (y[b] == y[c]):  # case: as above
         return 0
@@ -93,7 +93,7 @@ def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
 
 @merged
 def exact_cross(first: Ends, second: Ends, e: Components) -> int:
-    """Set e to the cross product of the directions of two edges; return its length, at most WEIGHT_ROOM."""
+    """Set expansion e to the cross product of the directions of two edges; return its length, at most WEIGHT_ROOM."""
     ux, ux_tail = two_diff(first[2], first[0])
     uy, uy_tail = two_diff(first[3], first[1])
     vx, vx_tail = two_diff(second[2], second[0])
@@ -103,7 +103,7 @@ def exact_cross(first: Ends, second: Ends, e: Components) -> int:
 
 @inline
 def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
-    """Return orient(c, d, p) as a double-double, and its error bound."""
+    """Return orient2d(c, d, p) as a double-double (h, low), and a bound of its absolute error."""
     ux, ux_tail = two_diff(dx, cx)
     uy, uy_tail = two_diff(dy, cy)
     wx, wx_tail = two_diff(px, cx)
@@ -116,15 +116,14 @@ def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) 
 
 @called
 def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
-    """Set e to orient(c, d, p); return its length, at most WEIGHT_ROOM."""
+    """Set expansion e to orient2d(c, d, p) of three vertices; return its length, at most WEIGHT_ROOM."""
     x, y = edges.x, edges.y
     return exact_cross((x[c], y[c], x[d], y[d]), (x[c], y[c], x[p], y[p]), e)
 
 
 @called
 def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
-    """Return -1, 0 or 1: the crossing of edge e with f comes before, with or after that with g, along e.
-
+    """Return -1, 0 or 1: along edge e, its crossing with edge f comes before, with or after that with edge g. Exact.
     Caller guarantees that f and g each cross e in a point inside both.
     """
     a, b, fb, gb = e, edges.after[e], edges.after[f], edges.after[g]
@@ -143,9 +142,8 @@ def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
 
 @called
 def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail: float) -> int:
-    """Return the exact sign of a coordinate of the crossing of e and f minus ``value + tail``.
-
-    Caller guarantees that they cross in a point inside both; value and tail as of two_sum.
+    """Return the exact sign of ``coordinate - (value + tail)`` for the crossing of edges e and f; axis 0: x, 1: y.
+    Caller guarantees that e and f cross in a point inside both, and that ``value + tail`` rounds to ``value``.
     """
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
@@ -167,7 +165,7 @@ def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail
 
 @inline
 def _set_difference(z: float, value: float, tail: float, e: Components) -> int:
-    """Set e to z - value - tail; return its length, at most 3."""
+    """Set expansion e to ``z - value - tail``; return its length, at most 3."""
     n = 0
     high, low = two_diff(z, value)
     if low != 0.0:

@@ -58,7 +58,7 @@ def _are_on_one_side(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: in
 
 @merged
 def _crosses(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> bool:
-    """Return whether ab and cd cross properly, in floating point."""
+    """Return whether segments ab and cd cross properly, by signs of floating-point orientations (not proven)."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
     if (side_c > 0.0) == (side_d > 0.0):
@@ -83,14 +83,15 @@ def segments_are_far(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: in
 
 
 _ANY_SLACK: Final = 4.0
-"""Slack of a parameter of which only the sign is known: any comparison with it is exact."""
+"""Slack of a parameter known by its sign only: larger than any difference of parameters, so all comparisons are exact.
+"""
 
 
 class Turn(IntEnum):
-    """To which side the second edge of a crossing leaves, seen along the first."""
+    """The side to which the second edge of a crossing leaves, seen along the first edge."""
 
     NOT_SIMPLE = 0
-    """Not proven by floating point, or not the only crossing there."""
+    """Not proven by floating point, or other edges pass through the same point."""
     LEFT = 1
     RIGHT = 2
 
@@ -108,21 +109,23 @@ Events = namedtuple("Events", "edge point other t slack reach first second turn"
 """
 
 Unions = namedtuple("Unions", "points is_node rings")
-"""points: forest of equal points; is_node: by vertex, uint8, whether something meets it or a ring begins there;
-rings: forest of connected rings.
+"""points: union-find forest of equal points; is_node: by vertex, uint8, 1 if another edge meets it or a ring begins
+there; rings: union-find forest of rings that touch.
 """
 
 
 @merged
 def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: float, slack: float) -> None:
-    """Write event ``at``."""
+    """Write event number ``at``: edge ``edge`` passes ``point`` at parameter t, known to +- slack."""
     events.edge[at], events.point[at], events.other[at] = edge, point, other
     events.t[at], events.slack[at], events.reach[at] = t, slack, slack
 
 
 @inline
 def _add_vertex_on_edge_event(edges: Edges, events: Events, unions: Unions, at: int, e: int, v: int) -> int:
-    """Add an event for vertex v on the line of edge e, if it lies on the closed edge; return the number of events."""
+    """Append an event for vertex v if it lies inside edge e; unite v with an end of e that equals it; return the number
+    of events. Caller guarantees that v lies on the line of e.
+    """
     x, y = edges.x, edges.y
     a, b = e, edges.after[e]
     for end in (a, b):
@@ -148,9 +151,8 @@ def _add_vertex_on_edge_event(edges: Edges, events: Events, unions: Unions, at: 
 def _add_contact(
     edges: Edges, events: Events, unions: Unions, n: int, n_events: int, n_crossings: int, e: int, f: int
 ) -> tuple[int, int]:
-    """Add the contacts of the edges e and f, decided exactly; return the numbers of events and crossings.
-
-    n: number of vertices. There is room for four more events.
+    """Append the events of all common points of edges e and f, decided exactly; return the numbers of events and
+    crossings. n: number of vertices. There is room for four more events.
     """
     parent, rings = unions.points, unions.rings
     a, b, c, d = e, edges.after[e], f, edges.after[f]
@@ -200,8 +202,9 @@ def _add_contact(
 
 
 class Contacts(NamedTuple):
-    """Numbers of events (-1: no room), of crossings, and of pairs decided exactly; are_far: all disjoint edges are
-    further apart than the margin, and all contacts are crossings.
+    """Result of noding. n_events: number of events, -1 if they exceed the room; n_exact: number of edge pairs decided
+    exactly; are_far: all edges without a common point are further apart than the margin, and all contacts are proper
+    crossings.
     """
 
     n_events: int
@@ -211,7 +214,7 @@ class Contacts(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """orient(a, b, c) and orient(a, b, d) in floating point, an error bound of both, and |dx| + |dy| of ab."""
+    """orient2d(a, b, c) and orient2d(a, b, d) in floating point, an error bound of both, and ``|dx| + |dy|`` of ab."""
 
     first: float
     second: float
@@ -221,7 +224,7 @@ class Turns(NamedTuple):
 
 @merged
 def turns(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> Turns:
-    """Return the orientations of c and d relative to the segment ab."""
+    """Return the orientations of vertices c and d relative to the segment ab, with their error bound."""
     i, j, k, m = np.uint64(a), np.uint64(b), np.uint64(c), np.uint64(d)  # unsigned: no check for negative indices
     ux, uy = x[j] - x[i], y[j] - y[i]
     left, right = ux * (y[k] - y[i]), uy * (x[k] - x[i])
@@ -246,9 +249,8 @@ def same_sign(pair: Turns) -> bool:
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: FlagArray
 ) -> Contacts:
-    """Node the edges: add all contacts as events.
-
-    tree: over the boxes of the edges, with the margin around them. unions: filled.
+    """Node the edges: write all contacts of the n edges to ``events``, crossings and vertices on edges, and fill
+    ``unions``. tree: over the boxes of the edges, enlarged by the margin.
     """
     for i in range(n):
         unions.points[i] = i
@@ -302,9 +304,9 @@ def find_contacts(
 
 @merged
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
-    """Add the event of a proper crossing with certified signs; ends: the turns from ``other`` to both ends of the edge.
-
-    ``t = A / (A + B)``; with A and B off by at most r, ``error <= r / (A + B) + 3 roundings``.
+    """Append the event of a proper crossing on ``edge``, proven by floats. ends: orientations A, B of the two ends of
+    ``edge`` relative to ``other``. ``t = A / (A + B)``; with A and B off by at most r, ``error <= r / (A + B) + 3
+    roundings``.
     """
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)

@@ -16,17 +16,17 @@ from engine.polygon_overlay.compiled.edge_tree import POLL
 from engine.types import FlagArray
 
 _RUN: Final = 16
-"""Length of runs sorted by insertion, before they are merged."""
+"""Number of consecutive items sorted by insertion, before such runs are merged."""
 
 Along = namedtuple("Along", "starts order keys spare_keys spare")
-"""The sorted events along each edge: ``order[starts[e]:starts[e + 1]]``; keys: their parameters, float64 in that order;
-spare_keys, spare: scratch as large as keys and order.
+"""Events sorted along each edge: those of edge e are ``order[starts[e]:starts[e + 1]]``, and ``keys`` has their
+parameters. spare_keys, spare: scratch as large as keys and order.
 """
 
 
 @called
 def compare_events(edges: Edges, events: Events, e: int, i: int, j: int) -> int:
-    """Return -1, 0 or 1: event i of edge e comes before, with or after event j."""
+    """Return -1, 0 or 1: along edge e, event i comes before, with or after event j. Exact."""
     gap = events.t[i] - events.t[j]
     slack = events.slack[i] + events.slack[j]
     if gap > slack:
@@ -66,7 +66,7 @@ def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
 
 @inline
 def _sort_by_key(along: Along, first: int, last: int) -> None:
-    """Sort ``keys[first:last]`` and ``order`` with them (stable): insertion runs, then merges."""
+    """Merge-sort ``along.keys[first:last]``, and ``along.order`` with it; stable."""
     order, keys, spare_keys, spare = along.order, along.keys, along.spare_keys, along.spare
     width = _RUN
     for low in range(first, last, width):
@@ -94,7 +94,7 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
 
 @inline
 def _group_events(events: Events, along: Along, n: int, n_events: int, stop: FlagArray) -> bool:
-    """Bucket the events by edge, in any order; return False if ``stop`` is set."""
+    """Bucket the events by edge in ``along``, unsorted within an edge; return False if ``stop`` is set."""
     starts = along.starts
     starts[: n + 1] = 0
     for i in range(n_events):
@@ -118,7 +118,7 @@ def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Fla
 
 @called
 def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n: int, e: int) -> None:
-    """Sort the events of an edge by binary insertion with exact comparisons, and unite those at one point."""
+    """Sort the events of edge e by exact comparisons (binary insertion), and unite points of events that coincide."""
     order, keys, points, first = along.order, along.keys, events.point, along.starts[e]
     for k in range(first + 1, along.starts[e + 1]):
         moving, key, low, high = order[k], keys[k], first, k
@@ -145,10 +145,9 @@ def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n:
 def sort_events(
     edges: Edges, events: Events, along: Along, unions: Unions, n: int, n_events: int, stop: FlagArray
 ) -> bool:
-    """Fill ``along``, unite events at one point, and make crossings there NOT_SIMPLE.
-
-    Returns whether all events are further apart than the sum of their reaches, and further from the ends than their
-    own.
+    """Sort the events along each edge into ``along``, unite points of events that coincide, and mark their crossings
+    NOT_SIMPLE. Returns whether, on every edge, events are further from each other than the sum of their reaches, and
+    further from both ends than their own reach.
     """
     if not _group_events(events, along, n, n_events, stop):
         return False

@@ -28,12 +28,13 @@ POLL: Final = 0x3FFF
 OFTEN: Final = 0x3FF
 """The same for steps of some microseconds."""
 LEAF: Final = 4
+"""Boxes of a leaf."""
 FEW: Final = 40
 """Number of boxes up to which all pairs are tested: fewer steps than a tree, and at most one portion of pairs."""
 PORTION: Final = 2048
 """Pairs of one call: some 50 us of exact tests."""
 _NUMBER_BITS: Final = 31
-"""Bits of the number of a box, below those of its Morton code."""
+"""Low bits of a sort key that store the index of a box; the Morton code stands above them."""
 _STEPS: Final = 1 << 16
 """Steps of one call, about a millisecond."""
 ANYWHERE: Final = 2 + 4 + 8 + 16
@@ -43,12 +44,17 @@ BENT: Final = 32
 RUN: Final = 64
 """Mark of an edge that stands for many, which meet nothing; see reducing.py."""
 DEEPEST: Final = 256
-"""Size of the stack: 60 levels, at most three pairs a level."""
+"""Size of the traversal stack: at most 60 levels, three entries each."""
 
 BoxTree = namedtuple("BoxTree", "boxes marks nodes node_marks places stack pairs")
-"""A tree over boxes: boxes (n, 4) float64 and marks (n,), nodes and node_marks by node.
+"""An implicit binary tree over n boxes.
 
-places: the boxes in the order of the leaves. stack: (DEEPEST, 2) int64; pairs: (PORTION, 2), the last portion.
+| field | dtype, shape | meaning |
+| --- | --- | --- |
+| boxes, marks | float64 (n, 4), uint8 (n,) | the boxes and their bits |
+| nodes, node_marks | by node | box around the boxes below it, the or of their marks; node 1 is the root |
+| places | int32 (n,) | the boxes in the order of the leaves |
+| stack, pairs | (DEEPEST, 2), (PORTION, 2) | scratch of a traversal; the pairs of its last portion |
 """
 
 
@@ -63,7 +69,7 @@ def leaves_of(n: int) -> int:
 
 @merged
 def boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
-    """Return whether two closed boxes have a common point."""
+    """Return whether box i of ``boxes`` and box j of ``others``, closed, have a common point."""
     return (  # branch-free: a mispredicted branch costs more than all four
         (boxes[i, 0] <= others[j, 1])
         & (others[j, 0] <= boxes[i, 1])
@@ -74,7 +80,7 @@ def boxes_meet(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
 
 @merged
 def box_contains(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
-    """Return whether a box contains another, which may be equal."""
+    """Return whether box i of ``boxes`` contains box j of ``others`` (equal boxes do)."""
     return (
         (boxes[i, 0] <= others[j, 0])
         & (boxes[i, 1] >= others[j, 1])
@@ -85,13 +91,17 @@ def box_contains(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
 
 @merged
 def heading(ux: float, uy: float) -> int:
-    """Return the direction bits of an edge with the direction u, which is not zero."""
+    """Return the direction bits of an edge: 2 right, 4 left, 8 up, 16 down; caller guarantees that (ux, uy) is not
+    zero.
+    """
     return 2 * (ux > 0.0) + 4 * (ux < 0.0) + 8 * (uy > 0.0) + 16 * (uy < 0.0)
 
 
 @merged
 def _is_one_run(mark: int) -> bool:
-    """Return whether consecutive edges with this combined mark head for one quadrant."""
+    """Return whether edges with these combined direction bits all head for one quadrant (never right and left, up and
+    down).
+    """
     return (mark & 6) != 6 and (mark & 24) != 24
 
 
@@ -106,10 +116,9 @@ def _interleave_zeros(bits: int) -> int:
 
 @allocating
 def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
-    """Fill ``places`` with the boxes in Morton order of their lower left corners, or as they are; return whether
-    sorted.
-
-    They stay as they are where the path through the corners is short: in Morton order it grows like ``sqrt(n)``.
+    """Fill ``places`` with 0 .. n - 1 in Morton order of the boxes' lower left corners; return whether they were
+    sorted. They stay in the given order where the path through the corners is short: in Morton order it grows like
+    ``sqrt(n)``.
     """
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
@@ -139,13 +148,15 @@ def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
 
 @inline
 def build_tree(tree: BoxTree, n: int, stop: FlagArray) -> None:
-    """Fill the nodes, their marks and the places of the first n boxes."""
+    """Build the tree over the first n boxes of ``tree.boxes``: fill ``places``, ``nodes`` and ``node_marks``."""
     fill_nodes(tree, n, ANYWHERE if order_boxes(tree.boxes, n, tree.places) else 0, stop)
 
 
 @inline
 def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
-    """Fill the nodes and their marks by ``places``; empty nodes are inverted boxes. added: or-ed to every mark."""
+    """Fill ``nodes`` and ``node_marks`` from ``places``; nodes without boxes get inverted boxes. added: bits for every
+    mark.
+    """
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
     for leaf in range(n_leaves):
@@ -171,7 +182,7 @@ def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
 
 @merged
 def push_children(tree: BoxTree, node: int, depth: int) -> int:
-    """Push the children of a node for a search upwards, the lower one last (visited first); return the depth."""
+    """Push both children of a node on ``tree.stack``, the one with the lower bottom last; return the new depth."""
     low, high = 2 * node, 2 * node + 1
     if tree.nodes[low, 2] > tree.nodes[high, 2]:
         low, high = high, low
@@ -181,7 +192,9 @@ def push_children(tree: BoxTree, node: int, depth: int) -> int:
 
 @inline
 def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Continue the traversal: write intersecting pairs, each once; return their number, and the depth of the stack."""
+    """Continue the dual traversal: write intersecting pairs to ``tree.pairs``; return their number and the stack's
+    depth.
+    """
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     stack, pairs = tree.stack, tree.pairs
     n_leaves, n_pairs, steps = leaves_of(n), 0, 0
@@ -209,7 +222,7 @@ def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
 
 @inline
 def _all_pairs(tree: BoxTree, n: int) -> int:
-    """Write all intersecting pairs of few boxes; return their number."""
+    """Write all intersecting pairs of the first n <= FEW boxes to ``tree.pairs``; return their number."""
     boxes, pairs = tree.boxes, tree.pairs
     n_pairs = 0
     for i in range(n):
@@ -221,16 +234,15 @@ def _all_pairs(tree: BoxTree, n: int) -> int:
 
 @inline
 def begin_pairs(tree: BoxTree) -> int:
-    """Start the traversal; return the depth for `next_pairs`."""
+    """Start the self-traversal of a tree; return the depth to pass to `next_pairs`."""
     tree.stack[0, 0], tree.stack[0, 1] = 1, 1
     return 1
 
 
 @inline
 def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Write the next portion of intersecting pairs, each once; return their number, and the depth, 0 at the end.
-
-    Caller guarantees a built tree, unless boxes are few.
+    """Write the next portion of intersecting pairs to ``tree.pairs``, each pair once; return their number and the new
+    depth. Depth 0: the traversal has ended. Caller guarantees a built tree if n > FEW.
     """
     if n <= FEW:
         return _all_pairs(tree, n), 0

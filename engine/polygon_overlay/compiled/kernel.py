@@ -78,9 +78,9 @@ from engine.types import OPEN, FlagArray, IntArray
 
 FINISHED: Final = 0
 NEEDS_CONTACTS: Final = 1
-"""The pair reached has more contacts than the scratch has room for."""
+"""The pair at which the kernel stopped has more contacts than fit the scratch."""
 NEEDS_OUTPUT: Final = 2
-"""The pair reached has more vertices or rings than the output has room for."""
+"""The pair at which the kernel stopped has more vertices or rings than fit the output."""
 
 
 class PairStatus(IntEnum):
@@ -100,9 +100,9 @@ class _Span(NamedTuple):
 
 
 class _Arrangement(NamedTuple):
-    """Counts of the boundary rings of a pair, their points, crossings and exactly decided edge pairs.
-
-    is_clear: clearance.py proves that rounding is harmless. n_contacts: needed scratch, more than there is on failure.
+    """Counts of a pair: boundary rings, their points, crossings, edge pairs decided exactly. is_clear: clearance.py
+    proves that rounding preserves the topology. n_contacts: the scratch needed; if it exceeds what there is, the pair
+    failed.
     """
 
     n_boundary: int
@@ -120,7 +120,9 @@ _NONE: Final = _Arrangement(0, 0, 0, 0, False, 0)
 def _intersect_convex(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, stop: FlagArray
 ) -> tuple[int, int, float]:
-    """Intersect two convex polygons of one ring each; returns as `intersect_convex`."""
+    """Intersect two convex polygons of one ring each; return the number of points or GENERAL, the first index, the
+    displacement.
+    """
     first, second = span.first, span.second
     return intersect_convex(
         subjects.vertices[subjects.offsets[first] : subjects.offsets[first + 1]],
@@ -135,7 +137,8 @@ def _load_pair(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, selected: FlagArray,
     is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Load both polygons; return the numbers of vertices and rings, and whether no coordinate is too small."""
+    """Load both polygons of a pair; return the numbers of vertices and rings, and whether no coordinate is too small.
+    """
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, is_in_range = load_rings(
@@ -151,7 +154,7 @@ def _load_pair(
 
 @merged
 def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, stop: FlagArray) -> _Arrangement:
-    """Arrange a loaded pair and find its boundary rings. If ``stop`` is set, the result is invalid."""
+    """Node a loaded pair, label its faces and trace its boundary rings into ``w.rings``. Invalid if ``stop`` is set."""
     n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     margin = CLEARANCE * loaded.largest
     is_clear = fill_boxes(edges, n, margin, w.tree, stop) > margin
@@ -188,9 +191,8 @@ def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting
 def _arrange_chains(
     w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
 ) -> tuple[int, int]:
-    """Find the boundary rings by chains and faces; return their number, or NO_ROOM, and the number of their points.
-
-    If ``stop`` is set, the result is invalid.
+    """Trace the boundary rings of a noded pair by chains and faces; return the number of rings, or NO_ROOM, and of
+    points. If ``stop`` is set, the result is invalid.
     """
     n, n_rings, edges, n_crossings = loaded.n, loaded.n_rings, w.given.edges, contacts.n_crossings
     w.stars.node_of[: n + n_crossings] = -1
@@ -226,7 +228,9 @@ def _arrange_chains(
 
 @merged
 def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tuple[float, bool]:
-    """Round the points of the rings; return the largest displacement, or LOST, and whether they are proven valid."""
+    """Round the points of the rings; return the largest displacement, or LOST, and whether the rounded rings are proven
+    valid.
+    """
     rings, rounded, n_boundary, n_points = w.rings, w.rounded, arranged.n_boundary, arranged.n_points
     farthest = round_points(w.given.edges, w.events, rings.point, n, arranged.n_crossings, n_points, rounded, stop)
     if farthest <= 0.0:
@@ -240,7 +244,7 @@ def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tup
 
 @merged
 def _progress(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
-    """Return what `overlay_pairs` returns."""
+    """Return the tuple that `overlay_pairs` returns: see there."""
     n_vertices, n_rings, n_pieces, n_evidence = filled
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 

@@ -25,24 +25,25 @@ from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 Box = tuple[float, float, float, float]
-"""x_min, x_max, y_min, y_max."""
+"""An axis-aligned box: x_min, x_max, y_min, y_max."""
 EVERYTHING: Final = (-np.inf, np.inf, -np.inf, np.inf)
 
 
 LEFT_OUT: Final = -2
-"""Second source of a vertex after which vertices up to the next source are left out."""
+"""Second source of a vertex after which input vertices are omitted up to the next source; `expand_rings` inserts them.
+"""
 
 
 class RingArrays(NamedTuple):
-    """Rings as read-only arrays: vertices (n, 2) float64, where each ring begins (n_rings + 1,) int64; may be empty."""
+    """Rings as read-only arrays: vertices (n, 2) float64, and ``offsets`` (n_rings + 1,) int64; a ring may be empty."""
 
     vertices: FloatArray
     offsets: IntArray
 
 
 class Given(NamedTuple):
-    """The rings of both polygons: edges; by vertex its number in the input; by ring its top vertex (x, then y) and the
-    mask of its source.
+    """The rings of both polygons: edges; origins, by vertex its number in the input; tops and masks, by ring its last
+    vertex (x, then y) and the bits of its source.
     """
 
     edges: Edges
@@ -52,7 +53,8 @@ class Given(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Numbers of vertices, rings, and edges that stand for many (runs); the largest magnitude of a coordinate."""
+    """Numbers of vertices and rings, and of edges that replace several (runs); the largest magnitude of a coordinate.
+    """
 
     n: int
     n_rings: int
@@ -68,7 +70,9 @@ def is_before(vertices: FloatArray, i: int, j: int) -> bool:
 
 @inline
 def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple[int, int]:
-    """Close the ring of the vertices from ``start`` on, or drop it; return the numbers of vertices and rings then."""
+    """Close the ring of vertices ``start`` .. n - 1, dropped if it has fewer than three; return the numbers of vertices
+    and rings.
+    """
     edges = given.edges
     x, y = edges.x, edges.y
     while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
@@ -91,10 +95,11 @@ def load_rings(
     rings: RingArrays, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int, box: Box, given: Given,
     n: int, n_rings: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append rings without repeated points; return the numbers of vertices and rings, and whether none is too small.
+    """Append rings, repeated points merged, to ``given``; return the numbers of vertices and rings, and whether no
+    nonzero coordinate is below SMALLEST.
 
-    is_named: the mask of each ring is its number from ``first_ring`` on. base: offset of vertex numbers in ``origins``.
-    box: of consecutive vertices beyond one of its sides the first and the last stay.
+    is_named: the mask of each ring is its number from ``first_ring`` on, instead of ``mask``. base: added to vertex
+    numbers in ``origins``. box: of consecutive vertices beyond one of its sides only the first and the last are loaded.
     """
     vertices, offsets = rings.vertices, rings.offsets
     x_min, x_max, y_min, y_max = box
@@ -130,7 +135,7 @@ def load_rings(
 
 @inline
 def box_of(vertices: FloatArray, first: int, last: int) -> Box:
-    """Return the box of some vertices; inverted where there is none."""
+    """Return the box of ``vertices[first:last]``; inverted (minimum above maximum) if there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
     for k in range(first, last):
@@ -160,9 +165,9 @@ def is_empty(box: Box) -> bool:
 
 @inline
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArray) -> float:
-    """Fill the box of every edge, enlarged by the margin, and its mark; return the least max(|dx|, |dy|) of an edge.
-
-    BENT: `find_contacts` would prove, by the same `turns`, that this edge and the one before it share one vertex only.
+    """Fill ``tree.boxes`` with the box of each edge, enlarged by the margin, and ``tree.marks`` with its direction
+    bits. Returns the least max(|dx|, |dy|) of an edge. BENT is set where the turn from the edge before, by the filter
+    of `turns`, proves that both share one vertex only.
     """
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
@@ -193,7 +198,7 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArr
 
 @inline
 def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> None:
-    """Mark the edges that stand for many, and give them boxes that intersect none; the ring turns at both ends."""
+    """Mark the edges that replace several (RUN), with boxes that intersect none; the ring turns at both ends (BENT)."""
     for k in range(n_runs):
         e = runs[k]
         tree.marks[e] = ANYWHERE | BENT | RUN
@@ -203,7 +208,7 @@ def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> Non
 
 @kernel
 def largest_counts(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[int, int]:
-    """Return the largest numbers of vertices and of rings of a polygon."""
+    """Return the largest number of vertices of one polygon, and the largest number of rings."""
     n_vertices = n_rings = 0
     for k in range(polygon_offsets.shape[0] - 1):
         first, end = polygon_offsets[k], polygon_offsets[k + 1]

@@ -48,7 +48,7 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 @inline
 def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
-    """Return the lexicographically largest vertex (x, then y) of the blocks of a ring."""
+    """Return the lexicographically largest vertex (x, then y) of blocks begin .. end - 1 of a ring."""
     x_max = blocks.boxes[begin, 1]
     for i in range(begin + 1, end):
         x_max = max(x_max, blocks.boxes[i, 1])
@@ -64,7 +64,9 @@ def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
 
 @inline
 def _low_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
-    """Return the lexicographically smallest vertex (x, then y) of a run of blocks, without the end of the last."""
+    """Return the lexicographically smallest vertex (x, then y) of blocks begin .. end - 1, the end of the last
+    excluded.
+    """
     x_min = blocks.boxes[begin, 0]
     for i in range(begin + 1, end):
         x_min = min(x_min, blocks.boxes[i, 0])
@@ -82,9 +84,8 @@ def _load_run(
     vertices: FloatArray, first: int, last: int, low: int, high: int, base: int, given: Given, runs: Int32Array, n: int,
     n_runs: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append the vertices that stay of first .. last: both ends, low and high, and the neighbours of each.
-
-    Returns the numbers of vertices and runs, and whether all coordinates are in range.
+    """Append the vertices that a run first .. last retains: both ends, ``low`` and ``high``, and the neighbours of
+    each. Returns the numbers of vertices and runs, and whether all coordinates are in range.
     """
     x, y = given.edges.x, given.edges.y
     is_in_range = True
@@ -111,9 +112,8 @@ def _load_ring(
     vertices: FloatArray, blocks: Blocks, begin: int, end: int, top: int, base: int, given: Given, runs: Int32Array,
     n: int, n_runs: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append what stays of the blocks of a ring; return the numbers of vertices and runs, and whether all are in range.
-
-    runs: filled with the edges that stand for several.
+    """Append a ring of blocks begin .. end - 1: active blocks whole, others reduced by `_load_run`. Returns the numbers
+    of vertices and runs, and whether all coordinates are in range. runs: receives the edges that replace several.
     """
     x, y, origins = given.edges.x, given.edges.y, given.origins
     start = n
@@ -152,7 +152,9 @@ def _load_polygon(
     rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: IntArray,
     runs: Int32Array, reduced: Loaded, stop: FlagArray,
 ) -> tuple[Loaded, bool]:  # fmt: skip
-    """Append what stays of a polygon; return the counts then, and whether all coordinates are in range."""
+    """Append a polygon, its inactive blocks reduced to runs; return the counts, and whether all coordinates are in
+    range.
+    """
     n, n_rings, n_runs, largest = reduced
     vertices, is_in_range = rings.vertices, True
     for i_ring in range(ring, ring + rings.offsets.shape[0] - 1):
@@ -197,10 +199,9 @@ def _activate_blocks(
 def reduce_pair(
     subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, addresses: IntArray
 ) -> Loaded:
-    """Load two polygons into the scratch of overlay_pairs, edges that meet nothing as runs.
-
-    size: edges of a block. n_most: number of active edges from which on it does not pay; then no vertices are returned.
-    There is scratch for at least a thousand contacts.
+    """Load two polygons into the scratch of `overlay_pairs`, with stretches of edges that meet nothing reduced to runs.
+    size: edges of a block. n_most: with more active edges than this reduction does not pay, and the result has no
+    vertices. There is scratch for at least a thousand contacts.
     """
     w = workspace_at(addresses)
     n_subject = subjects.offsets.shape[0] - 1
@@ -233,7 +234,7 @@ def reduce_pair(
 
 @inline
 def count_left_out(sources: Int32Array, first: int, last: int) -> int:
-    """Return how many vertices are left out of the ring of sources ``first`` .. ``last - 1``."""
+    """Return how many input vertices are omitted (LEFT_OUT) in the ring of sources ``first`` .. ``last - 1``."""
     n = 0
     for k in range(first, last):
         if sources[k, 1] == LEFT_OUT:
@@ -245,7 +246,9 @@ def count_left_out(sources: Int32Array, first: int, last: int) -> int:
 def _copy(
     vertices: FloatArray, source: int, base: int, step: int, n: int, made: FloatArray, made_sources: Int32Array, at: int
 ) -> None:
-    """Write n consecutive input vertices, from number ``source`` on in the direction of ``step``, and their sources."""
+    """Write n consecutive input vertices, from number ``source`` on in direction ``step`` (1 or -1), and their sources.
+    base: number of the first of ``vertices``. at: where to write in ``made``.
+    """
     part, numbers = made[at : at + n], made_sources[at : at + n]
     if step > 0:
         given = vertices[source - base : source - base + n]
@@ -264,10 +267,11 @@ def expand_rings(
     vertices: FloatArray, sources: Int32Array, offsets: IntArray, subjects: FloatArray, clips: FloatArray,
     stop: FlagArray, made: FloatArray, made_sources: Int32Array, made_offsets: IntArray,
 ) -> None:  # fmt: skip
-    """Fill ``made``, (m, 2) float64, and ``made_sources``, (m, 2) int32, with rings and the vertices left out of them.
+    """Copy rings to ``made`` (m, 2) float64 and ``made_sources`` (m, 2) int32, with their omitted vertices inserted.
 
     vertices, sources, offsets: as of overlay_pairs. subjects, clips: (n, 2) float64 vertices. made_offsets: (rings +
-    1,) int64, filled with the offsets of rings into ``made``. A run is consecutive input vertices, in either direction.
+    1,) int64, filled with the offsets of rings into ``made``. Omitted vertices are consecutive in the input, either way
+    round.
     """
     n_subject = subjects.shape[0]
     at = made_offsets[0] = 0

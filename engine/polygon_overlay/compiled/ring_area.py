@@ -44,17 +44,17 @@ from engine.predicates.error_free import (
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 _TINY = 2.0**-1040
-"""More than an underflow may lose in a term."""
+"""Bound of what a term may lose by underflow."""
 _LANES: Final = 8
 _SUMS: Final = 3 * _LANES
 _BLOCK: Final = 32
-"""Consecutive vertices of the input whose terms are summed in lanes. The sums are joined at the end: eight terms more
-are within twice the bound of a block's.
+"""Consecutive input vertices whose terms are summed in eight lanes. Joining the sums adds eight terms, within twice the
+bound of a block.
 """
 
 
 class _Place(NamedTuple):
-    """A point as double-doubles relative to another, and an error bound of each coordinate."""
+    """A point as double-doubles (xh + xl, yh + yl) relative to an origin, and an error bound of each coordinate."""
 
     xh: float
     xl: float
@@ -64,8 +64,8 @@ class _Place(NamedTuple):
 
 
 class _Pair(NamedTuple):
-    """Polygons, and of a pair: first vertex of its subject, number of its vertices, first vertex of its clip;
-    last_rings: the ring located last, by side.
+    """Polygons, and a pair of them: its subject's first vertex and number of vertices, its clip's first vertex;
+    last_rings: by side, the ring that was located last.
     """
 
     subjects: Any
@@ -86,7 +86,9 @@ def _polygon_vertex(pair: _Pair, v: int) -> tuple[Any, int, int]:
 
 @merged
 def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, side: int) -> int:
-    """Return the next distinct vertex of the ring of vertex v (v if there is none)."""
+    """Return the next vertex of v's ring that differs from v (v itself if there is none). last_rings[side]: a guess of
+    the ring, updated.
+    """
     low, n = int(last_rings[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
         low = (v - offsets[0]) * n // (offsets[n] - offsets[0])  # where all rings are of one size
@@ -110,7 +112,7 @@ def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, si
 
 @merged
 def _edge(pair: _Pair, e: int) -> Ends:
-    """Return the ends of the edge that begins at vertex e."""
+    """Return x, y of both ends of the edge that begins at vertex e of a pair."""
     vertices, v, side = _polygon_vertex(pair, e)
     after = _end_of(vertices, pair.clips.offsets if side else pair.subjects.offsets, v, pair.last_rings, side)
     return vertices[v, 0], vertices[v, 1], vertices[after, 0], vertices[after, 1]
@@ -118,7 +120,7 @@ def _edge(pair: _Pair, e: int) -> Ends:
 
 @merged
 def _place_of_doubles(x: float, y: float, ox: float, oy: float) -> _Place:
-    """Return a point of doubles relative to o, exactly."""
+    """Return the point (x, y) relative to the origin (ox, oy), exactly."""
     xh, xl = two_diff(x, ox)
     yh, yl = two_diff(y, oy)
     return _Place(xh, xl, yh, yl, 0.0)
@@ -126,7 +128,7 @@ def _place_of_doubles(x: float, y: float, ox: float, oy: float) -> _Place:
 
 @inline
 def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
-    """Return the crossing of two edges relative to o; exact where both are axis-parallel."""
+    """Return the crossing of edges e and f relative to (ox, oy); exact if one is vertical and one horizontal."""
     ends, others = _edge(pair, e), _edge(pair, f)
     (x, has_x), (y, has_y) = common_places(ends, others)
     if has_x and has_y:
@@ -150,7 +152,7 @@ def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
 
 @inline
 def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _Place:
-    """Return point k relative to o."""
+    """Return point k of the rings, an input vertex or a crossing by its ``sources``, relative to (ox, oy)."""
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
     vertices, v, _ = _polygon_vertex(pair, sources[k, 0])
@@ -159,7 +161,7 @@ def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _P
 
 @merged
 def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
-    """Return whether `_BLOCK` + 2 points, from ``first`` on, are consecutive vertices of the input."""
+    """Return whether the `_BLOCK` + 2 points from ``first`` on are consecutive input vertices, in either direction."""
     last = first + _BLOCK + 1
     v, w = sources[first, 0], sources[last, 0]
     if abs(w - v) != last - first or (v < pair.n) != (w < pair.n):
@@ -174,10 +176,9 @@ def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
 
 @merged
 def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
-    """Add the terms of `_BLOCK` vertices, without the first and the last; return whether no difference to ``ox`` is
-    rounded.
-
-    sums: (3, LANES) totals, rounding errors, and sizes. sign: -1 where the ring runs from the last to the first.
+    """Add the area terms of the `_BLOCK` inner ones of `_BLOCK` + 2 vertices to ``sums``; return whether all
+    differences to ``ox`` are exact. sums: (3 * LANES,) totals, rounding errors, and magnitudes. sign: -1 if the ring
+    runs from the last to the first.
     """
     low, high = (min(0.5 * ox, 2.0 * ox), max(0.5 * ox, 2.0 * ox)) if ox != 0.0 else (-np.inf, np.inf)
     is_exact = True
@@ -196,7 +197,8 @@ def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
 
 @inline
 def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tuple[float, float, float, float]:
-    """Return twice the area of a ring as a double-double, the error bound of its terms, and the sum of their sizes."""
+    """Return twice the area of a ring as a double-double, an error bound of its terms, and the sum of their magnitudes.
+    """
     vertices, v, _ = _polygon_vertex(pair, sources[first, 0])
     ox, n = vertices[v, 0], (last - first) >> 2
     for k in range(first, last if n > _BLOCK else first, max(n, 1)):  # the others are likely to be like these
@@ -214,7 +216,8 @@ def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tupl
 def _twice_area_from(
     pair: _Pair, sources: Int32Array, first: int, last: int, ox: float, oy: float
 ) -> tuple[float, float, float, float]:
-    """Return the result of `_twice_area` relative to o; an error below 0 if only zero will do for ``ox``."""
+    """Return as `_twice_area`, with coordinates relative to (ox, oy); an error bound below 0: call again with ``ox`` 0.
+    """
     before = _place(pair, sources, last - 1, ox, oy)
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
@@ -259,11 +262,9 @@ def sum_areas(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, sources: Int32Array,
     offsets: IntArray, groups: IntArray, stop: FlagArray, areas: FloatArray,
 ) -> int:  # fmt: skip
-    """Fill ``areas``, (n,) float64, with the nearest doubles of summed ring areas, NaN where uncertified; return their
-    number.
-
-    subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or one for all. sources,
-    offsets: of rings, as of overlay_pairs. groups: (n + 1,) int64 offsets into the rings.
+    """Fill ``areas``, (n,) float64, with the nearest doubles of summed ring areas, NaN where that is not proven.
+    Returns the number of NaN. subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or
+    one for all. sources, offsets: of rings, as of overlay_pairs. groups: (n + 1,) int64 offsets into the rings.
     """
     n_uncertified = 0
     last_rings = workspace(2)

@@ -46,7 +46,9 @@ Blocks = namedtuple("Blocks", "first last following boxes marks is_active firsts
 
 @inline
 def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int, stop: FlagArray) -> int:
-    """Append the blocks of rings, of up to ``size`` edges, from number n and ``ring`` on; return their end."""
+    """Append the blocks, of up to ``size`` edges, of all rings, as blocks n .. and rings ``ring`` ..; return the end of
+    blocks.
+    """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, boxes = blocks.first, blocks.last, blocks.boxes
     for i_ring in range(n_rings):
@@ -80,10 +82,9 @@ def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
 
 @inline
 def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, stop: FlagArray) -> None:
-    """Fill the marks and successors of all blocks of rings; activate those without a direction or with a doubtful
-    vertex.
-
-    A vertex is doubtful where the ring may not turn, or which may repeat the one before.
+    """Fill the marks and successors of all blocks of rings; activate blocks without a common direction or with a
+    doubtful vertex. A vertex is doubtful if floats do not prove that the ring turns there, or that it differs from the
+    vertex before.
     """
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     for i_ring in range(n_rings):
@@ -118,7 +119,7 @@ def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, sto
 
 @inline
 def _way(is_right: bool, is_left: bool, is_up: bool, is_down: bool) -> int:
-    """Return the mark of a block."""
+    """Return the mark of a block: the NOT_ bits of the directions in which not all its edges advance."""
     mark = 0 if is_right else NOT_RIGHT
     mark |= 0 if is_left else NOT_LEFT
     mark |= 0 if is_up else NOT_UP
@@ -126,12 +127,12 @@ def _way(is_right: bool, is_left: bool, is_up: bool, is_down: bool) -> int:
 
 
 _VISITS: Final = 8
-"""Visits of node pairs, by block, above which the traversal costs more than it can save."""
+"""Visits of node pairs for each block, above which the traversal costs more than it can save."""
 
 
 @merged
 def _are_near(boxes: FloatArray, i: int, others: FloatArray, j: int, gap: float) -> bool:
-    """Return whether the distance of two boxes may be at most ``gap``."""
+    """Return whether box i of ``boxes`` and box j of ``others`` are at most ``gap`` apart along both axes."""
     return (
         (boxes[i, 0] - others[j, 1] <= gap)
         & (others[j, 0] - boxes[i, 1] <= gap)
@@ -152,9 +153,9 @@ def count_active(blocks: Blocks, n: int) -> int:
 
 @inline
 def activate_blocks_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: FlagArray) -> bool:
-    """Activate blocks whose boxes may be within ``gap`` of another; return False if too many edges are active.
-
-    tree: built, with all mark bits on the last block of each ring. n_most: number of edges that is too many.
+    """Activate each block whose box is within ``gap`` of another's; return False if this makes too many edges active.
+    tree: built over the boxes of n blocks, with all mark bits on the last block of each ring. n_most: number of edges
+    that is too many.
     """
     nodes, stack = tree.nodes, tree.stack
     n_active = count_active(blocks, n)
@@ -187,7 +188,9 @@ def _head_together(mark: int, other: int) -> bool:
 
 @inline
 def _activate_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf: int, other: int) -> int:
-    """Activate the blocks of two leaves that are near each other; return the number of edges newly active."""
+    """Activate the near blocks of two leaves; return the number of edges in the blocks newly activated. Consecutive
+    blocks with a common direction are exempt.
+    """
     first, last, boxes, marks, is_active = blocks.first, blocks.last, blocks.boxes, blocks.marks, blocks.is_active
     n_activated = 0
     low, high = LEAF * leaf, LEAF * other
@@ -207,7 +210,7 @@ def _activate_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, 
 
 @inline
 def activate_blocks_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxTree) -> None:
-    """Activate the blocks that may contain the edge next above a point, a step to its right."""
+    """Activate all blocks that may contain the first edge above the point (x, y), a step to its right."""
     ceiling = float("inf")  # certainly above the edge that is next above the point
     for is_searching in (True, False):
         tree.stack[0, 0], depth = 1, 1
@@ -232,5 +235,7 @@ def activate_blocks_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxT
 
 @merged
 def _is_above(boxes: FloatArray, i: int, x: float, y: float, ceiling: float) -> bool:
-    """Return whether a box has points above a point, a step to its right, and below a ceiling."""
+    """Return whether a box intersects the ray from (x, y) straight up, a step to the right, at or below height
+    ``ceiling``.
+    """
     return not (boxes[i, 0] > x or boxes[i, 1] <= x or boxes[i, 3] < y or boxes[i, 2] > ceiling)

@@ -35,14 +35,14 @@ _NOT_YET: Final = -2
 
 
 class Rule(IntEnum):
-    """Which faces are inside."""
+    """The fill rule: which faces are inside."""
 
     AGAIN = 0
-    """Inside a shell and in no hole of it, after a round of rounding."""
+    """Inside a shell and in no hole of that shell; used for rounded rings."""
     ANY = 1
-    """Inside any source."""
+    """Inside at least one source."""
     NON_ZERO = 2
-    """By winding number, like the next two."""
+    """By the winding number: not zero here, positive or negative for the next two."""
     POSITIVE = 3
     NEGATIVE = 4
     PAIR = 5
@@ -85,9 +85,9 @@ FloodFill = namedtuple("FloodFill", "sources place stamp link first entered ring
 
 @merged
 def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFill, half: int, n_sources: int) -> int:
-    """Cross a half-chain from its left and toggle all coinciding sources; return how many contain the face beyond.
-
-    Winding numbers and labels of two polygons: ``n_sources`` is the label here, the result that beyond.
+    """Toggle the sources that bound a half-chain, crossed from its left; return the number of sources around the face
+    beyond. By PAIR and by the rules of winding numbers ``n_sources`` and the result are a label or a winding number
+    instead.
     """
     chain = half >> 1
     if nesting.rule == Rule.PAIR:
@@ -112,7 +112,9 @@ def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFi
 
 @merged
 def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> int:
-    """Return the part of the result that a face belongs to, 0 for none, by a rule other than AGAIN."""
+    """Return the part of the result that a face belongs to, 0 for none, by a rule other than AGAIN. n_sources: number
+    of sources, label or winding number of the face, as of `_cross_half_chain`.
+    """
     if rule == Rule.PAIR:
         return int(selected[n_sources])
     if rule == Rule.FIRST_ALONE:
@@ -122,7 +124,9 @@ def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> in
 
 @merged
 def _classify_face(nesting: Nesting, h: FloodFill, face: int, n_sources: int, n: int) -> tuple[bool, int]:
-    """Return whether a face is inside by the rule AGAIN, and the number of entries with its evidence appended."""
+    """Return whether a face is inside by the rule AGAIN, and the number of evidence entries with those of the face, or
+    NO_ROOM. n: number of entries before; the face lies in the rings ``h.sources[:n_sources]``.
+    """
     shells, sizes, room = nesting.shells, nesting.sizes, h.ring.shape[0]
     least = float("inf")
     for k in range(n_sources):
@@ -150,9 +154,9 @@ def propagate_labels(
     given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: FloodFill, selected: FlagArray,
     sizes: tuple[int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill ``faces.inside`` by flood fill, and entries of evidence with their faces; return their number, or NO_ROOM.
-
-    selected: see `overlay_pairs`. sizes: numbers of chains and cycles. ``faces.joined`` joins the cycles of one face.
+    """Fill ``faces.inside`` by flood fill over half-chains, and append evidence entries; return their number, or
+    NO_ROOM. selected: see `overlay_pairs`. sizes: numbers of chains and cycles. ``faces.joined`` joins the cycles of
+    one face.
     """
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
@@ -199,7 +203,9 @@ def propagate_labels(
 def group_provenance_by_region(
     faces: Faces, h: FloodFill, n_entries: int, n_cycles: int, n_rings: int, stop: FlagArray
 ) -> None:
-    """Link the evidence entries of each region, each ring once; ``faces.regions`` is filled."""
+    """Link the n_entries evidence entries of faces into one list a region, each source ring once (``h.region``,
+    ``h.after``). ``faces.regions`` is filled.
+    """
     for i in range(n_cycles + 1):
         h.region[i] = h.entered[
             i
@@ -226,7 +232,8 @@ def group_provenance_by_region(
 
 @merged
 def record_adjacent_regions(faces: Faces, h: FloodFill, path: Int32Array, first: int, last: int, n_rings: int) -> None:
-    """Record the regions beyond the ring of the half-chains ``path[first:last]``."""
+    """Append to ``h.beyond`` the regions on the other side of ring n_rings, whose half-chains are ``path[first:last]``.
+    """
     n = h.offset[n_rings]
     for k in range(first, last):
         region = root_of(faces.regions, faces.cycle[path[k] ^ 1])
@@ -240,10 +247,9 @@ def record_adjacent_regions(faces: Faces, h: FloodFill, path: Int32Array, first:
 def write_evidence(
     h: FloodFill, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: IntArray, n: int
 ) -> int:  # fmt: skip
-    """Append rows ``name``, source ring of one ring of the result; return the number of rows, or NO_ROOM.
-
-    The sources of a shell are those of its own region, of a hole those of the regions beyond. base: number of the first
-    ring.
+    """Append a row (``name``, ``base`` + source) for each source ring of one result ring; return the number of rows, or
+    NO_ROOM. The sources of a shell are those of its own region, the sources of a hole those of the regions on its other
+    side.
     """
     for at in range(h.offset[ring] if is_hole else 0, h.offset[ring + 1] if is_hole else 1):
         k = h.region[h.beyond[at] if is_hole else region]

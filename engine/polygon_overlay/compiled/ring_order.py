@@ -22,17 +22,19 @@ from engine.predicates.orientation import orient2d
 from engine.types import FlagArray, FloatArray, Int32Array, Point2
 
 Output = namedtuple("Output", "vertices sources rings pieces evidence")
-"""Pair after pair: vertices (m, 2) float64, sources (m, 2) int32, ends of rings and of pieces (n + 1,) int64, beginning
-with 0, evidence (m, 2) int64: a ring, and one that it comes from.
+"""Results, pair after pair: vertices (m, 2) float64; sources (m, 2) int32; offsets of rings into vertices and of pieces
+into rings, (n + 1,) int64; evidence (m, 2) int64, rows (ring, source ring).
 """
 
 Ranking = namedtuple("Ranking", "start x y is_hole piece order spare")
-"""By ring: index and place of its first vertex, whether it is a hole, rank of its piece; order: the rings in order."""
+"""By ring: start, x, y, index and coordinates of its first vertex; is_hole; piece, rank of its piece. order: the rings
+in canonical order; spare: scratch.
+"""
 
 
 @inline
 def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int) -> bool:
-    """Return whether ring i comes before ring j."""
+    """Return whether ring i precedes ring j in canonical order: by piece, shell before holes, then vertex by vertex."""
     x, y = rounded.x, rounded.y
     if ranking.piece[i] != ranking.piece[j]:
         return ranking.piece[i] < ranking.piece[j]
@@ -91,9 +93,8 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 @inline
 def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: FloatArray) -> bool:
     """Fill ``ranking.is_hole`` for rings whose orientation rounding may have changed; return False if it is ambiguous.
-
-    Rounding is monotone, so the rounded box of a shell contains those of its holes: the shell of a region is its only
-    ring whose box contains all others and lies in none. widest: scratch by region; boxes: by ring.
+    Rounding is monotone, so the rounded box of a shell contains those of its holes: the shell of a region is the only
+    ring whose box contains all others and equals none. widest: scratch by region. boxes: scratch by ring.
     """
     x, y = rounded.x, rounded.y
     for ring in range(n_rings):
@@ -120,9 +121,8 @@ def rank_rings(
     rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Int32Array,
     boxes: FloatArray, stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill ``ranking``; return the number of pieces, or -1 if a region has not exactly one proven shell.
-
-    is_valid: rounding preserved the topology of the rings. piece_of: scratch by region; boxes: by ring.
+    """Sort rings into canonical order (``ranking``); return the number of pieces, -1 if a region has not one proven
+    shell. is_valid: rounding preserved the topology of the rings. piece_of: scratch by region; boxes: scratch by ring.
     """
     if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
@@ -161,7 +161,8 @@ def rank_rings(
 
 @inline
 def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: FlagArray) -> int:
-    """Find the first vertex of a ring; return the orientation sign there, 0 if ``stop`` is set."""
+    """Write the smallest vertex (x, then y) of a ring to ``ranking``; return the orientation sign there, 0 if stopped.
+    """
     x, y = rounded.x, rounded.y
     first, last = rings.offset[ring], rings.offset[ring + 1]
     low = first
@@ -176,7 +177,7 @@ def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, 
 
 
 class Filled(NamedTuple):
-    """How much output is written."""
+    """Numbers of vertices, rings, pieces and evidence rows written so far."""
 
     n_vertices: int
     n_rings: int
@@ -186,7 +187,7 @@ class Filled(NamedTuple):
 
 @merged
 def has_room(output: Output, filled: Filled, n_vertices: int, n_rings: int) -> bool:
-    """Return whether so many more vertices and rings fit the output."""
+    """Return whether n_vertices more vertices and n_rings more rings fit the output."""
     return (filled.n_vertices + n_vertices <= output.vertices.shape[0]) & (
         filled.n_rings + n_rings < output.rings.shape[0]
     )
@@ -194,7 +195,7 @@ def has_room(output: Output, filled: Filled, n_vertices: int, n_rings: int) -> b
 
 @merged
 def write_convex(w: Any, m: int, low: int, output: Output, filled: Filled) -> None:
-    """Append the ring of `_intersect_convex`, from its point ``low`` on."""
+    """Append the ring of m points that `_intersect_convex` computed, from its point ``low`` on."""
     i = low
     for k in range(filled.n_vertices, filled.n_vertices + m):
         output.vertices[k, 0], output.vertices[k, 1] = w.rounded.x[i], w.rounded.y[i]
@@ -219,7 +220,7 @@ def _source_of(w: Any, n: int, i: int) -> tuple[int, int]:
 
 @merged
 def write_rings(w: Any, n: int, n_boundary: int, output: Output, filled: Filled, stop: FlagArray) -> None:
-    """Append the rings to the output in their order."""
+    """Append the n_boundary rings to the output in canonical order. n: number of input vertices."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
     for k in range(n_boundary):
         ring = w.ranking.order[k] if n_boundary > 1 else 0
@@ -240,7 +241,9 @@ def write_rings(w: Any, n: int, n_boundary: int, output: Output, filled: Filled,
 
 @merged
 def write_provenance(w: Any, n_boundary: int, first: int, output: Output, filled: Filled) -> int:
-    """Append the source rings of each ring to the output; return the number of rows then, or NO_ROOM."""
+    """Append the evidence rows (ring, source ring) of all rings; return the number of rows then, or NO_ROOM. first:
+    number of the pair's first source ring.
+    """
     n = filled.n_evidence
     for k in range(n_boundary):
         ring = w.ranking.order[k] if n_boundary > 1 else 0
@@ -253,7 +256,7 @@ def write_provenance(w: Any, n_boundary: int, first: int, output: Output, filled
 
 @merged
 def write_component_ids(w: Any, n_boundary: int, output: Output, filled: Filled) -> int:
-    """Append the part of the result that each ring bounds; return the number of rings then."""
+    """Append a row (ring, part of the result that it bounds) for each ring; return the number of rings then."""
     for k in range(n_boundary):
         ring = w.ranking.order[k] if n_boundary > 1 else 0
         at = filled.n_rings + k

@@ -30,6 +30,7 @@ from engine.predicates.orientation import BOUND_2D, orient2d
 from engine.types import FlagArray, FloatArray, Int32Array, IntArray, Point2
 
 FOLDS: Final = -1
+"""Result value: snapping changes the topology or the canonical order of rings."""
 
 
 @merged
@@ -65,9 +66,8 @@ def scale(
     least: float,
     scaled: FloatArray,
 ) -> float:
-    """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest magnitude.
-
-    Within a relative ``near_integer`` of an integer it is that integer, and below ``least`` zero.
+    """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest magnitude before rounding.
+    A value within a relative ``near_integer`` of an integer becomes that integer; a value below ``least``, zero.
     """
     largest = 0.0
     for k in range(values.shape[0]):
@@ -82,7 +82,7 @@ def scale(
 
 @inline
 def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> int:
-    """Fill ``pixels`` with the nearest integer points of vertices; return how many vertices differ from them."""
+    """Fill ``pixels`` with the integer point nearest to each vertex; return how many vertices differ from it."""
     n_moved = 0
     for k in range(vertices.shape[0]):
         if k & POLL == 0 and stop[0]:
@@ -96,9 +96,9 @@ def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> i
 def _find_corners(
     pixels: FloatArray, offsets: IntArray, pieces: IntArray, corners: Int32Array, starts: IntArray, stop: FlagArray
 ) -> int:
-    """Fill ``corners`` with the vertices where rings turn, and ``starts`` with the offsets of rings into them.
-
-    Returns their number, or FOLDS where a ring turns back, begins elsewhere than before, or is not in its order.
+    """Fill ``corners`` with the vertices where snapped rings turn, and ``starts`` with the offsets of rings into them.
+    Returns the number of corners, or FOLDS if a ring turns back, begins at another vertex than before, or is out of
+    order.
     """
     piece = n = 0
     for ring in range(offsets.shape[0] - 1):
@@ -137,7 +137,7 @@ def _find_corners(
 
 @merged
 def _add_passage(passages: Int32Array, m: int, edges: Edges, e: int, f: int, px: float, py: float) -> int:
-    """Append (e, f) if edge e passes the pixel (px, py) of vertex f; return the number of passages then."""
+    """Append (e, f) to ``passages`` if edge e passes the pixel (px, py) of vertex f; return the number of passages."""
     x, y, b = edges.x, edges.y, edges.after[e]
     if not _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
         return m

@@ -32,7 +32,7 @@ small_pool: list[Scratch] = []
 """Unused scratch for `FEW_VERTICES`, taken and returned without a check of its size."""
 FEW_VERTICES: Final = 500
 _MOST_POOLED: Final = 256_000_000
-"""Bytes of the pool; of most of them a fifth was ever written to."""
+"""Most bytes that the pool retains; a fifth of most scratch was ever written to."""
 _MORE_CONTACTS: Final = 2**15
 _MANY_CONTACTS: Final = 2**15
 
@@ -51,7 +51,9 @@ _N_BUFFERS: Final = len(Buffers._fields)
 
 
 class Workspace(NamedTuple):
-    """Scratch by name, a tuple for each step in the order of the data flow: rows of the arrays of `Buffers`."""
+    """Scratch by name, one tuple for each step in the order of the data flow; its arrays are rows of those of
+    `Buffers`.
+    """
 
     given: Given
     tree: BoxTree
@@ -78,9 +80,8 @@ displacement (n,) float64: the largest distance by which rounding moved a vertex
 
 @dataclass(frozen=True, slots=True)
 class Scratch:
-    """Arrays that the kernel writes to, for pairs of up to so many vertices, rings and contacts.
-
-    outcome: of one pair. addresses: sizes and addresses of buffers and output, for `workspace_at` and `output_at`.
+    """Arrays that the kernel writes to, for pairs of at most n_vertices, n_rings and n_contacts. outcome: room for one
+    pair. addresses: sizes and addresses of buffers and output, for `workspace_at` and `output_at`.
     """
 
     n_bytes: int
@@ -94,9 +95,8 @@ class Scratch:
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
-    """Return scratch of at least that size, from the pool or new; the caller returns it by `return_scratch`.
-
-    One pair of that size always fits the output: every contact adds at most a vertex and a ring. Pages that are not
+    """Return scratch of at least these sizes, from the pool or new; the caller returns it by `return_scratch`. The
+    output has room for one pair of that size: every contact adds at most a vertex and a ring. Pages that are not
     written to cost nothing; fresh pages cost more than the kernel does.
     """
     try:
@@ -144,7 +144,7 @@ def more_contacts(n: int) -> int:
 
 
 def return_scratch(scratch: Scratch) -> None:
-    """Return scratch to the pool, unless that exceeds `_MOST_POOLED`."""
+    """Return scratch to the pool, or drop it if the pool would exceed `_MOST_POOLED` bytes."""
     if scratch.n_bytes + sum([other.n_bytes for other in _pool]) <= _MOST_POOLED:
         _pool.append(scratch)
 
@@ -166,7 +166,7 @@ def release() -> None:
 
 
 def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
-    """Return scratch for pairs of up to so many vertices, rings and contacts."""
+    """Allocate the buffers for pairs of at most n_vertices, n_rings and n_contacts."""
     n, k = n_vertices + 1, n_contacts + 8
     m = n + 2 * k  # points of all boundary rings: every vertex once, every end of a chain on two sides
     n_leaves = 1
@@ -188,7 +188,7 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
 
 
 def addresses_of(buffers: Buffers, output: Output) -> IntArray:
-    """Return (words,) int64: sizes, then addresses of arrays, which must outlive it."""
+    """Return sizes, then addresses of all arrays, int64; the arrays must outlive the result."""
     sizes = (
         buffers.vertex_floats.shape[1], buffers.ring_integers.shape[1], buffers.contact_floats.shape[1],
         len(buffers.boxes), len(buffers.tree), len(output.vertices), len(output.rings),
@@ -198,7 +198,7 @@ def addresses_of(buffers: Buffers, output: Output) -> IntArray:
 
 @merged
 def output_at(addresses: IntArray) -> Output:
-    """Return the output of a `Scratch` from its addresses."""
+    """Return the output arrays of a `Scratch` as views, from its ``addresses``."""
     n, n_rings, first = addresses[5], addresses[6], _N_SIZES + _N_BUFFERS
     return Output(
         array_at(addresses[first], (n, 2), np.float64), array_at(addresses[first + 1], (n, 2), np.int32),
@@ -209,7 +209,9 @@ def output_at(addresses: IntArray) -> Output:
 
 @merged
 def workspace_at(addresses: IntArray) -> Workspace:
-    """Return the rows of the buffers of a `Scratch` by name; rows at one address are never in use at the same time."""
+    """Return the rows of the buffers of a `Scratch` by name, as views; rows that share memory are never in use
+    together.
+    """
     n, n_rings, k, m, n_nodes = addresses[0], addresses[1], addresses[2], addresses[3], addresses[4]
     at = addresses[_N_SIZES : _N_SIZES + _N_BUFFERS]
     vx, v = array_at(at[0], (_VERTEX_FLOATS, n), np.float64), array_at(at[1], (_VERTEX_INTEGERS, n), np.int32)

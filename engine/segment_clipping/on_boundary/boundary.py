@@ -35,18 +35,18 @@ from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
 Bounded = Polygon | Polyhedron | Triangle
 """Solids with a boundary of edges or triangles; triangles only in 2D."""
 _LEAST_ROOM: Final = 1 << 8
-"""Least capacity for contacts, or pieces; doubled if one segment has more."""
+"""Smallest capacity for contacts, or pieces; doubled if one segment needs more."""
 _CONTACTS: Final = 4
-"""Capacity for each segment of a group; likewise."""
+"""Capacity for contacts for each segment of a group; doubled likewise."""
 _BYTES: Final = 180
-"""Memory of a piece, in its part and joined."""
+"""Memory counted for a piece, in its part and joined."""
 _MOST_FEW: Final = 1 << 10
 _CONTACTS_OF_FEW: Final = 1 << 16
-"""Largest batch that runs as one chunk: that many segments, and no more contacts than these."""
+"""Limits of a batch that runs as one chunk: _MOST_FEW segments, and at most so many contacts."""
 _CONTACT_BYTES: Final = 60
 """Memory of a contact while a kernel runs."""
 _FIRST_CHUNK: Final = 16
-"""Segments of the first chunk, one of which may cross everything."""
+"""Segments of the first chunk; one of them may cross everything."""
 
 
 def on_boundary(region: Polygon | Polyhedron) -> Plan:
@@ -79,10 +79,8 @@ def clip_on_boundary(
 def clip_chunk(
     segments: FloatArray, first: int, last: int, region: Bounded, locator: Locator | None, budget: Budget
 ) -> tuple[Pieces, IntArray]:
-    """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, by source and t, and which used the exact
-    fallback.
-
-    locator: None for a small batch, whose first ends are located on the fast path.
+    """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, sorted, and the segments that took the exact
+    fallback. locator: of the region; None for a small batch, whose first ends are located on the fast path.
     """
     boundary, part = region.cached("clipping_boundary") or boundary_of(region), segments[first:last]
     points, locations = part[:, 0].copy(), np.zeros((last - first, 2), np.int8)
@@ -107,7 +105,7 @@ def clip_chunk(
 def _locate_second_ends(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set the second of the locations (n, 2) where the first is BOUNDARY; if both are, see `locate_before_contacts`."""
+    """Set locations[:, 1] of segments whose first end is on the boundary; of chords as `locate_before_contacts`."""
     chords = np.flatnonzero(locations[:, 0] == 0)
     locator.fill(segments[chords, 1], second := np.empty(len(chords), np.int8), budget)
     locations[chords, 1] = second
@@ -117,7 +115,7 @@ def _locate_second_ends(
 def cut_at_crossings(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[list[Pieces], FlagArray]:
-    """Return the pieces of the segments that the kernel decides, and the state of each segment."""
+    """Return the pieces of the segments that the kernel decides, and by segment its state (SETTLED, OPEN)."""
     n, _, dimension = segments.shape
     cut: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
     room, least, reached, parts = _LEAST_ROOM + n, _LEAST_ROOM + _CONTACTS * min(GROUP, n), 0, []
@@ -141,15 +139,17 @@ def cut_at_crossings(
 _AT_END: Final = 2 * Place.END + 5
 """Code of an element crossed at the segment's end; one less if it is touched."""
 _PER_BLOCK: Final = 64
-"""Chords of a block, whose contacts are in memory together."""
+"""Chords (segments with both ends on the boundary) whose contacts are in memory together."""
 _PLACES: Final = (0.5, 0.3125, 0.8125)
-"""Parameters at which an inner point is tried; the next one if a point is on the boundary or separated by elements."""
+"""Parameters of inner points tried in turn, if a point is on the boundary or elements separate it from the end."""
 
 
 def locate_before_contacts(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set the second of locations (n, 2) where both are 0 and the filter decides it, see `INSIDE_BEFORE`."""
+    """Set locations[:, 1] to INSIDE_BEFORE or OUTSIDE_BEFORE for chords, both ends on the boundary, if the filter
+    decides.
+    """
     if not boundary.are_safe:  # signs of the perturbed line are exact only then
         return
     chords = np.flatnonzero((locations == 0).all(axis=1))
@@ -159,7 +159,7 @@ def locate_before_contacts(
 
 
 def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
-    """Return the values that `locate_before_contacts` sets for chords (n, 2, dim), 0 if undecided."""
+    """Return INSIDE_BEFORE, OUTSIDE_BEFORE or 0 (undecided) for chords (n, 2, dim)."""
     sides = np.zeros(len(segments), np.int8)
     is_odd, is_left, met, owners = _crossing_parity(segments, boundary, budget)
     for place in _PLACES:
@@ -180,9 +180,9 @@ def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, bu
 def _crossing_parity(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
-    """Return for each segment the parity of crossings before its end, and whether it is certain and no edge runs there.
-
-    Also the elements that contain its end, and the segment of each.
+    """Return by segment whether it crosses the boundary an odd number of times before its end, and whether that is
+    certain. Not certain if an edge runs along its end. Then the elements that contain a segment's end, and the segment
+    of each.
     """
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
@@ -202,9 +202,8 @@ def _crossing_parity(
 def exclude_separated(
     elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_known: BoolArray
 ) -> None:
-    """Set is_known (n,) False for segments whose first end and inner point an element may separate.
-
-    elements, met, owners: all elements met, and their segments.
+    """Set is_known (n,) False for segments whose first end and inner point may be separated by an element. met, owners:
+    elements and the segment of each. inner: (n, 2, dim), from the inner points.
     """
     for place in range(met.size):
         element, item = met[place], owners[place]

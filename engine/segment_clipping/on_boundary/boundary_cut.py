@@ -43,13 +43,18 @@ from engine.types import OPEN, FlagArray, FloatArray, Int8Array, IntArray
 SETTLED: Final = 0
 """State of a segment, besides OPEN."""
 UNSURE: Final = -1
+"""Returned instead of a number or row if something is undecided."""
 Crossings = namedtuple("Crossings", "t points faces order codes met")
-"""Crossings of one segment: t, points, faces; codes and met: kind of contact (contacts.py) and element; order: by t."""
+"""Crossings of one segment, by contact. t, points, faces: parameter, point, face; codes, met: kind of contact
+(contacts.py) and element; order: the contacts sorted by t.
+"""
 
 
 @called
 def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> int:
-    """Compute the contacts of a segment, sorted along it; return their number, UNSURE if not all are certain."""
+    """Compute the contacts of segment ``item`` into `cuts`, sorted along it; return their number, UNSURE if one is
+    undecided.
+    """
     first, last, n = contacts.offsets[item], contacts.offsets[item + 1], 0
     if not is_item_safe(segments, item) or 2 * (last - first) > cuts.t.size:
         return UNSURE
@@ -70,7 +75,7 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
 
 @called
 def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: int, cuts: Crossings, n: int) -> int:
-    """Write parameter and point of a contact with ``cuts.met[n]``; return n + 1, UNSURE if not certain."""
+    """Write parameter and point of the contact with element ``cuts.met[n]`` as entry n; return n + 1, or UNSURE."""
     place, element, dimension = decode_place(code), cuts.met[n], segments.shape[2]
     cuts.codes[n] = code
     if Place.START <= place <= Place.END:
@@ -92,7 +97,9 @@ def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: 
 
 @inline
 def _write_overlap(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
-    """Write both ends of an overlap of a segment and a collinear edge; return as `_write_contact` does."""
+    """Write both ends of the overlap of a segment and a collinear edge as entries n and n + 1; return the next, or
+    UNSURE.
+    """
     k, element, face = axis_of(segments, item), cuts.met[n], cuts.faces[n]
     p, q = segments[item, 0, k], segments[item, 1, k]
     rises = q > p
@@ -117,14 +124,16 @@ class Before(IntEnum):
     OUTSIDE = 0
     INSIDE = 1
     ANYWHERE = -1
-    """Irrelevant, unless a span is off the boundary."""
+    """Not needed: no span is off the boundary."""
     UNKNOWN = -2
-    """Different contacts round alike."""
+    """Undecided: different contacts round alike."""
 
 
 @inline
 def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
-    """Return the location of the perturbed line before the first of n contacts, see `Before`."""
+    """Return the location of the perturbed line before the first of n contacts, see `Before`. of_p, of_q: locations of
+    the ends, as `ends` of `emit_touching`.
+    """
     begin, turns = 0, False
     for place in range(n):
         i, first = cuts.order[place], cuts.order[begin]
@@ -148,7 +157,7 @@ def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, o
 def _write_end(
     out: Pieces, row: int, end: int, segments: FloatArray, item: int, cuts: Crossings, i: int, face: int
 ) -> None:
-    """Write a contact as an end of a piece; as the segment's own end if the segment begins or ends there."""
+    """Write contact i as end 0 or 1 of the piece in a row, as the segment's own end if the contact is that end."""
     if decode_place(cuts.codes[i]) == Place.START + end:
         put_own_end(out, row, end, segments, item, segments.shape[2] == 2)
         return
@@ -162,10 +171,8 @@ def emit_touching(
     segments: FloatArray, item: int, source: int, ends: Int8Array, elements: FloatArray, cuts: Crossings, n: int,
     out: Pieces, row: int,
 ) -> int:  # fmt: skip
-    """Write the at most n + 1 pieces between n contacts to the rows of `out` from `row` on; return the next row, or
-    UNSURE.
-
-    ends: (2,) int8 locations of the segment's ends, the second only if the first is not OUTSIDE, or what
+    """Write the pieces between n contacts, at most n + 1, to `out` from `row` on; return the next row, or UNSURE. ends:
+    (2,) int8 locations of the segment's ends, the second only if the first is not OUTSIDE, or what
     `locate_before_contacts` sets.
     """
     is_in, turned, n_along, is_open, place = _location_before(elements, cuts, n, ends[0], ends[1]), 0, 0, ends[0] > 0, 0
@@ -201,7 +208,7 @@ def emit_touching(
 
 @allocating
 def allocate_crossings(n: int, dimension: int) -> Crossings:
-    """Return uninitialised arrays for n contacts."""
+    """Allocate arrays for n contacts, uninitialised."""
     return Crossings(
         np.empty(n), np.empty((n, dimension)), np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64),
         np.empty(n, np.int64),
@@ -210,7 +217,7 @@ def allocate_crossings(n: int, dimension: int) -> Crossings:
 
 @inline
 def sort_crossings(cuts: Crossings, n: int) -> bool:
-    """Sort the first n crossings by t; return False if two are equal."""
+    """Sort the first n crossings by t into ``cuts.order``; return False if two parameters are equal."""
     t, order = cuts.t, cuts.order
     for i in range(n):
         order[i] = i
@@ -231,7 +238,7 @@ def sort_crossings(cuts: Crossings, n: int) -> bool:
 
 @inline
 def group_size(n: int) -> int:
-    """Return the size of the groups, all about equal, into which n segments are split."""
+    """Return the size of equal groups, of at most about `GROUP`, into which n segments are split."""
     n_groups = max(1, (n + GROUP - 1) // GROUP)
     return (n + n_groups - 1) // n_groups
 
@@ -240,7 +247,7 @@ def group_size(n: int) -> int:
 def emit(
     segments: FloatArray, item: int, source: int, is_inside: bool, cuts: Crossings, n: int, out: Pieces, row: int
 ) -> int:
-    """Write the pieces between n crossings to the rows of `out` from `row` on; return the next row."""
+    """Write the pieces between n sorted proper crossings to `out` from `row` on; return the next row."""
     is_flat, end = segments.shape[2] == 2, 1 if is_inside else 0
     if is_inside:
         out.source[row] = source
@@ -268,7 +275,9 @@ def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
 
 @inline
 def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
-    """Compute the crossings of a segment, sorted along it; return False if one is uncertain or two are equal."""
+    """Compute the proper crossings of segment ``item``, sorted; return False if one is uncertain or two parameters are
+    equal.
+    """
     first, last = contacts.offsets[item], contacts.offsets[item + 1]
     if first < last and not is_item_safe(segments, item):
         return False
@@ -289,9 +298,8 @@ def cut_group(
     segments: FloatArray, locations: Int8Array, first: int, boundary: Any, contacts: Any, cuts: Crossings,
     stop: FlagArray, out: Pieces, row: int, state: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Cut the segments of a group, from `first` on, at their contacts; return the next segment, and the next row.
-
-    Stops early if `out` is full or `stop` is set. See `cut_on_outline`.
+    """Cut the segments of a group at their contacts; return the next segment and the next row. first: index of the
+    group's first segment. Stops early if `out` is full or `stop` is set. See `cut_on_outline`.
     """
     for item in range(segments.shape[0]):
         begin, end, place = contacts.offsets[item], contacts.offsets[item + 1], first + item
@@ -319,7 +327,7 @@ def cut_on_outline(
     segments: FloatArray, locations: Int8Array, outline: Outline, stop: FlagArray, out: Pieces, state: FlagArray,
     n: IntArray,
 ) -> None:  # fmt: skip
-    """Cut segments (m, 2, 2) float64 to a polygon, as far as filters and double-doubles decide.
+    """Clip segments (m, 2, 2) float64 to a polygon as far as filters and double-doubles decide.
 
     | argument | content |
     |---|---|
@@ -346,7 +354,7 @@ def cut_on_outline(
 def cut_on_mesh(
     segments: FloatArray, locations: Int8Array, mesh: Mesh, stop: FlagArray, out: Pieces, state: FlagArray, n: IntArray
 ) -> None:
-    """Cut segments (m, 2, 3) float64 to a polyhedron, `Mesh`: see `cut_on_outline`."""
+    """Clip segments (m, 2, 3) float64 to a polyhedron: arguments as of `cut_on_outline`."""
     size = group_size(locations.shape[0] - n[0])
     contacts, cuts, last = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(2 * n[2], 3), n[0]
     n[1], n_contacts = 0, 0

@@ -39,7 +39,7 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2
 
 
 class Kind(IntEnum):
-    """Kind of a contact that has no code of `code_of`."""
+    """Kind of a contact, where there is no code of `code_of`."""
 
     APART = 0
     PROPER = 1
@@ -48,7 +48,7 @@ class Kind(IntEnum):
 
 
 class Place(IntEnum):
-    """Place of a contact, besides corners (0 .. 2) and sides (3 .. 5, from corner place - 3 on)."""
+    """Place of a contact other than a corner (0 .. 2) or a side (3 .. 5, from corner place - 3 on)."""
 
     START = 6
     END = 7
@@ -56,7 +56,7 @@ class Place(IntEnum):
 
 
 class Bit(IntEnum):
-    """Bits of a code besides place + 2, which starts at bit 1."""
+    """Bits of a contact's code other than place + 2, which begins at bit 1."""
 
     CROSSES = 1
     ALONG = Kind.ALONG
@@ -68,16 +68,18 @@ CROSSED: Final = 2 * Place.WITHIN + 5
 """Code of an element crossed in its open interior, at no end of the segment."""
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
-"""Locations of a second end that encode the location of the perturbed line before the first contact."""
+"""In place of the location of a second end on the boundary: the location of the perturbed line before the first
+contact.
+"""
 GROUP: Final = 2048
-"""Largest number of segments of a group."""
+"""Most segments of a group."""
 NO_ROOM: Final = -1
 STOPPED: Final = -2
-"""Returned instead of a number of contacts."""
+"""Returned instead of a number of contacts: too many for the arrays, or the flag was set."""
 
 
 LEAF_SIZE: Final = 4
-"""Edges of a leaf, see `build_box_tree`."""
+"""Edges of a leaf of the tree, see `build_box_tree`."""
 _DEEPEST: Final = 64
 """Capacity of the traversal stack: a tree of depth d < 60 needs d + 1 nodes."""
 _SLACK: Final = 2.0**-46
@@ -87,7 +89,7 @@ _TOO_LARGE: Final = 2.0**500
 
 
 class Contacts(NamedTuple):
-    """Output arrays for the contacts of a group: elements and kinds by segment, and offsets."""
+    """Output for the contacts of a group of segments: met, kinds: element and kind of each; offsets: by segment."""
 
     met: Any
     kinds: Any
@@ -99,7 +101,7 @@ class Contacts(NamedTuple):
 
 @allocating
 def allocate_contacts(n_segments: int, n_contacts: int, waiting: Any) -> Contacts:
-    """Return uninitialised arrays for groups of at most n_segments segments and n_contacts contacts."""
+    """Allocate arrays for groups of at most n_segments segments and n_contacts contacts, uninitialised."""
     return Contacts(
         np.empty(n_contacts, np.int64), np.empty(n_contacts, np.uint8), np.empty(n_segments + 1, np.int64), waiting
     )
@@ -107,25 +109,25 @@ def allocate_contacts(n_segments: int, n_contacts: int, waiting: Any) -> Contact
 
 @allocating
 def edge_stack() -> IntArray:
-    """Return the traversal stack for edges."""
+    """Allocate the traversal stack of a tree over edges."""
     return np.empty(_DEEPEST, np.int64)
 
 
 @merged
 def code_of(place: int, is_crossed: bool) -> int:
-    """Return the code of a contact at a place."""
+    """Return the code of a contact at a place (corner, side, START, END, WITHIN)."""
     return 2 * place + (5 if is_crossed else 4)
 
 
 @merged
 def decode_place(code: int) -> int:
-    """Decode the place of a contact."""
+    """Return the place encoded in a contact's code."""
     return ((code & (Bit.ALONG - 1)) >> 1) - 2
 
 
 @merged
 def axis_of(segments: FloatArray, item: int) -> int:
-    """Return the longest axis of a segment."""
+    """Return the axis along which a segment is longest."""
     best = 0
     for k in range(1, segments.shape[2]):
         length = abs(segments[item, 1, k] - segments[item, 0, k])
@@ -136,7 +138,7 @@ def axis_of(segments: FloatArray, item: int) -> int:
 
 @inline
 def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> bool:
-    """Return whether a row of one array (n, dim) equals a row of another."""
+    """Return whether row ``point`` of one array (n, dim) equals row ``other`` of another."""
     are_same = True
     for k in range(points.shape[1]):
         are_same &= points[point, k] == others[other, k]
@@ -145,7 +147,9 @@ def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> 
 
 @inline
 def are_same_point(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
-    """Return whether two codes of two elements denote one point: an end, or a common corner or side."""
+    """Return whether two contacts of one segment are one point: its end, or a common corner or side of the elements.
+    first, second: elements; code, other: their codes.
+    """
     n, m = decode_place(code), decode_place(other)
     if n >= Place.START or m >= Place.START:
         return n == m and n <= Place.END
@@ -160,9 +164,8 @@ def are_same_point(elements: FloatArray, first: int, code: int, second: int, oth
 
 @called
 def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
-    """Return the code of the contact of an edge a b and a segment p q in 2D from their four signs.
-
-    ALONG if they are collinear and overlap, DEGENERATE if a sign is UNDECIDED.
+    """Return the code of the contact of edge a b and segment p q from four signs, some of which are not 1 or -1. of_a,
+    of_b: sides of a and b at the line p q; of_p, of_q: vice versa. ALONG if collinear, DEGENERATE if one is UNDECIDED.
     """
     if of_a == UNDECIDED or of_b == UNDECIDED or of_p == UNDECIDED or of_q == UNDECIDED:
         return Kind.DEGENERATE
@@ -174,7 +177,7 @@ def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
 
 @called
 def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
-    """Return ALONG if a segment p q and a collinear edge a b overlap, else APART; DEGENERATE for an edge a = b."""
+    """Return ALONG if segment p q and a collinear edge a b overlap, else APART; DEGENERATE if a = b."""
     if a.x == b.x and a.y == b.y:
         return Kind.DEGENERATE
     if max(a.x, b.x) < min(p.x, q.x) or max(p.x, q.x) < min(a.x, b.x):
@@ -184,7 +187,7 @@ def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
 
 @inline
 def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
-    """Return the kind or code of the contact of a segment and an edge in 2D, (2, 2) float64 both."""
+    """Return kind (APART, PROPER, ALONG, DEGENERATE) or code of the contact of a segment and an edge, both (2, 2)."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
@@ -201,7 +204,7 @@ def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
 
 @inline
 def may_meet(segment: FloatArray, box: FloatArray) -> bool:
-    """Return whether a segment may meet a closed box; False only if a separating axis is proven."""
+    """Return False if a separating axis proves that a segment misses the closed box low, high; else True."""
     n = segment.shape[1]
     largest = 0.0
     for k in range(n):
@@ -226,7 +229,9 @@ def may_meet(segment: FloatArray, box: FloatArray) -> bool:
 
 @inline
 def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contacts: int) -> int:
-    """Append the contacts of a segment (2, 2) to the first `n_contacts` ones; return their new number, or NO_ROOM."""
+    """Append the contacts of a segment (2, 2) with edges to the n_contacts present; return their new number, or
+    NO_ROOM.
+    """
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -253,8 +258,7 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contac
 @called
 def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 2); return their number.
-
-    Zero-length segments have none. NO_ROOM if the capacity is too small, STOPPED if `stop` (one uint8) is set.
+    Zero-length segments have none. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set.
     """
     n_met = 0
     contacts.offsets[0] = 0
@@ -271,10 +275,9 @@ def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int,
 
 @allocating_kernel
 def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return the number of contacts of segments (n, 2, 2) float64 with the edges of a polygon, and the contacts.
-
-    elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of each segment. NO_ROOM if there are more
-    than `room`. stop: one uint8, polled.
+    """Return the number of contacts of segments (n, 2, 2) float64 with the edges of a polygon, and arrays of them.
+    Arrays: elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of segments. NO_ROOM if there are
+    more than `room`. stop: one uint8, polled.
     """
     contacts = allocate_contacts(segments.shape[0], room, edge_stack())
     n_met = gather_edges(contacts, outline, segments, segments.shape[0], stop)

@@ -48,7 +48,7 @@ Vector = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 @merged
 def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float, y: float, y_low: float) -> Triple:
-    """Return U V - X Y of exact pairs as a sum of two doubles, and |u v| + |x y|."""
+    """Return U V - X Y as a sum of two doubles, and |u v| + |x y|; U = u + u_low and so on are exact pairs."""
     ph, pl = two_prod(u, v)
     qh, ql = two_prod(x, y)
     h, tail = two_diff(ph, qh)
@@ -58,14 +58,14 @@ def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float
 
 @merged
 def product(n: Triple, w: float, w_low: float) -> Triple:
-    """Return (h + low) (w + w_low), h + low of `minor`, as a sum of two doubles, and its size m |w|."""
+    """Return (h + low) (w + w_low) as a sum of two doubles, and its size m |w|; n = (h, low, m) of `minor`."""
     g, tail = two_prod(n[0], w)
     return g, tail + (n[0] * w_low + n[1] * w), n[2] * abs(w)
 
 
 @merged
 def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
-    """Return (b - a) x (c - a), each component as `minor` does."""
+    """Return the normal (b - a) x (c - a), each component as of `minor`."""
     ux, uy, uz = two_diff(b.x, a.x), two_diff(b.y, a.y), two_diff(b.z, a.z)
     vx, vy, vz = two_diff(c.x, a.x), two_diff(c.y, a.y), two_diff(c.z, a.z)
     return (
@@ -77,7 +77,7 @@ def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
 
 @merged
 def dot(n: Normal, w: Vector) -> Triple:
-    """Return n . w as a double-double, and its error bound."""
+    """Return n . w as a double-double, and its error bound; n of `normal_of`, w of exact pairs."""
     x, x_low, x_size = product(n[0], w[0][0], w[0][1])
     y, y_low, y_size = product(n[1], w[1][0], w[1][1])
     z, z_low, z_size = product(n[2], w[2][0], w[2][1])
@@ -89,7 +89,8 @@ def dot(n: Normal, w: Vector) -> Triple:
 
 @merged
 def line_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d for one of the edges (k, 2, 2) as double-doubles, each with its error bound."""
+    """Return s(p) and d of edge ``element`` (k, 2, 2) and segment ``item``, each a double-double and its error bound.
+    """
     ax, ay = elements[element, 0, 0], elements[element, 0, 1]
     px, py = segments[item, 0, 0], segments[item, 0, 1]
     u, u_low = two_diff(elements[element, 1, 0], ax)
@@ -107,7 +108,9 @@ def line_values(elements: FloatArray, element: int, segments: FloatArray, item: 
 
 @merged
 def plane_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d for one of the triangles (k, 3, 3) as double-doubles, each with its error bound."""
+    """Return s(p) and d of triangle ``element`` (k, 3, 3) and segment ``item``, each a double-double and its error
+    bound.
+    """
     a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
     normal = normal_of(a, b, c)
@@ -118,7 +121,9 @@ def plane_values(elements: FloatArray, element: int, segments: FloatArray, item:
 
 @merged
 def is_item_safe(items: FloatArray, item: int) -> bool:
-    """Return whether every coordinate of an item is zero or in the range in which double-doubles have their bounds."""
+    """Return whether all coordinates of ``items[item]`` are zero or in the range in which double-doubles have their
+    bounds.
+    """
     safe = True
     for place in range(items.shape[1]):
         for k in range(items.shape[2]):
@@ -130,8 +135,9 @@ def is_item_safe(items: FloatArray, item: int) -> bool:
 def cut_at(
     segments: FloatArray, item: int, elements: FloatArray, element: int, points: FloatArray, row: int
 ) -> tuple[float, bool]:
-    """Set a row of `points` to the crossing of a segment and an element; return t and whether all is certainly
-    nearest."""
+    """Set points[row] to the crossing of a segment and an element; return t, and whether all are proven nearest
+    doubles.
+    """
     if segments.shape[2] == 2:
         at_p, along = line_values(elements, element, segments, item)
     else:
@@ -159,10 +165,8 @@ def cut_at(
 
 @called
 def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
-    """Set e, 192 places, to |s| at an end of a segment as an expansion; return its length.
-
-    Triangle a b c: sum over k of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b -
-    a) x (x - a).
+    """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of a segment; return its length. Triangle a b c: sum over k
+    of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b - a) x (x - a).
     """
     m, n, is_flat = workspace(16), 0, segments.shape[2] == 2
     for k in range(2 if is_flat else 0, 3):
@@ -183,8 +187,7 @@ def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int
 def cross_exactly(
     segments: FloatArray, item: int, elements: FloatArray, element: int, point: FloatArray
 ) -> tuple[float, bool]:
-    """Set `point` to the crossing of a segment and an element from exact values; return t and whether all is certain.
-
+    """Set `point` to the crossing of a segment and an element from exact values; return t, and whether all is proven.
     The ends lie on different sides, or one of them on the element's line or plane. Coordinates are zero or of sizes
     within 2^-120 .. 2^120, so differences are multiples of 2^-172 and values of 2^-516, below 2^366.
     """
@@ -196,7 +199,7 @@ def cross_exactly(
 
 @called
 def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
-    """Return (x - p) / (q - p), x between p and q, and whether it is certainly the nearest double."""
+    """Return (x - p) / (q - p) for x between p and q, and whether it is the proven nearest double."""
     wp, wq, e = workspace(2), workspace(2), workspace(24)
     n_wp, n_wq = _put_distance(wp, x, p), _put_distance(wq, q, x)
     h, low = two_diff(q, p)
@@ -206,6 +209,6 @@ def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
 
 @inline
 def _put_distance(e: Components, x: float, y: float) -> int:
-    """Set e to |x - y| as an expansion of two places."""
+    """Set expansion e to |x - y|; return its length, at most 2."""
     h, low = two_diff(x, y)
     return magnitude(e, grow(e, grow(e, 0, low), h))

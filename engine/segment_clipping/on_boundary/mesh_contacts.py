@@ -75,16 +75,16 @@ LIMIT: Final = 4.0
 
 _MOST: Final = np.float32(2.0**100)
 Way = namedtuple("Way", "middle half inverse slack is_near")
-"""A segment in tree coordinates with its slack, float32. inverse: 1 / half, at most 2^100, where halves are far below
-every slack; is_near: whether it comes near the tree."""
+"""A segment in tree coordinates, float32: middle +- half, and its slack. inverse: 1 / half, at most 2^100, where halves
+are far below every slack; is_near: whether it comes near the tree.
+"""
 
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return the kind of contact of a segment p q and a triangle a b c by exact signs; a point contact by its code.
-
-    If an end is off the plane and the triangle has an area, the line meets the plane in one point, on the segment
-    unless both ends are on one side. That point is outside of the triangle only if the signs of two edges differ.
+    """Return kind or code of the contact of segment p q and triangle a b c, by exact signs. If an end is off the plane
+    and the triangle has an area, the line meets the plane in one point, on the segment unless both ends are on one
+    side. That point is outside of the triangle only if the signs of two edges differ.
     """
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
@@ -113,9 +113,8 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 
 @called
 def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
-    """Return on which side of the side a b the line p q is, perturbed by eps along one axis and eps^2 along the next.
-
-    UNDECIDED if they are parallel.
+    """Return the side of edge a b on which the line p q passes, perturbed by eps along one axis and eps^2 along the
+    next. k: the longest axis of p q. UNDECIDED if they are parallel.
     """
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
     if side == 0:
@@ -125,9 +124,8 @@ def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> 
 
 @inline
 def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
-    """Return the sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j).
-
-    Filter: six roundings and a sum, twice that is 2^-50; then exact if sizes satisfy `is_safe`.
+    """Return the exact sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j), or UNDECIDED. Filter: six roundings
+    and a sum, twice that is 2^-50; then exact if sizes satisfy `is_safe`.
     """
     x, y = (a[j] - b[j]) * (q[k] - p[k]), (a[k] - b[k]) * (q[j] - p[j])
     gap, bound = x - y, 2.0**-50 * (abs(x) + abs(y)) + UNDERFLOW
@@ -138,8 +136,9 @@ def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
 
 @merged
 def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: float) -> int:
-    """Return the kind of contact of a segment and a triangle if the filter proves it, else UNDECIDED; blur: error bound
-    of each coordinate of p and q."""
+    """Return APART or PROPER if the filter proves it for segment p q and triangle a b c, else UNDECIDED. blur: error of
+    each coordinate of p and q.
+    """
     ex, ey, ez = q.x - p.x, q.y - p.y, q.z - p.z
     ax, ay, az = a.x - p.x, a.y - p.y, a.z - p.z
     bx, by, bz = b.x - p.x, b.y - p.y, b.z - p.z
@@ -173,9 +172,8 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 
 @merged
 def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, blur: float) -> int:
-    """Return the kind of contact of a segment and one of the triangles (k, 3, 3).
-
-    UNDECIDED if the filter does not decide and the blur of the segment's ends is above 0.
+    """Return kind or code of the contact of segment p q with triangle ``element`` (k, 3, 3). blur: error of each
+    coordinate of p and q; if above 0, UNDECIDED where the filter does not decide.
     """
     a, b, c = triangle_at(elements, element)
     kind = contact_filter(a, b, c, p, q, blur)
@@ -184,7 +182,7 @@ def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, b
 
 @merged
 def corner(elements: FloatArray, element: int, place: int) -> Point3:
-    """Return a corner of one of the elements (k, corners, 3)."""
+    """Return corner ``place`` of element ``element`` (k, corners, 3)."""
     return Point3(
         float(elements[element, place, 0]), float(elements[element, place, 1]), float(elements[element, place, 2])
     )
@@ -192,13 +190,13 @@ def corner(elements: FloatArray, element: int, place: int) -> Point3:
 
 @merged
 def triangle_at(elements: FloatArray, element: int) -> tuple[Point3, Point3, Point3]:
-    """Return the corners of one of the triangles (k, 3, 3)."""
+    """Return the corners of triangle ``element`` (k, 3, 3)."""
     return corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
 
 
 @merged
 def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float) -> Way:
-    """Return a segment in tree coordinates; blur: error bound of each coordinate of its ends."""
+    """Return segment p q in tree coordinates; blur: error of each coordinate of its ends."""
     ox, oy, oz = origin[0] * inverse, origin[1] * inverse, origin[2] * inverse
     px, py, pz = p.x * inverse - ox, p.y * inverse - oy, p.z * inverse - oz
     dx, dy, dz = q.x * inverse - p.x * inverse, q.y * inverse - p.y * inverse, q.z * inverse - p.z * inverse
@@ -228,7 +226,7 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float
 
 @merged
 def shear_of(way: Way) -> Any:
-    """Return the arguments of `near_triangles` for a segment: axes, middle, r, s, reach and slack."""
+    """Return the arguments of `near_triangles` for a segment: axes, middle, slopes r and s, reach, slack."""
     k, middle, half = longest_axis(way.half), way.middle, way.half
     i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
     slack = np.float32(2.0) * way.slack  # 32 u (S + 2) of lanes/faces.py, and twice what cutting loses
@@ -246,7 +244,7 @@ triangles: int64, at least 2 * LANES each."""
 
 @allocating
 def traversal_buffers() -> Waiting:
-    """Return the scratch of one traversal."""
+    """Allocate the scratch of one traversal."""
     return Waiting(
         np.empty(STACK, np.int32),
         np.empty((1, WIDTH), np.float32),
@@ -257,7 +255,7 @@ def traversal_buffers() -> Waiting:
 
 @inline
 def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
-    """Return whether a traversal may end: the output is full, or one decided contact is enough."""
+    """Return whether a traversal may end: the arrays are full, or `is_any` and one contact is decided."""
     return n_met < 0 or (is_any and n_met > 0 and kinds[0] != Kind.DEGENERATE)
 
 
@@ -265,7 +263,7 @@ def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
 def _append_triangles(
     mesh: Any, ends: Any, is_any: bool, triangles: IntArray, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts with n queued triangles; see `append_contacts`."""
+    """Append the contacts of a segment with n queued triangles; as of `append_contacts`. ends: p, q, blur."""
     p, q, blur = ends
     for place in range(n):
         element = triangles[place]
@@ -286,8 +284,9 @@ def _append_triangles(
 def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts of a segment with the triangles of the first n queued leaf blocks; return the new number of
-    contacts, or NO_ROOM. shear: `shear_of` the segment; the rest as in `append_contacts`."""
+    """Append the contacts of a segment with the triangles of the first n queued leaf blocks; as of `append_contacts`.
+    ends: p, q, blur. shear: `shear_of` the segment.
+    """
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
@@ -313,10 +312,9 @@ def _append_blocks(
 def append_contacts(
     mesh: Any, p: Point3, q: Point3, blur: float, is_any: bool, waiting: Waiting, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts of a segment: triangles to met, kinds to kinds; return their new number, or NO_ROOM.
-
-    blur: error bound of each coordinate of p and q; if above 0, what the filter leaves is Kind.DEGENERATE. is_any: one
-    contact is enough, in the first row; it is Kind.DEGENERATE only if no other is decided.
+    """Append the contacts of segment p q with triangles to met and kinds; return their new number, or NO_ROOM. blur:
+    error of each coordinate of p and q; if above 0, what the filter leaves is Kind.DEGENERATE. is_any: one contact is
+    enough, in row 0; it is Kind.DEGENERATE only if no other is decided.
     """
     stack, blocks = waiting.stack, waiting.blocks
     way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)
@@ -354,7 +352,7 @@ def append_contacts(
 
 @called
 def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 3): see `gather_edges`."""
+    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 3): as of `gather_edges`."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -371,21 +369,22 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
 
 @allocating_kernel
 def find_contacts_3d(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return the contacts of at most GROUP segments (n, 2, 3) float64 with triangles: see `find_contacts_2d`."""
+    """Return the contacts of at most GROUP segments (n, 2, 3) float64 with triangles: as of `find_contacts_2d`."""
     contacts = allocate_contacts(segments.shape[0], room, traversal_buffers())
     n_met = gather_triangles(contacts, mesh, segments, segments.shape[0], stop)
     return n_met, contacts.met, contacts.kinds, contacts.offsets
 
 
 _LEAST_CONTACTS: Final = 1 << 8
-"""Least capacity for contacts, besides `_EACH` a segment; doubled if there are more."""
+"""Smallest capacity for contacts, plus `_EACH` for each segment; doubled if there are more."""
 _EACH: Final = 8
 
 
 def contacts_with(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[IntArray, FlagArray, IntArray]:
-    """Return the elements that at most GROUP segments (n, 2, dim) may meet, the kinds, and offsets (n + 1,)."""
+    """Return, by segment (n <= GROUP, 2, dim), the elements that it may meet, the kind of each, and offsets (n + 1,).
+    """
     kernel: Any = find_contacts_3d if isinstance(boundary, Mesh) else find_contacts_2d
     room, n_contacts = _LEAST_CONTACTS + _EACH * len(segments), NO_ROOM
     met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)

@@ -31,21 +31,21 @@ _BITS: Final = 20
 
 
 class Outline(NamedTuple):
-    """The edges of all rings of a polygon."""
+    """The edges of all rings of a polygon, with a tree of boxes."""
 
     elements: FloatArray
     """(k, 2, 2): the corners of each edge."""
     are_safe: bool
     """Whether every coordinate is zero or in the range in which kernels have their bounds."""
     faces: IntArray
-    """(k,): number reported for each edge."""
+    """(k,): the caller's number of each edge."""
     order: IntArray
     boxes: FloatArray
-    """order, boxes: see `build_box_tree`."""
+    """order, boxes: result of `build_box_tree`."""
 
 
 class Mesh(NamedTuple):
-    """The triangles of a polyhedron."""
+    """The triangles of a polyhedron or surface, with a tree of boxes."""
 
     elements: FloatArray
     """(k, 3, 3) the corners of each triangle."""
@@ -57,7 +57,7 @@ class Mesh(NamedTuple):
     child: Int32Array
     origin: FloatArray
     inverse: float
-    """boxes, child, origin, 1 / scale: see `Bvh`, but inner nodes stand before all blocks, close to each other."""
+    """boxes, child, origin, 1 / scale: a `Bvh` with its inner nodes before all leaf blocks, close to each other."""
     n_inner: int
     """Number of inner nodes; the first is the root, unless there is one block only."""
     corners: Float32Array
@@ -65,7 +65,7 @@ class Mesh(NamedTuple):
 
 
 def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | Mesh:
-    """Return the prepared boundary of a region; a triangle is planar."""
+    """Return the boundary of a polygon, planar triangle, polyhedron or surface, built at first use."""
 
     def build() -> Outline | Mesh:
         if isinstance(region, Polyhedron | Surface):
@@ -79,7 +79,7 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
 
 
 def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outline:
-    """Return the prepared boundary of the edges (k, 2, 2) of rings."""
+    """Build the boundary of the edges (k, 2, 2) of rings; faces: number of each edge; offsets: of rings."""
     low, high = np.minimum(elements[:, 0], elements[:, 1]), np.maximum(elements[:, 0], elements[:, 1])
     order, boxes = build_box_tree(low, high, offsets)
     return Outline(read_only(elements), are_all_safe(elements), read_only(faces), read_only(order), read_only(boxes))
@@ -87,8 +87,7 @@ def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outl
 
 def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tuple[IntArray, FloatArray]:
     """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each; offsets: of their rings.
-
-    (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
+    Result: (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
     """
     n, dimension = low.shape
     order = _order(low, high, offsets)
@@ -110,7 +109,7 @@ def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tupl
 
 
 def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
-    """Return the elements ring by ring, rings in Morton order of their centres."""
+    """Return the elements ring by ring, rings sorted by the Morton codes of their centres."""
     if len(offsets) == 2:
         return np.arange(len(low))
     starts = offsets[:-1]
@@ -119,7 +118,7 @@ def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
 
 
 def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
-    """Return the Morton code of each box's centre; any order is correct, a good one is fast."""
+    """Return the Morton code of the centre of each box low .. high; any order is correct, a good one is fast."""
     centers = low / 2 + high / 2
     smallest = centers.min(axis=0)
     extent = (centers / 2 - smallest / 2).max(axis=0)
@@ -136,7 +135,7 @@ def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
 
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
-    """Return the prepared boundary of triangles (k, 3, 3)."""
+    """Build the boundary of triangles (k, 3, 3); faces: number of each."""
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
@@ -146,7 +145,7 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
 
 
 def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
-    """Return a tree with its inner nodes before its blocks, each kind in its old order, and their number."""
+    """Return a tree with its inner nodes moved before its leaf blocks, and the number of inner nodes."""
     is_block = tree.child[:, 0] < 0
     order = np.argsort(is_block, kind="stable")
     place = np.empty(len(order), np.int32)
@@ -157,9 +156,8 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
-    """Return the corners (n_blocks, 9, 8) float32 of the triangles in each block of a tree, in tree coordinates.
-
-    Unused lanes lie far from everything.
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates. Unused
+    lanes lie far from everything.
     """
     child = tree.child[n_inner:]
     is_item = child != EMPTY
