@@ -32,7 +32,7 @@ from engine.types import OPEN, Accuracy, BoolArray, FlagArray, FloatArray, Int8A
 
 
 class PolygonStatus(IntEnum):
-    """What became of one polygon of a batch."""
+    """Outcome of one polygon of a batch."""
 
     CLIPPED = 0
     TOO_COMPLEX = 1
@@ -92,9 +92,9 @@ class ClippedPolygons(Ragged):
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
-"""Number of coordinates that are clipped faster than a batch is planned."""
+"""Most coordinates of a batch that is clipped at once: planning chunks would take longer."""
 _USUAL: Final = (2.0**-100, 2.0**120)
-"""Range of the sum of squares of few coordinates in which nothing is scaled: the largest coordinate lies between the
+"""Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
 root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does.
 """
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
@@ -204,7 +204,7 @@ def clip_polygons(
 
 
 def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> ClippedPolygons | None:
-    """Clip an array of few polygons; None where it needs the general path, which checks the array."""
+    """Clip an array of few polygons; None if the general path is needed, which checks the array."""
     if plan.tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], dimension):
         return None
     n, size, _ = polygons.shape
@@ -216,29 +216,31 @@ def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> Clipp
 
 
 def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
-    """Return the offsets of the rings of n polygons, and of these; read-only, as kernels are compiled for."""
+    """Return ring offsets and polygon offsets of n polygons of one ring of `size` vertices; read-only, as kernels
+    expect.
+    """
     numbers = np.arange(n + 1)
     return read_only(size * numbers), read_only(numbers)
 
 
 _few_rings = functools.lru_cache(64)(_equal_rings)
-"""Offsets of arrays that are clipped in one piece, of up to `_FEW` coordinates."""
+"""`_equal_rings`, cached for arrays that are clipped at once."""
 
 
 class Contours(NamedTuple):
-    """The rings of all polygons."""
+    """The rings of all polygons of a call."""
 
     dimension: int
     vertices: FloatArray
-    """(m * dim,), as one row of numbers; zeros of either sign."""
+    """(m * dim,), flat; zeros of either sign."""
     ring_offsets: IntArray
     polygon_offsets: IntArray
     size: float
-    """The largest magnitude of any coordinate, or a number that nothing is scaled for where nothing is for that one."""
+    """Largest magnitude of a coordinate; or another number, if both need no scaling."""
 
 
 class Batch(NamedTuple):
-    """Polygons, the planes, and the results to fill: see `Clipped` and `ClippedPolygons`."""
+    """Polygons, planes, and the arrays to fill: see `Clipped` and `ClippedPolygons`."""
 
     contours: Contours
     plan: Plan
@@ -250,11 +252,9 @@ class Batch(NamedTuple):
 
 
 def as_contours(polygons: Any, dimension: int) -> Contours:
-    """Return the rings of all polygons of a call: an array (one ring a polygon), a list of polygons or of lists of
-    rings, or GeoJSON. An array is not copied.
-
-    No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring without vertices;
-    InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element.
+    """Return the rings of all polygons of a call: an array (one ring a polygon), polygons, lists of rings, or GeoJSON.
+    An array is not copied. No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring
+    without vertices; InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element.
     """
     if isinstance(polygons, np.ndarray):
         array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
@@ -306,7 +306,7 @@ def _size_of(vertices: FloatArray) -> float:
 
 
 def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArray:
-    """Clip polygons first .. last - 1; return their vertices, in order, and fill the results."""
+    """Clip polygons first .. last - 1; return their vertices (n, dim), in order, and fill the other results."""
     (d, _, ring_offsets, polygon_offsets, _), _, scene, sizes, state, *_ = batch
     done, parts = first, list[FloatArray]()
     if scene is None:
@@ -346,7 +346,7 @@ def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArra
 
 
 def _clip_in_integers(batch: Batch, i: int, budget: Budget) -> FloatArray:
-    """Return the vertices left of a polygon by exact integers, and fill its results."""
+    """Return the vertices left of polygon i by exact integers, and fill its other results."""
     d, vertices, ring_offsets, polygon_offsets, _ = batch.contours
     rings, points = range(polygon_offsets[i], polygon_offsets[i + 1]), vertices.reshape(-1, d)
     contours = [points[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
@@ -361,7 +361,9 @@ def _clip_in_integers(batch: Batch, i: int, budget: Budget) -> FloatArray:
 def _clip(
     contours: Contours, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ClippedPolygons, int, int]:
-    """Clip every polygon; return the result, the number of polygons beyond the filter, and in rational arithmetic."""
+    """Clip every polygon; return the result, the number of polygons beyond the filter, and of those in rational
+    arithmetic.
+    """
     d, vertices, ring_offsets, polygon_offsets, size = contours
     scene = kernel_scene(plan, vertices, size, budget.check)
     if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
@@ -386,9 +388,8 @@ def _clip(
 def _clip_few(
     vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons, vertices flat; return the result, and the number of polygons beyond the filter.
-
-    None where one is left open, or does not fit.
+    """Clip few polygons (flat vertices) in one call; return the result, and the number of polygons beyond the filter.
+    None if one is left open, or does not fit.
     """
     d = tables.high.shape[1] - 1
     n, n_rings, clip = len(polygon_offsets) - 1, len(ring_offsets) - 1, entry_of(clip_rings, d)
@@ -414,7 +415,7 @@ def _clip_few(
 def _assemble(
     vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
 ) -> ClippedPolygons:
-    """Return the clipped polygons; sizes: the vertices of each ring, 0 for those that vanished."""
+    """Return the clipped polygons; sizes: number of vertices of each ring, 0 for rings that vanished."""
     left = np.flatnonzero(sizes)
     owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
     contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]

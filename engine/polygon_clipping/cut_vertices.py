@@ -34,9 +34,11 @@ from engine.predicates.error_free import (
 )
 
 VALUE_BOUND: Final = 16.0 * 2.0**-53
-"""Signs in doubles: a term loses the low parts of row and vertex, a product, three sums; its size as much again."""
+"""Relative error bound of a plane value in doubles: a term loses the low parts of row and vertex, a product, three
+sums; its size as much again.
+"""
 DD_VALUE_BOUND: Final = 32.0 * U2
-"""Values in double-double: rows known to 2 u^2, products 5 u^2, three sums of 4 u^2."""
+"""The same in double-double: rows known to 2 u^2, products 5 u^2, three sums of 4 u^2."""
 EDGE_BOUND: Final = 64.0 * U2
 TINY: Final = 2.0**-800
 WIDEST: Final = 2.0**-200
@@ -45,7 +47,7 @@ Triple = tuple[float, float, float]
 
 @inline
 def edge_parameter(a: float, b: float, place: float) -> tuple[float, float, bool]:
-    """Return t = (a - place) / (a - b) as a double-double for place between a and b; False where it underflows."""
+    """Return t = (a - place) / (a - b) as a double-double, for place between a and b; and False if it underflows."""
     h, low = two_diff(a, place)
     length, rest = two_diff(a, b)
     inverse = 1.0 / length
@@ -55,7 +57,7 @@ def edge_parameter(a: float, b: float, place: float) -> tuple[float, float, bool
 
 @inline
 def point_on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, float, float]:
-    """Return x + t (y - x) as a double and its remainder, and the error bound, for original x and y."""
+    """Return x + t (y - x) as a double and its remainder, and the error bound; x and y are exact."""
     h, low, mh, _ = point_along(x, y, th, tl)
     h, rest = two_sum(h, low)
     return h, rest, (EDGE_BOUND * (abs(x) + abs(mh)) + TINY if x != y else 0.0)
@@ -63,7 +65,9 @@ def point_on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, floa
 
 @inline
 def is_exactly_at(x: float, y: float, a: float, b: float, place: float, guess: float) -> bool:
-    """Return whether x + (a - place) / (a - b) (y - x) is proven to be `guess`, by products of exact differences."""
+    """Return whether x + t (y - x) with t = (a - place) / (a - b) is proven to be `guess`, by products of exact
+    differences.
+    """
     x_off, x_low = two_diff(x, guess)
     y_off, y_low = two_diff(y, guess)
     a_off, a_low = two_diff(a, place)
@@ -79,7 +83,7 @@ def is_exactly_at(x: float, y: float, a: float, b: float, place: float, guess: f
 
 @inline
 def distance_across(x: float, low: float, bound: float, at: float) -> tuple[float, float, float]:
-    """Return x - at as a double-double, and its error bound."""
+    """Return x + low - at as a double-double, and its error bound; bound: of x + low."""
     if low == 0.0:
         h, rest = two_diff(x, at)
         return h, rest, bound
@@ -88,7 +92,7 @@ def distance_across(x: float, low: float, bound: float, at: float) -> tuple[floa
 
 
 class CutWeights(NamedTuple):
-    """Where an edge is cut: weights |p|, |q|, their sum, t = |p| / sum as double-doubles, and the relative error r of
+    """Where an edge p q is cut: |value| at p and q, their sum, t = |p| / sum, as double-doubles; r: relative error of
     t.
     """
 
@@ -105,7 +109,8 @@ class CutWeights(NamedTuple):
 
 @inline
 def interpolate(x: Triple, y: Triple, s: CutWeights) -> Triple:
-    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x) as double, remainder and bound, like x and y."""
+    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x); x, y and the result as double, remainder and error bound.
+    """
     x_h, x_low, x_bound = x
     y_h, y_low, y_bound = y
     if x_low != 0.0 or y_low != 0.0 or x_bound != 0.0 or y_bound != 0.0:
@@ -136,7 +141,7 @@ Vertices = namedtuple("Vertices", "pool rests edges names")
 
 @merged
 def are_same(s: Vertices, v: int, u: int) -> bool:
-    """Return whether the doubles of two vertices are equal."""
+    """Return whether the rounded coordinates of vertices v and u are equal."""
     d, is_same = len(s.names), True
     for k in range(d):
         is_same = is_same & (s.pool[v * d + k] == s.pool[u * d + k])
@@ -145,7 +150,7 @@ def are_same(s: Vertices, v: int, u: int) -> bool:
 
 @merged
 def coordinate(s: Vertices, v: int, k: int, n_ring: int) -> Triple:
-    """Return a coordinate of a vertex: its double, remainder and error bound."""
+    """Return coordinate k of vertex v: its double, remainder and error bound; vertices below n_ring are exact."""
     place = v * len(s.names) + k
     rest, bound = (s.rests[2 * place], s.rests[2 * place + 1]) if v >= n_ring else (0.0, 0.0)
     return s.pool[place], rest, bound
@@ -153,14 +158,14 @@ def coordinate(s: Vertices, v: int, k: int, n_ring: int) -> Triple:
 
 @merged
 def set_coordinate(s: Vertices, v: int, k: int, h: float, rest: float, bound: float) -> None:
-    """Set a coordinate of a cut vertex."""
+    """Set coordinate k of cut vertex v: its double h, remainder and error bound."""
     place = v * len(s.names) + k
     s.pool[place], s.rests[2 * place], s.rests[2 * place + 1] = h, rest, bound
 
 
 @merged
 def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
-    """Return the value of a plane at a vertex as a double-double, and its error bound."""
+    """Return the value of a plane at vertex v as a double-double, and its error bound."""
     if plane.axis >= 0:
         x, rest, bound = coordinate(s, v, plane.axis, n_ring)
         return distance_across(x, rest, bound, plane.place)
@@ -177,7 +182,9 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
 
 @merged
 def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
-    """Set vertex j to where an original edge crosses a plane across an axis; return whether it is correctly rounded."""
+    """Set vertex j to the crossing of original edge p q with a plane across an axis; return whether it is correctly
+    rounded.
+    """
     d, axis, place = len(s.names), plane.axis, plane.place
     a, b = s.pool[p * d + axis], s.pool[q * d + axis]
     th, tl, is_certified = edge_parameter(a, b, place)
@@ -197,7 +204,7 @@ def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
 
 @merged
 def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
-    """Return whether p and q have the same double coordinates except along an axis."""
+    """Return whether p and q have the same coordinates, all doubles, except along one axis."""
     d, is_along = len(s.names), True
     for k in range(d):
         is_double = (p < n_ring or s.rests[2 * (p * d + k) + 1] == 0.0) and (
@@ -209,7 +216,9 @@ def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
 
 @merged
 def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to where an edge between any vertices crosses a plane; return whether it is correctly rounded."""
+    """Set vertex j to the crossing of edge p q, between any vertices, with a plane; return whether it is correctly
+    rounded.
+    """
     d = len(s.names)
     ph, pl, p_bound = value_of(s, plane, p, n_ring)
     qh, ql, q_bound = value_of(s, plane, q, n_ring)
@@ -234,9 +243,8 @@ def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: in
 
 @merged
 def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to where the edge v w crosses a plane; return whether it is correctly rounded.
-
-    A part of an original edge is cut as the whole edge.
+    """Set vertex j to the crossing of edge v w with a plane; return whether it is correctly rounded. A part of an
+    original edge is cut as the whole edge.
     """
     edge, p, q = s.edges[v], v, w
     if edge >= 0:

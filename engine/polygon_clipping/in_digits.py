@@ -32,15 +32,16 @@ from engine.predicates.digits import MOST, SLOT, nearest_quotient, negate, sign_
 from engine.types import OPEN, FlagArray, FloatArray, IntArray
 
 TOO_LONG = -1
-"""Instead of a number of vertices: exact numbers are too long for digits.py."""
+"""In place of a number of vertices: exact numbers are too long for digits.py."""
 _ONE = 0
 _VALUES = SLOT
 _FREE = 3 * SLOT
 _LOADED = 6 * SLOT
 _ROWS = 16 * SLOT
-"""Places of a heap: the number 1, two values, working slots, two loaded vertices, rows; then numbers that stay."""
+"""Indices into a heap: the number 1, two values, working slots, two loaded vertices, plane rows; then stored numbers.
+"""
 _TINY = 2.0**-1000
-"""Bound of products that underflow."""
+"""Error bound of products that underflow."""
 
 
 class ExactScratch(NamedTuple):
@@ -77,7 +78,9 @@ class ExactScratch(NamedTuple):
 
 @allocating
 def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: IntArray) -> Any:
-    """Return scratch of `clip_exactly` for rings that grow to `room` vertices, dropped ones included."""
+    """Allocate scratch of `clip_exactly` for rings that grow to `room` vertices, dropped ones included. row_heap,
+    row_places: of `PlaneTables`.
+    """
     first = _ROWS + row_heap.size
     heap = np.empty(first + 8 * SLOT + 48 * room, np.int64)
     heap[_ONE], heap[_ONE + 1], heap[_ONE + 2] = 1, 0, 1
@@ -93,7 +96,9 @@ def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: Int
 
 @inline
 def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
-    """Set ``loaded[side]`` to the places of vertex v's numbers; for an original vertex they are created."""
+    """Set ``loaded[side]`` to the heap indices of vertex v's coordinates x, y[, z], w; an original vertex is stored
+    first.
+    """
     d = s.points.shape[1]
     for k in range(d + 1):
         if v >= n_ring:
@@ -107,7 +112,7 @@ def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
 
 @inline
 def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
-    """Store the value of a plane at a loaded vertex at `place`; False where it is too long."""
+    """Store the value of a plane at loaded vertex ``side`` at heap index `place`; False if it is too long."""
     n = s.loaded.shape[1]
     for k in range(n):
         s.terms[k, 0], s.terms[k, 1], s.terms[k, 2] = s.rows[plane, k], s.loaded[side, k], 1
@@ -116,7 +121,7 @@ def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
 
 @inline
 def sign_of_vertex(s: ExactScratch, plane: Plane, v: int, n_ring: int) -> tuple[int, bool]:
-    """Return the exact sign of a plane at vertex v; False where numbers are too long."""
+    """Return the exact sign of a plane's value at vertex v; and False if numbers are too long."""
     d, number, axis = s.points.shape[1], plane.number, plane.axis
     if axis >= 0:
         x = s.points[v, axis]
@@ -138,7 +143,7 @@ def sign_of_vertex(s: ExactScratch, plane: Plane, v: int, n_ring: int) -> tuple[
 
 @inline
 def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
-    """Return whether two vertices are the same point; the second is False where numbers are too long."""
+    """Return whether vertices v and u are one point, exactly; the second result is False if numbers are too long."""
     d = s.points.shape[1]
     for k in range(d):
         if s.points[v, k] != s.points[u, k]:
@@ -159,7 +164,9 @@ def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
 
 @inline
 def store_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
-    """Set number k of vertex `place` to the sum of two terms, on top of the heap; False where it is too long."""
+    """Set coordinate k of vertex `place` to the sum of two terms, on top of the heap; False if it is too long. carry:
+    digits to reserve for one.
+    """
     top = s.used[1]
     if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
         return False
@@ -170,7 +177,7 @@ def store_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
 
 @inline
 def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
-    """Compute vertex j, where the edge p q crosses a plane; False where its numbers are too long."""
+    """Compute vertex j, the crossing of edge p q with a plane, as exact integers; False if these are too long."""
     load_vertex(s, p, n_ring, 0)
     load_vertex(s, q, n_ring, 1)
     if not (value_at(s, plane, 0, _VALUES) and value_at(s, plane, 1, _VALUES + SLOT)):
@@ -186,7 +193,8 @@ def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -
 
 @inline
 def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
-    """Compute vertex j, the intersection of two lines of the plane; False where its numbers are too long."""
+    """Compute vertex j, the intersection of two planes (lines) in 2D, as exact integers; False if these are too long.
+    """
     for k in range(3):  # the cross product of both rows
         a, b = (k + 1) % 3, (k + 2) % 3
         s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = s.rows[plane, a], s.rows[other, b], 1
@@ -201,7 +209,9 @@ def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
 
 @inline
 def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
-    """Return the new vertex where the edge v w crosses a plane, leaving its inner side or not; TOO_LONG."""
+    """Return the new vertex at the crossing of edge v w with a plane; TOO_LONG. is_left: the edge leaves the plane's
+    inner side.
+    """
     j, edge, d = s.used[0], s.edges[v], s.points.shape[1]
     if j + 1 >= s.points.shape[0]:
         return TOO_LONG
@@ -222,8 +232,7 @@ def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_rin
 
 @inline
 def append_vertex(s: ExactScratch, made: IntArray, n_left: int, v: int, is_on: bool, n_ring: int) -> int:
-    """Append a vertex, on the plane or not, to the n_left ones of a ring; return their number then, or TOO_LONG.
-
+    """Append vertex v to a ring of n_left vertices; return their number then, or TOO_LONG. is_on: v lies on the plane.
     A duplicate of the previous vertex is merged into it, and its outgoing edge inherited.
     """
     s.on_plane[n_left] = is_on
@@ -241,7 +250,7 @@ def append_vertex(s: ExactScratch, made: IntArray, n_left: int, v: int, is_on: b
 
 @inline
 def close_ring(s: ExactScratch, made: IntArray, n_left: int, n_ring: int) -> int:
-    """Return the number of vertices of a ring without last ones equal to the first; TOO_LONG."""
+    """Drop last vertices of a ring that equal the first; return the number of vertices, or TOO_LONG."""
     while n_left > 1 and s.on_plane[n_left - 1] and s.on_plane[0]:
         is_same, is_known = are_same(s, made[n_left - 1], made[0], n_ring)
         if not is_known:
@@ -254,7 +263,9 @@ def close_ring(s: ExactScratch, made: IntArray, n_left: int, n_ring: int) -> int
 
 @inline
 def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int) -> tuple[int, int]:
-    """Set the signs of the n vertices of a ring; return how many are outside (TOO_LONG), and on the plane."""
+    """Set the signs of the n vertices of a ring at a plane; return how many are outside (or TOO_LONG), and how many on
+    it.
+    """
     n_out, n_on = 0, 0
     for i in range(n):
         s.signs[i], is_known = sign_of_vertex(s, plane, ring[i], n_ring)
@@ -267,7 +278,9 @@ def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int)
 
 @inline
 def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray, n_ring: int) -> tuple[int, int]:
-    """Cut a ring of n vertices with signs by a plane into `made`; return how many are left (TOO_LONG), and are cuts."""
+    """Clip a ring of n vertices, whose signs are set, by a plane into `made`; return the number of its vertices (or
+    TOO_LONG), and of cuts.
+    """
     n_left, n_cuts = 0, 0
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
@@ -287,7 +300,7 @@ def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray
 
 @inline
 def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> int:
-    """Load a ring without repeated vertices, cyclically; return their number."""
+    """Load a ring, repeated vertices merged, cyclically; return the number of its vertices."""
     n, d = 0, s.points.shape[1]
     for i in range(first, last):
         is_same = n > 0
@@ -311,9 +324,8 @@ def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> i
 def cut_by_planes(
     s: ExactScratch, planes: PlaneTables, cutting: Cutting, n_cutting: int, n_ring: int, stop: FlagArray
 ) -> tuple[int, int]:
-    """Cut the loaded ring by the planes in order; return how many vertices are left, and in which of `rings`.
-
-    TOO_LONG or NO_ROOM instead. Adds to the contacts of the planes, and to which dropped a vertex.
+    """Clip the loaded ring by the planes in order; return the number of its vertices, and its row in `rings`. TOO_LONG
+    or NO_ROOM in place of the number. Counts the contacts with each plane, and notes which dropped a vertex.
     """
     n, now = n_ring, 0
     for i_plane in range(n_cutting):
@@ -337,9 +349,8 @@ def clip_exactly(
     s: ExactScratch, polygons: Polygons, polygon: int, planes: PlaneTables, cutting: Cutting, n_cutting: int,
     stop: FlagArray, clipped: Clipped, written: int,
 ) -> int:  # fmt: skip
-    """Clip a polygon by the planes of `cutting`, whose contacts are reset; `written` vertices are there already.
-
-    Returns the number of vertices then, or NO_ROOM. A polygon with too long numbers is left OPEN.
+    """Clip a polygon by the planes of `cutting`, whose contacts are reset, after `written` vertices of others. Returns
+    the number of vertices then, or NO_ROOM. A polygon with too long numbers is left OPEN.
     """
     written_before, d = written, s.points.shape[1]
     first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]

@@ -39,13 +39,15 @@ from engine.polygon_clipping.rings import (
 from engine.types import FlagArray, FloatArray, Int32Array
 
 DOUBT: Final = -1
-"""Instead of a number of vertices: doubles do not prove a decision."""
+"""In place of a number of vertices: doubles do not prove a decision."""
 _SLACK: Final = 2.0**-45
 LONG: Final = 8
-"""Vertices from which on a ring is grouped into runs: in shorter ones nearly every vertex is its own run."""
+"""Smallest number of vertices of a ring that is grouped into runs; in shorter rings most vertices are runs of their
+own.
+"""
 MOST_BITS: Final = 30
 ALONE: Final = 1 << MOST_BITS
-"""Mark of a vertex on a plane (or near it): a run of its own."""
+"""Mark of a vertex on a plane, or near one: it is a run of its own."""
 
 
 class Scratch(NamedTuple):
@@ -71,7 +73,7 @@ class Scratch(NamedTuple):
 
 @allocating
 def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
-    """Return scratch for rings that grow to `room` vertices, dropped ones included."""
+    """Allocate scratch for rings that grow to `room` vertices, dropped ones included."""
     d = len(names)
     return Scratch(
         Vertices(np.empty(room * d), np.empty(2 * room * d), np.empty(room, np.int32), names),
@@ -91,8 +93,7 @@ def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
 def load_ring(
     s: Scratch, vertices: FloatArray, begin: int, end: int
 ) -> tuple[int, float, float, float, float, float, float]:
-    """Load a ring without repeated vertices; return their number, and the bounds of each axis.
-
+    """Load a ring, repeated vertices merged; return the number of its vertices, and low and high bound of each axis.
     Zeros become +0.0. The first vertex may still be repeated at the end.
     """
     pool, d = s.vertices.pool, len(s.vertices.names)
@@ -116,7 +117,7 @@ def load_ring(
 
 @merged
 def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
-    """Set the box of the polygon of rings first .. last - 1; return the number of vertices of the last one, which is
+    """Set s.lows and s.highs to the box of rings first .. last - 1; return the number of vertices of the last ring,
     loaded.
     """
     vertices, offsets = polygons.vertices, polygons.ring_offsets
@@ -133,8 +134,7 @@ def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
 
 @merged
 def choose_planes(s: Scratch, planes: PlaneTables) -> tuple[int, bool]:
-    """List the planes that may cut a polygon; return their number, and whether one has all of it outside.
-
+    """List the planes that may cut a polygon in s.cutting; return their number, and whether one has all of it outside.
     A plane with all vertices inside cuts nothing: later planes see convex combinations of the vertices.
     """
     cutting, lows, highs, d = s.cutting, s.lows, s.highs, len(s.vertices.names)
@@ -163,14 +163,14 @@ def choose_planes(s: Scratch, planes: PlaneTables) -> tuple[int, bool]:
 
 @merged
 def row_of(s: Scratch, plane: Plane) -> tuple[float, float, float, float]:
-    """Return the row of a plane in doubles, read once for all vertices."""
+    """Return the row (a, b, c, d) of a plane in doubles, c = 0 in 2D; read once for all vertices."""
     d, rows, number = len(s.vertices.names), plane.high, plane.number
     return rows[number, 0], rows[number, 1], 0.0 if d == 2 else rows[number, 2], rows[number, d]
 
 
 @merged
 def value_at(s: Scratch, row: tuple[float, float, float, float], v: int) -> float:
-    """Return the value of a plane, given by its row, at a vertex in doubles."""
+    """Return the value of a plane, given by its row, at vertex v, in doubles."""
     pool, d = s.vertices.pool, len(s.vertices.names)
     value = row[3] + row[0] * pool[v * d] + row[1] * pool[v * d + 1]
     return value if d == 2 else value + row[2] * pool[v * d + 2]
@@ -178,7 +178,7 @@ def value_at(s: Scratch, row: tuple[float, float, float, float], v: int) -> floa
 
 @merged
 def mark_sides(s: Scratch, planes: PlaneTables, n_cutting: int, n: int) -> None:
-    """Set the codes of n vertices: a bit for each plane that one is outside of, ALONE where it is on one or near it."""
+    """Set the codes of n vertices: a bit for each plane that a vertex is outside of, ALONE if it is on or near one."""
     pool, codes, d = s.vertices.pool, s.codes, len(s.vertices.names)
     for i in range(n):
         codes[i] = 0
@@ -198,7 +198,7 @@ def mark_sides(s: Scratch, planes: PlaneTables, n_cutting: int, n: int) -> None:
 
 @merged
 def group_into_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int) -> int:
-    """Group the loaded ring into runs of vertices on the same sides; return their number."""
+    """Group the loaded ring into runs of vertices on the same sides of all planes; return the number of runs."""
     ring, edges, ends, codes = s.rings[0], s.vertices.edges, s.ends, s.codes
     if n_cutting == 0:
         ring[0], ends[0] = 0, n_ring - 1
@@ -221,7 +221,9 @@ def group_into_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int
 
 @merged
 def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: int) -> tuple[int, int]:
-    """Set the signs of n vertices at a plane across an axis; return how many are not outside (DOUBT), and on it."""
+    """Set the signs of n vertices at a plane across an axis; return how many are not outside (or DOUBT), and how many
+    on it.
+    """
     pool, rests, d, axis, place = s.vertices.pool, s.vertices.rests, len(s.vertices.names), plane.axis, plane.place
     sense, n_in, n_on = 1 if plane.high[plane.number, axis] > 0.0 else -1, 0, 0
     for i in range(n):
@@ -242,7 +244,8 @@ def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: 
 
 @merged
 def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n: int) -> tuple[int, int]:
-    """Set the signs of n vertices at a plane across no axis; see `classify_across`. None is proven to be on it."""
+    """Set the signs of n vertices at a plane across no axis; return as `classify_across`. None is proven to be on it.
+    """
     row, n_in = row_of(s, plane), 0
     for i in range(n):
         value = value_at(s, row, ring[i])
@@ -257,9 +260,8 @@ def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n
 def cut_ring(
     s: Scratch, plane: Plane, ring: Int32Array, n: int, made: Int32Array, n_ring: int, n_made: int
 ) -> tuple[int, int]:
-    """Cut a ring of n vertices with signs by a plane into `made`: append, cross or drop each edge.
-
-    n_made: number of vertices, cut ones included. Returns how many are left (DOUBT), and n_made then.
+    """Clip a ring of n vertices, whose signs are set, by a plane into `made`: append, cross or drop each edge. n_made:
+    number of vertices, cut ones included. Returns the number of vertices left (or DOUBT), and n_made then.
     """
     signs, edges = s.signs, s.vertices.edges
     n_left, was_on, first_on = 0, False, False
@@ -293,7 +295,9 @@ def cut_ring(
 
 @merged
 def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
-    """Cut the ring of n runs by the planes in order; return how many are left (DOUBT), and in which of `rings`."""
+    """Clip the ring of n runs by the planes in order; return the number of vertices left (or DOUBT), and its row in
+    `rings`.
+    """
     n_made, now, cutting = n_ring, 0, s.cutting
     for i_plane in range(n_cutting):
         plane = plane_of(planes, cutting.planes[i_plane])
@@ -319,7 +323,7 @@ def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_rin
 
 @merged
 def emit(s: Scratch, ring: Int32Array, n: int, n_ring: int, out: FloatArray, place: int) -> int:
-    """Write the vertices of n runs to ``out[place:]``; return the place after them."""
+    """Write the vertices of n runs to ``out[place:]``; return the index after them."""
     d = len(s.vertices.names)
     for i in range(n):
         v = ring[i]
@@ -335,9 +339,8 @@ def clip_in_doubles(
     polygons: Polygons, planes: PlaneTables, first: int, last: int, stop: FlagArray, clipped: Clipped, written: int,
     s: Scratch,
 ) -> tuple[int, int, int, int]:  # fmt: skip
-    """Clip polygons from `first` on, up to the first doubt; `written` vertices are there already.
-
-    Returns the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut that polygon.
+    """Clip polygons from `first` on until doubles do not decide one, after `written` vertices of earlier ones. Returns
+    the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut that polygon.
     """
     d, offsets = len(s.vertices.names), polygons.ring_offsets
     for polygon in range(first, last):

@@ -22,17 +22,19 @@ Vertex = tuple[int, ...]
 Row = tuple[int, ...]
 
 MOST_BITS = 1 << 17
-"""Cap on the size of an exact vertex: at 131,072 bits one cut costs milliseconds, and the next may cost double."""
+"""Most bits of an exact vertex: at 131,072 bits one cut costs milliseconds, and the next may cost double."""
 
 
 def integer_row(row: Sequence[float]) -> Row:
-    """Return a plane's row as integers, up to a positive factor."""
+    """Return a plane's row as integers, times a positive factor."""
     numbers, _ = common_integers(row)
     return tuple(numbers)
 
 
 def plane_through(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> Row:
-    """Return the integer row that is positive on the side the normal (b - a) x (c - a) points away from."""
+    """Return the integer row of the plane through a, b, c, positive on the side opposite to the normal (b - a) x (c -
+    a).
+    """
     n, scale = common_integers([*a, *b, *c])
     p, q, r = n[:3], n[3:6], n[6:]
     normal = cross(minus(r, p), minus(q, p))
@@ -40,7 +42,7 @@ def plane_through(a: Sequence[float], b: Sequence[float], c: Sequence[float]) ->
 
 
 def merge_repeated(contour: list[Vertex]) -> list[Vertex]:
-    """Return the contour without repeated vertices, cyclically; the first of them stays."""
+    """Return the contour without repeated vertices, cyclically; the first of equal ones remains."""
     inside = [vertex for i, vertex in enumerate(contour) if i == 0 or vertex != contour[i - 1]]
     while len(inside) > 1 and inside[-1] == inside[0]:
         inside.pop()
@@ -48,7 +50,9 @@ def merge_repeated(contour: list[Vertex]) -> list[Vertex]:
 
 
 def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bool]:
-    """Return a contour cut by one plane, in how many points it met the plane, and whether a vertex was dropped."""
+    """Return a contour clipped by one plane, the number of points in which it met the plane, and whether a vertex was
+    dropped.
+    """
     values = [sum(a * x for a, x in zip(row, vertex)) for vertex in contour]
     if min(values) >= 0:
         return contour, values.count(0), False
@@ -70,11 +74,9 @@ def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bo
 def clip_polygon(
     rings: Sequence[Sequence[Sequence[float]]], planes: Sequence[Row], check: Callable[[], object]
 ) -> tuple[list[list[list[float]]], bool]:
-    """Return the contours of one polygon after all planes, correctly rounded, and whether it may have bridge edges.
-
-    rings: contours of at least one vertex each. planes: integer rows, applied in order. check: called for each plane.
-    A contour that vanishes is an empty list.
-    Raises: TooComplexError.
+    """Return the contours of one polygon clipped by all planes, correctly rounded, and whether it may have bridge
+    edges. rings: contours of at least one vertex each. planes: integer rows, applied in order. check: called for each
+    plane. A contour that vanishes is an empty list. Raises: TooComplexError.
     """
     contours = []
     for ring in rings:

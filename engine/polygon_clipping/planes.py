@@ -41,7 +41,7 @@ _DEEPEST: Final = -900
 
 
 def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Int8Array:
-    """Return the exact orient3d of each row."""
+    """Return the exact orient3d of each row of a, b, c, d (n, 3)."""
     signs = np.empty(len(a), np.int8)
     with np.errstate(all="ignore"):
         orient3d_batch(*(np.ascontiguousarray(points) for points in (a, b, c, d)), signs)
@@ -51,8 +51,8 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
 
 
 class Plan(NamedTuple):
-    """The planes of a region, stored with it: integer rows in clipping order without duplicates; tables: for the
-    kernel, None where exponents are too far apart.
+    """The planes of a region, cached with it: integer rows in clipping order without duplicates; tables: for the
+    kernel, None if exponents are too far apart.
     """
 
     rows: list[Row]
@@ -60,9 +60,8 @@ class Plan(NamedTuple):
 
 
 def plan_of(region: Solid, check: Check) -> Plan:
-    """Return the plan of a region, stored with it.
-
-    Raises: UnsupportedSolidError, where a polyhedron is not convex naming a face and a vertex beyond it.
+    """Return the planes of a region, cached with it. Raises: UnsupportedSolidError, for a polyhedron that is not convex
+    naming a face and a vertex beyond it.
     """
     planes = row_of(region).planes
     if planes is None:
@@ -86,7 +85,9 @@ def planes_of_rows(region: HalfSpace | Aabb | Convex, _: Check) -> Iterable[Row]
 
 
 def planes_of_faces(region: Polyhedron, check: Check) -> Iterable[Row]:
-    """Return the planes of the faces of a polyhedron. Raises: UnsupportedSolidError where it is not convex."""
+    """Return the planes of the faces of a polyhedron as integer rows. Raises: UnsupportedSolidError if it is not
+    convex.
+    """
     return starmap(plane_through, region.vertices[_outward_triangles(region, check)].tolist())
 
 
@@ -99,9 +100,8 @@ class KernelScene(NamedTuple):
 
 
 def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check) -> KernelScene | None:
-    """Return the input of the kernel, None where exponents are too far apart.
-
-    largest: magnitude of any coordinate.
+    """Return the input of the kernel, scaled if necessary; None if exponents are too far apart. largest: magnitude of
+    any coordinate.
     """
     exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
@@ -112,8 +112,8 @@ def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check)
 
 
 def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
-    """Return the plane tables for vertices times 2^-exponent; None where exponents are too far apart, or without
-    planes.
+    """Return the tables of planes for vertices times 2^-exponent; None without planes, or if exponents are too far
+    apart.
     """
     if not planes:
         return None
@@ -141,7 +141,7 @@ def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables
 
 
 def _double_double(number: int, shift: int) -> tuple[float, float]:
-    """Return number / 2^shift as a double-double; its low part is zero only if the high part is exact."""
+    """Return number / 2^shift as a double-double. Raises: OverflowError if the low part underflows."""
     high, low = nearest_pair(number, 1 << shift)
     if low == 0.0 and Fraction(high) * (1 << shift) != number:
         raise OverflowError(number)  # the low part underflows
@@ -183,6 +183,7 @@ def _outward_triangles(region: Polyhedron, check: Check) -> IntArray:
 
 
 def _not_convex(what: str, region: Polyhedron, triangle: int) -> UnsupportedSolidError:
+    """Return the error for a polyhedron that is not convex; what: the reason, at this triangle's face."""
     face = int(region.triangle_faces[triangle])
     return UnsupportedSolidError(
         f"the polyhedron is not convex: {what} {face}; clip_polygons takes a half_space, aabb, convex or convex "

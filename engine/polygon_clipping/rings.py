@@ -9,11 +9,11 @@ from engine.compiling.jit import merged
 
 CLIPPED: Final = 0
 EXACT: Final = 1
-"""States of a polygon, besides OPEN: decided by doubles, by multi-digit integers."""
+"""States of a polygon, besides OPEN: CLIPPED, decided by doubles; EXACT, by multi-digit integers."""
 DONE: Final = 0
-"""Outcome: the last polygon is reached."""
+"""Outcome: all polygons are clipped."""
 NO_ROOM: Final = -2
-"""Instead of a number of vertices: they do not fit, or the kernel was stopped."""
+"""In place of a number of vertices: they do not fit, or the kernel was stopped."""
 
 Polygons = namedtuple("Polygons", "vertices ring_offsets polygon_offsets")
 """vertices: (m * dim,) float64, flat; offsets of rings and of polygons: see `ClippedPolygons`."""
@@ -30,7 +30,7 @@ PlaneTables = namedtuple("PlaneTables", "high low axes at row_heap row_places")
 
 
 class Plane(NamedTuple):
-    """One of the planes: its number, and the axis that it crosses at `place`, else -1."""
+    """One of the planes of the tables: its number, and the axis that it crosses at `place`; axis -1 for others."""
 
     high: Any
     low: Any
@@ -51,22 +51,20 @@ Clipped = namedtuple("Clipped", "vertices sizes state may_have_bridges")
 """
 
 Cutting = namedtuple("Cutting", "planes slack contacts dropped")
-"""The planes that may cut a polygon, in order.
-
-planes: their numbers. slack: error bounds of values in doubles. contacts: number of points in which all rings
-together met a plane. dropped: whether a ring lost a vertex to it.
+"""The planes that may cut a polygon, in order. planes: their numbers. slack: error bounds of values in doubles.
+contacts: number of points in which all rings together met a plane. dropped: whether a ring lost a vertex to it.
 """
 
 
 @merged
 def plane_of(planes: PlaneTables, number: int) -> Plane:
-    """Return one of the planes."""
+    """Return plane ``number`` of the tables."""
     return Plane(planes.high, planes.low, number, planes.axes[number], planes.at[number])
 
 
 @merged
 def has_bridges(cutting: Cutting, n_cutting: int) -> bool:
-    """Return whether a plane that dropped a vertex was met in more than two points."""
+    """Return whether a plane that dropped a vertex was met in more than two points: bridge edges are possible."""
     may_have = False
     for i in range(n_cutting):
         may_have |= cutting.dropped[i] and cutting.contacts[i] > 2

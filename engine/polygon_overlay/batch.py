@@ -45,9 +45,9 @@ from engine.types import OPEN, Accuracy, BoolArray, FloatArray, Int8Array, IntAr
 NOT_REPRESENTABLE: Final = 1
 _FIRST_CHUNK: Final = 8
 _FIRST_VERTICES: Final = 16_384
-"""Vertices of the first chunk, at most 64 times `_FIRST_CHUNK` pairs: the overhead of a chunk is 20 us."""
+"""Vertices of the first chunk of at most 64 times `_FIRST_CHUNK` pairs: the overhead of a chunk is 20 us."""
 _DOUBTFUL: Final = 256
-"""Pairs whose rings are arranged again together: the overhead of a call is that of some hundred of them."""
+"""Pairs whose rounded rings are arranged in one call: the overhead of a call is that of some hundred pairs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -180,11 +180,14 @@ class OverlayBatch(Ragged):
 
 
 def _polygons_in(solids: Any, name: str) -> Sequence[Solid]:
-    """Return polygons as a tuple, or as they are chosen from arrays; other shapes are read (`shapes.as_solid`)."""
+    """Return polygons as a tuple, or unchanged if they are a selection of arrays; other shapes are read
+    (`shapes.as_solid`).
+    """
     return solids if isinstance(solids, PolygonSelection) else tuple(polygons_in(solids, name))
 
 
 def _n_vertices(solids: Sequence[Solid]) -> int:
+    """Return the number of vertices of all polygons."""
     return (
         solids.n_vertices
         if isinstance(solids, PolygonSelection)
@@ -193,6 +196,7 @@ def _n_vertices(solids: Sequence[Solid]) -> int:
 
 
 def _polygon_arrays(solids: Sequence[Solid]) -> PolygonArrays:
+    """Return polygons as flat arrays."""
     return (
         solids.arrays()
         if isinstance(solids, PolygonSelection)
@@ -296,9 +300,8 @@ def _resolve(
     outcome: PairResults, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
     clips: Sequence[Solid], operation: Operation, workers: int | None, budget: Budget,
 ) -> tuple[PairResults, float, int]:  # fmt: skip
-    """Return all pairs valid, `Accuracy.coordinates_ulp`, and the number of rational decisions.
-
-    rest: `OverlayBatch.status`, `_is_rounded_again` and `_apart`, to be filled.
+    """Return the results of all pairs, valid after rounding; `Accuracy.coordinates_ulp`; and the number of rational
+    decisions. rest: `OverlayBatch.status`, `_is_rounded_again` and `_apart`, filled here.
     """
     status, is_rounded_again, apart = rest
     valid: dict[int, ValidPairs] = {}
@@ -339,7 +342,7 @@ def _resolve(
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
-    """Return the pairs of some batches, at least one, as one batch."""
+    """Concatenate the pairs of at least one batch."""
     apart: dict[int, Overlay] = {}
     n_pairs = 0
     for part in batches:

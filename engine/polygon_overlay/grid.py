@@ -31,25 +31,24 @@ from engine.solids.ragged import next_in_rings, summed
 from engine.types import FloatArray, Int32Array, IntArray, read_only
 
 _MOST: Final = 2.0**51
-"""Largest coordinate in cells: halves of cells are doubles, with room for sums."""
+"""Largest coordinate in cells, so that halves of cells are doubles, with room for sums."""
 _TENS: Final = 22
-"""Largest exponent of ten that is a double."""
+"""Largest exponent of a power of ten that is a double."""
 _LEAST: Final = 2.0**-60
-"""Fraction of a cell below which a coordinate is zero, so that exponents stay in the range of expansions."""
+"""Fraction of a cell that is rounded to zero, so that exponents stay in the range of expansions."""
 _ROUNDED: Final = 2.0**-51
 _CERTAINLY_VALID: Final = 2.0**24
 _FINEST: Final = 2.0**49
-"""Bounds of the largest coordinate in cells, and of it times the longest edge, for rings to stay valid:
-see `_are_distinguishable`.
+"""Bounds of the largest coordinate in cells (_CERTAINLY_VALID), and of it times the longest edge (_FINEST), for rings
+to stay valid: see `_are_distinguishable`.
 """
 HALF_DIAGONAL: Final = nextafter(0.5**0.5, 1.0)
 
 
 class Grid(NamedTuple):
-    """Multiples of ``base ** power``, base 2 or 10; spacing: the nearest double.
-
-    into, back: a divisor and two factors, to convert coordinates to units and back. A power of two may be no double, so
-    it is split into two factors; the first is exact.
+    """Multiples of ``base ** power``, base 2 or 10; spacing: the nearest double. into, back: a divisor and two factors
+    that convert coordinates to units and back. A power of two may be no double, so it is split into two factors; the
+    first is exact.
     """
 
     base: int
@@ -59,7 +58,9 @@ class Grid(NamedTuple):
     back: tuple[float, float, float]
 
     def to_units(self, vertices: FloatArray) -> FloatArray:
-        """Return coordinates in units of the grid; for powers of ten they are rounded to doubles."""
+        """Return coordinates in units of the grid; for powers of ten rounded to doubles. Raises if the grid is too
+        fine.
+        """
         near_integer = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
         units = np.empty_like(vertices)
         if not entry_of(scale)(vertices, *self.into, near_integer, _LEAST, units) < _MOST:
@@ -71,7 +72,9 @@ class Grid(NamedTuple):
         return read_only(units)
 
     def to_coordinates(self, units: FloatArray) -> tuple[FloatArray, float]:
-        """Return the doubles nearest to whole multiples of the grid, and their largest magnitude."""
+        """Return the doubles nearest to whole multiples of the grid, and their largest magnitude. Raises beyond the
+        range.
+        """
         places = np.empty_like(units)
         largest = entry_of(scale)(units, *self.back, 0.0, 0.0, places)
         if not largest < inf:
@@ -83,7 +86,7 @@ _LARGEST: Final = float(np.finfo(np.float64).max)
 
 
 def grid_of(size: object) -> Grid:
-    """Return the grid of a spacing; raise unless it is a power of two or ten."""
+    """Return the grid of a spacing; raise unless it is a power of two or of ten."""
     if isinstance(size, (int, float, np.floating)) and not isinstance(size, bool) and 0 < size <= _LARGEST:
         if (grid := _grid_of(float(size))) is not None:
             return grid
@@ -94,7 +97,7 @@ def grid_of(size: object) -> Grid:
 
 @functools.lru_cache(64)
 def _grid_of(size: float) -> Grid | None:
-    """Return the grid of a power of two or ten, else None."""
+    """Return the grid of a power of two or of ten, None for other sizes; cached."""
     mantissa, exponent = frexp(size)
     if mantissa == 0.5:
         half = (exponent - 1) // 2
@@ -109,14 +112,14 @@ def _grid_of(size: float) -> Grid | None:
 
 
 class _SnappedRings(NamedTuple):
-    """Valid rings snapped to whole numbers.
+    """Valid rings snapped to integer points.
 
     | field | topology kept | topology changed |
     | --- | --- | --- |
-    | n_moved | vertices that are no whole numbers | the same |
+    | n_moved | number of vertices that are no integer points | the same |
     | keeps_topology | True | False |
     | are_apart | no edge is within half a cell of another vertex | the same |
-    | vertices, offsets | the snapped rings | the whole points of all vertices |
+    | vertices, offsets | the snapped rings | the integer points of all vertices |
     | edges | by vertex the input vertex whose edge continues there; None: the same | None |
     | passages | unused | edges, and vertices whose pixels they pass |
     """
@@ -131,7 +134,7 @@ class _SnappedRings(NamedTuple):
 
 
 def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArray, budget: Budget) -> _SnappedRings:
-    """Snap valid rings (read-only arrays) to whole numbers; raises as `Budget.check`."""
+    """Snap valid rings (read-only arrays) to integer points; raises as `Budget.check`."""
     n = len(vertices)
     n_most, n_rings = max(64, n), len(offsets) - 1
     pixels, corners, starts = np.empty((n, 2)), np.empty(n, np.int32), np.empty(n_rings + 1, np.int64)
@@ -156,10 +159,9 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
 
 
 def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | None = None) -> PairResults:
-    """Return valid rings of one pair snapped to whole numbers: DONE, or MAY_CROSS if they must be arranged again.
-
-    Displacement is 0 where no vertex moved. sources: twice the vertex whose edge continues there. known: the result of
-    `snap_vertices` for these rings.
+    """Return valid rings of one pair snapped to integer points: DONE, or MAY_CROSS if they must be arranged again.
+    Displacement is 0 if no vertex moved. Each row of sources is twice the vertex whose edge continues there. known: the
+    result of `snap_vertices` for these rings.
     """
     vertices, offsets = rings.vertices, rings.ring_offsets
     on_grid = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
@@ -174,10 +176,9 @@ def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | 
 
 
 def snapped_overlay(pair: PairResults, snapped: _SnappedRings, grid: Grid, start: int) -> Overlay | None:
-    """Return the overlay of a pair whose topology snapping keeps, in the units of its input; else None.
-
-    Also None where doubles may not distinguish its multiples. start: the first vertex of the clip. Equal to the result
-    of `make_valid_after_rounding` and `from_units`.
+    """Return the overlay of a pair in the units of its input, if snapping keeps its topology; else None. None also if
+    doubles may not distinguish its multiples. start: the first vertex of the clip. Equal to the result of
+    `make_valid_after_rounding` and `from_units`.
     """
     if not snapped.keeps_topology:
         return None
@@ -199,7 +200,9 @@ def snapped_overlay(pair: PairResults, snapped: _SnappedRings, grid: Grid, start
 def _route_through_pixels(
     vertices: FloatArray, pixels: FloatArray, offsets: IntArray, passages: Int32Array
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return rings routed through the pixels that they pass, without repeated points, and by vertex its edge."""
+    """Return rings routed through the pixels that their edges pass, without repeated points, and by vertex its input
+    edge. passages (m, 2): edge, and vertex whose pixel it passes. pixels: by vertex.
+    """
     edges, others = passages.T
     ways = np.sign(vertices[next_in_rings(offsets)[edges]] - vertices[edges])
     along = (ways * pixels[others]).sum(axis=1)  # order: an edge that rises passes no pixel further left or below
@@ -217,12 +220,12 @@ def _route_through_pixels(
 
 
 def _sources_along(edges: IntArray) -> Any:
-    """Return the sources of vertices from which rings continue along these edges."""
+    """Return the sources (n, 2) int32 of vertices from which rings continue along these edges."""
     return np.repeat(edges.astype(np.int32), 2).reshape(-1, 2)
 
 
 def _are_distinguishable(units: FloatArray, offsets: IntArray) -> bool:
-    """Return whether valid rings certainly stay valid when each of these multiples is rounded to a double.
+    """Return whether valid rings of whole multiples provably stay valid when each multiple is rounded to a double.
 
     With C the largest coordinate, ``d = 2^-53 C`` bounds the displacement in cells. L: the longest edge along an axis,
     at least 1. To become invalid, a vertex c must reach an edge ab, within its box. Either abc turned before, by at
@@ -235,7 +238,7 @@ def _are_distinguishable(units: FloatArray, offsets: IntArray) -> bool:
 
 
 def _displacement(displacement: float, grid: Grid, largest: float) -> float:
-    """Return a displacement in units as one in coordinates, with the rounding of coordinates up to ``largest``."""
+    """Return a displacement in cells as a distance, with the rounding of coordinates up to ``largest`` added."""
     moved = grid.spacing * displacement
     if grid.base == 10 and largest > 0.0:  # units are rounded, and what they stand for
         moved += 2.0 * ulp(largest)
@@ -244,8 +247,7 @@ def _displacement(displacement: float, grid: Grid, largest: float) -> float:
 
 def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budget) -> Overlay:
     """Return an overlay in units of the grid as one in the units of its input, with its own rings as exact rings.
-
-    start: the first vertex of the clip. again: arranges rings.
+    start: the first vertex of the clip. again: function that arranges rounded rings.
     """
     vertices, largest = grid.to_coordinates(read_only(result.vertices))
     if grid.base == 10 and not _are_distinguishable(result.vertices, result.ring_offsets):

@@ -31,13 +31,13 @@ NO_RINGS: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, 
 
 
 def edges_along(sources: npt.NDArray[np.signedinteger]) -> IntArray:
-    """Return by vertex of a ring the input edge, by its first vertex, along which the ring continues."""
+    """Return, by vertex of a ring, the input edge (by its first vertex) along which the ring continues."""
     return np.where(sources[:, 1] < LEFT_OUT, LEFT_OUT - 1 - sources[:, 1], sources[:, 0]).astype(np.int64)
 
 
 @functools.lru_cache(64)
 def one_polygon(n_rings: int) -> IntArray:
-    """Return the ring offsets of one polygon."""
+    """Return the ring offsets of a single polygon of n_rings: [0, n_rings]; cached."""
     return read_only(np.array([0, n_rings]))
 
 
@@ -45,16 +45,15 @@ def areas_of(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray,
     sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray,
 ) -> tuple[FloatArray, int]:  # fmt: skip
-    """Return the areas that `sum_areas` fills, and how many are not certified."""
+    """Return the areas by `sum_areas`, and how many of them are NaN, not certified."""
     areas = np.empty(len(groups) - 1)
     sum_them = entry_of(sum_areas)
     return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas)
 
 
 def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArray) -> None:
-    """Raise unless sources, from a pickle, name existing input vertices; kernels do not check.
-
-    n_inputs: number of input vertices, one number or by row.
+    """Raise unless sources, read from a pickle, name existing input vertices; kernels do not check that. n_inputs:
+    number of input vertices, for all rows or by row.
     """
     if sources.shape != (np.size(n_inputs) if np.ndim(n_inputs) else len(sources), 2) or sources.dtype.kind != "i":
         raise InvalidArrayError(f"sources have dtype {sources.dtype} and shape {sources.shape}", ("sources",))
@@ -65,10 +64,9 @@ def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArr
 
 
 class ImplicitRings(NamedTuple):
-    """Exact rings over two polygons, computed on request.
-
-    sources: (n, 2) integers, see `overlay_pairs`; vertices of `clip` are counted after those of `subject`. offsets:
-    (n_rings + 1,) int64, where each ring begins.
+    """Exact rings whose vertices are input vertices or crossings, computed on request. sources: (n, 2) integers, see
+    `overlay_pairs`; vertices of `clip` are numbered after those of `subject`. offsets: (n_rings + 1,) int64, where each
+    ring begins.
     """
 
     subject: RingArrays
@@ -81,25 +79,22 @@ class ImplicitRings(NamedTuple):
         return len(self.offsets) - 1
 
     def check(self) -> None:
-        """Raise unless all is in range: for rings from a pickle."""
+        """Raise unless all indices are in range: for rings read from a pickle."""
         for side in (self.subject, self.clip):
             as_nested_offsets(len(as_points(side.vertices, 2)), offsets=side.offsets)
         as_nested_offsets(len(self.sources), offsets=self.offsets)
         check_sources(self.sources, len(self.subject.vertices) + len(self.clip.vertices))
 
     def certified_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
-        """Return (n,) float64, the nearest doubles of the areas of the rings groups[k] .. groups[k + 1] - 1, NaN if not
-        certified.
-
-        And the number of NaN.
+        """Return the summed areas of rings groups[k] .. groups[k + 1] - 1, (n,) float64 nearest doubles, NaN if not
+        certified. And the number of NaN.
         """
         items = one_polygon(len(self.subject.offsets) - 1), one_polygon(len(self.clip.offsets) - 1)
         return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
-        """Return those areas, by exact sums where the error bound does not certify them.
-
-        Raises `NotRepresentableError` where one is beyond the largest double.
+        """Return the areas of `certified_areas`, those not certified by exact sums. Raises `NotRepresentableError` for
+        an area beyond the largest double.
         """
         areas, n_uncertified = self.certified_areas(groups)
         for k in np.flatnonzero(np.isnan(areas)).tolist() if n_uncertified else ():
@@ -107,7 +102,7 @@ class ImplicitRings(NamedTuple):
         return areas
 
     def are_shells(self) -> BoolArray:
-        """Return by ring whether its exact area is positive, also where that is no double."""
+        """Return, by ring, whether its exact area is positive, even if no double represents it."""
         areas, n_uncertified = self.certified_areas(np.arange(self.n_rings + 1))
         is_shell = areas > 0.0
         if n_uncertified:
@@ -116,7 +111,7 @@ class ImplicitRings(NamedTuple):
         return is_shell
 
     def some(self, rings: Sequence[int]) -> ExactRings:
-        """Return some of the rings, by their numbers, as integers."""
+        """Return the rings with the given numbers as exact integers."""
         sources = [self.sources[self.offsets[ring] : self.offsets[ring + 1]] for ring in rings]
         offsets = np.cumsum([0, *map(len, sources)])
         return self._replace(sources=np.concatenate(sources), offsets=offsets).exact_rings()
@@ -143,7 +138,7 @@ class ImplicitRings(NamedTuple):
 
 
 def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
-    """Return rings of doubles as rings over themselves."""
+    """Return rings of doubles as implicit rings over themselves."""
     own = RingArrays(read_only(vertices), read_only(offsets))
     n, few = len(vertices), _FEW_IDENTITY_SOURCES
     sources = few[:n] if n <= len(few) else _identity_sources(n)
@@ -151,17 +146,19 @@ def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
 
 
 def _identity_sources(n: int) -> npt.NDArray[np.int32]:
+    """Return the sources (n, 2) of n input vertices in order."""
     sources = np.full((n, 2), -1, np.int32)
     sources[:, 0] = np.arange(n)
     return read_only(sources)
 
 
 _FEW_IDENTITY_SOURCES: Final = _identity_sources(1024)
-"""Sources of small rings, which are requested often."""
+"""Sources of small rings, made once."""
 
 
 def _ends_of_edges(vertices: FloatArray, offsets: IntArray, firsts: IntArray) -> IntArray:
-    """Return by vertex the next distinct vertex of its ring (itself if there is none)."""
+    """Return, for each vertex of `firsts`, the next vertex of its ring that differs from it (itself if there is none).
+    """
     rings = np.searchsorted(offsets, firsts, side="right") - 1
     starts, stops = offsets[rings], offsets[rings + 1]
     ends = firsts.copy()

@@ -35,7 +35,9 @@ def overlay_exactly(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:  # fmt: skip
-    """Return the overlay of checked rings (either may be empty), and the number of edge pairs decided exactly."""
+    """Return the overlay of checked rings (either side may be empty), and the number of edge pairs decided exactly.
+    is_on_grid: snap the result to integer points.
+    """
     subdivision, inside = _label_arrangement(subject, clip, SELECTED[operation], budget, nesting)
     arrangement = subdivision.arrangement
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces)
@@ -54,7 +56,7 @@ def overlay_exactly(
 
 
 def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[PairResults, IntArray]:
-    """Return the result of the kernel with `EACH_PART`, and by vertex the number of its exact place."""
+    """Return as the kernel with `EACH_PART`, and by vertex the number of its exact point."""
     subdivision, inside = _label_arrangement(subject, clip, range(4), budget)
     pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside])
     result = round_pieces(subdivision.arrangement, pieces)
@@ -66,7 +68,9 @@ def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tupl
 def _label_arrangement(
     subject: RingArrays, clip: RingArrays, selected: Sequence[int], budget: Budget, nesting: Nesting = UNNAMED
 ) -> tuple[Subdivision, list[int]]:
-    """Return the faces of the arrangement of checked rings, and by face the part of the result, or 0."""
+    """Return the subdivision of checked rings, and by face the part of the result that it belongs to, or 0. selected:
+    by label 0 .. 3, as of `overlay_pairs`.
+    """
     vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
     arrangement = arrange_rings(vertices, offsets, None, budget)
@@ -101,7 +105,7 @@ def _odd_sources(sources: Iterable[int]) -> _Sources:
 
 
 def _windings(arrangement: Arrangement, vertices: FloatArray, offsets: Sequence[int]) -> list[int]:
-    """Return by edge the number of rings along it minus the number against it."""
+    """Return, by edge of the arrangement, the number of input edges along it minus the number against it."""
     places = list(map(tuple, vertices.tolist()))
     along = [0] * len(places)
     for start, stop in itertools.pairwise(offsets):
@@ -116,9 +120,8 @@ def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
 
 
 def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResults:
-    """Return the nearest doubles of the nodes of all rings; DONE if nothing moves.
-
-    sources: twice the first of the edges along which the ring continues; vertices and crossings are not distinguished.
+    """Return the pieces with all nodes rounded to nearest doubles; DONE if none moves, else MAY_CROSS. Each row of
+    sources is twice the lowest edge along which the ring continues; vertices and crossings are alike.
     """
     rings, nodes = rings_of(pieces), arrangement.nodes
     half_edges = [half_edge for ring in rings for half_edge in ring]
@@ -133,7 +136,7 @@ def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResul
 
 
 def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
-    """Arrange the rounded rings of one pair again, exactly, and trace the pieces."""
+    """Arrange the rounded rings of one pair, exactly, by the rule AGAIN, and trace the pieces."""
     ends = rings.piece_offsets.tolist()
     holes_of = {shell: frozenset(range(shell + 1, end)) for shell, end in itertools.pairwise(ends)}
     sizes = np.repeat(ring_sizes(rings)[rings.piece_offsets[:-1]], np.diff(rings.piece_offsets)).tolist()
@@ -144,7 +147,7 @@ def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResult
 
     @functools.cache
     def classify(label: _Sources) -> tuple[bool, _Sources]:
-        """Return whether a face is inside, and the shells it lies in, or else the innermost holes."""
+        """Return whether a face is inside, and its shells, or the innermost holes if it is outside."""
         inside = frozenset(ring for ring in label if ring in holes_of and not label & holes_of[ring])
         holes = [] if inside else [ring for ring in label if ring not in holes_of]
         least = min((sizes[hole] for hole in holes), default=0.0)

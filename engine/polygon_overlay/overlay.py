@@ -165,7 +165,7 @@ def check_operation(operation: str) -> None:
 
 
 def polygons_in(solids: Sequence[Solid], name: str) -> Sequence[Solid]:
-    """Return polygons as they are, other shapes read; refuse anything else, by its place."""
+    """Return polygons, other shapes read; raise for anything that is no polygon, naming its index."""
     read = as_solids(solids, name)
     if set(map(type, read)) - {Polygon}:
         for k, each in enumerate(read):
@@ -174,7 +174,7 @@ def polygons_in(solids: Sequence[Solid], name: str) -> Sequence[Solid]:
 
 
 def rings_of(solid: object, *where: str | int) -> RingArrays:
-    """Return the rings of a polygon; refuse anything else."""
+    """Return the rings of a polygon; raise for anything else."""
     if not isinstance(solid, Polygon):
         kind = solid.type if isinstance(solid, Solid) else type(solid).__name__
         raise UnsupportedSolidError(
@@ -189,9 +189,9 @@ def overlay_rings(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     grid: float | None = None,
 ) -> tuple[Overlay, int, int]:  # fmt: skip
-    """Return the overlay of checked rings (either may be empty), and the edge pairs decided exactly, and in rationals.
-
-    nesting: of the rings of the subject, for a rule other than even-odd in either; then no clip, and "union".
+    """Return the overlay of checked rings (either side may be empty), edge pairs decided exactly, and those in
+    rationals. nesting: of the subject's rings, for a rule other than even-odd; then there is no clip, and the operation
+    is "union".
     """
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
@@ -212,14 +212,15 @@ def overlay_rings(
 
 
 def ulps_moved(result: Overlay) -> float:
-    """Return the largest displacement of a vertex in units in the last place of the largest coordinate."""
+    """Return the largest displacement of a vertex, in units in the last place of the largest coordinate; at least 0.5.
+    """
     if not result.vertices_moved:
         return 0.5
     return max(0.5, result.largest_displacement / float(np.spacing(np.abs(result.vertices).max())))
 
 
 def accuracy_of(ulps: float, n_edges: int, n_exact: int, n_rational: int) -> Accuracy:
-    """Return the report of one or many overlays; ulps: the largest of them."""
+    """Return the accuracy report of one or many overlays; ulps: the largest displacement."""
     return Accuracy(
         decisions="exact", coordinates_ulp=ulps, n_items=n_edges, n_beyond_filter=n_exact, n_rational=n_rational,
         method="arrangement",
@@ -299,7 +300,7 @@ def union_all(
 
 
 def less_all(subject: Polygon, clips: Sequence[Polygon], budget: Budget) -> tuple[Overlay, Accuracy]:
-    """Return a polygon, which has rings, minus the union of others."""
+    """Return a polygon with at least one ring, minus the union of others."""
     return _arrange_all([subject, *clips], Rule.FIRST_ALONE, budget)
 
 
@@ -359,7 +360,7 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
 def _arrange_all(
     polygons: Sequence[Solid], rule: Rule, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
-    """Arrange the rings of all polygons, each polygon a source."""
+    """Return the overlay of the rings of all polygons by a fill rule, each polygon a source."""
     rings, sources, starts = _rings_of_all(polygons)
     nesting = Nesting(sources, np.zeros(0), int(rule))
     result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)
@@ -368,9 +369,8 @@ def _arrange_all(
 
 
 def _rings_of_all(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
-    """Return the rings of all polygons, by ring the number of its polygon, and the first vertices of all but the first.
-
-    Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
+    """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of each polygon but the
+    first. Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
     """
     each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
     if not each:

@@ -52,7 +52,7 @@ def one_pair(
     vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, displacement: float, n_exact: int,
     sources: Int32Array | None = None, status: int = PairStatus.DONE,
 ) -> PairResults:  # fmt: skip
-    """Return the result of one pair; without sources: all zero."""
+    """Return the result of one pair; without sources these are zero."""
     counts = np.array([[len(piece_offsets) - 1, len(ring_offsets) - 1, len(vertices), n_exact]])
     sources = np.zeros((len(vertices), 2), np.int32) if sources is None else sources
     outcome = np.array([status], np.int8), counts, np.array([displacement])
@@ -60,7 +60,7 @@ def one_pair(
 
 
 def take_pairs(pairs: PairResults, items: IntArray) -> PairResults:
-    """Return the results of the pairs ``items``, in this order, without evidence."""
+    """Return the results of pairs ``items``, in this order, without evidence."""
     of_pieces, of_rings, of_vertices = (places_of(summed(pairs.counts[:, k]), items) for k in range(3))
     return PairResults(
         pairs.status[items], pairs.counts[items], pairs.displacement[items], pairs.vertices[of_vertices],
@@ -77,7 +77,7 @@ def places_of(offsets: IntArray, items: IntArray) -> IntArray:
 
 
 def concatenate_pairs(parts: list[PairResults]) -> PairResults:
-    """Return the pairs of all parts, at least one, without evidence."""
+    """Concatenate the pairs of at least one part, without evidence."""
     if len(parts) == 1:
         return parts[0]._replace(evidence=NO_EVIDENCE)
     outcomes = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[:3])
@@ -85,24 +85,24 @@ def concatenate_pairs(parts: list[PairResults]) -> PairResults:
 
 
 def concatenate_parts(parts: Sequence[Sequence[Any]]) -> list[Any]:
-    """Return vertices, sources, ring offsets, piece offsets and evidence of some parts, concatenated."""
+    """Concatenate tuples (vertices, sources, ring offsets, piece offsets, evidence)."""
     vertices, sources, ring_offsets, piece_offsets, evidence = zip(*parts, strict=True)
     offsets = concatenate_offsets(ring_offsets), concatenate_offsets(piece_offsets)
     return [np.concatenate(vertices), np.concatenate(sources), *offsets, np.concatenate(evidence)]
 
 
 def concatenate_offsets(offsets: Sequence[IntArray]) -> IntArray:
-    """Return the offsets of concatenated arrays."""
+    """Return the offsets of concatenated arrays from the offsets of each."""
     return summed(np.concatenate([np.zeros(0, np.int64), *(each[1:] - each[:-1] for each in offsets)]))
 
 
 def ring_of_vertices(offsets: IntArray) -> IntArray:
-    """Return by vertex the number of its ring."""
+    """Return, by vertex, the number of its ring."""
     return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
 
 
 def ring_sizes(rings: PairResults) -> FloatArray:
-    """Return by ring the width plus the height of its box."""
+    """Return, by ring, the width plus the height of its box, halved."""
     starts = rings.ring_offsets[:-1]
     if not len(starts):
         return np.zeros(0)
@@ -111,23 +111,25 @@ def ring_sizes(rings: PairResults) -> FloatArray:
 
 
 _LEAST: Final = 3
-"""Fewest positions of a ring with area."""
+"""Smallest number of positions of a ring with area."""
 
 
 class PolygonArrays(NamedTuple):
-    """vertices (n, 2) float64; ring_offsets into them, no ring repeats its first; polygon_offsets into the rings."""
+    """Polygons as flat arrays: vertices (n, 2) float64; ring_offsets into them, first vertices not repeated;
+    polygon_offsets into the rings.
+    """
 
     vertices: FloatArray
     ring_offsets: IntArray
     polygon_offsets: IntArray
 
     def polygon(self, number: int) -> Polygon:
-        """Return one polygon, as a view."""
+        """Return polygon ``number`` as a view."""
         rings = self.ring_offsets[self.polygon_offsets[number] : self.polygon_offsets[number + 1] + 1]
         return Polygon.of_arrays(self.vertices[rings[0] : rings[-1]], read_only(rings - rings[0]))
 
     def take(self, numbers: IntArray) -> PolygonArrays:
-        """Return the polygons `numbers`, in this order."""
+        """Return polygons `numbers`, in this order."""
         rings = places_of(self.polygon_offsets, numbers)
         return PolygonArrays(
             read_only(self.vertices[places_of(self.ring_offsets, rings)]),
@@ -136,7 +138,7 @@ class PolygonArrays(NamedTuple):
         )
 
     def merged(self, groups: IntArray) -> PolygonArrays:
-        """Return polygons, each of the rings of polygons groups[k] .. groups[k + 1] - 1."""
+        """Return one polygon for each group: the rings of polygons groups[k] .. groups[k + 1] - 1."""
         return self._replace(polygon_offsets=read_only(self.polygon_offsets[groups]))
 
     def sizes(self) -> IntArray:
@@ -145,12 +147,12 @@ class PolygonArrays(NamedTuple):
         return starts[1:] - starts[:-1]
 
     def largest_counts(self) -> tuple[int, int]:
-        """Return the largest numbers of vertices and of rings of a polygon."""
+        """Return the largest number of vertices of one polygon, and the largest number of rings."""
         largest: tuple[int, int] = entry_of(largest_counts)(self.ring_offsets, self.polygon_offsets)
         return largest
 
     def boxes(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the low and high corners (n, 2) of the polygons `numbers`, ascending and not empty."""
+        """Return the low and high corners (n, 2) of the boxes of polygons `numbers`, ascending and none empty."""
         starts = self.ring_offsets[self.polygon_offsets[numbers]]
         if not len(starts):
             return np.zeros((0, 2)), np.zeros((0, 2))
@@ -158,7 +160,7 @@ class PolygonArrays(NamedTuple):
 
 
 def arrays_of(coordinates: object, ring_offsets: object, polygon_offsets: object) -> PolygonArrays:
-    """Return the input of `polygons` as arrays; rings of two positions are left out. Raises as `polygons`."""
+    """Return the input of `polygons` as flat arrays; rings of two positions are dropped. Raises as `polygons`."""
     vertices, starts, ends, groups = parted(coordinates, ring_offsets, polygon_offsets)
     sizes = ends - starts
     if len(single := np.flatnonzero(sizes == 1)):
@@ -171,7 +173,7 @@ def arrays_of(coordinates: object, ring_offsets: object, polygon_offsets: object
 
 
 def concatenate_polygons(parts: Sequence[PolygonArrays]) -> PolygonArrays:
-    """Return the polygons of some parts, at least one, concatenated."""
+    """Concatenate the polygons of at least one part."""
     return PolygonArrays(
         read_only(np.concatenate([part.vertices for part in parts])),
         concatenate_offsets([part.ring_offsets for part in parts]),
@@ -180,7 +182,7 @@ def concatenate_polygons(parts: Sequence[PolygonArrays]) -> PolygonArrays:
 
 
 def polygon_arrays_of(polygons: Sequence[Polygon]) -> PolygonArrays:
-    """Return polygons as arrays, joined as bytes: numpy takes three times as long to concatenate small ones."""
+    """Return polygons as flat arrays, joined as bytes: numpy takes three times as long to concatenate small ones."""
     if len(polygons) == 1:
         return PolygonArrays(polygons[0].vertices, polygons[0].ring_offsets, one_polygon(polygons[0].n_rings))
     vertices = np.frombuffer(b"".join(cast("list[bytes]", [each.vertices for each in polygons])))
@@ -194,7 +196,7 @@ def polygon_arrays_of(polygons: Sequence[Polygon]) -> PolygonArrays:
 
 
 class PolygonSelection(Sequence[Polygon]):
-    """Some polygons of arrays, by their numbers; indexing makes an object."""
+    """A sequence of polygons of flat arrays, by their numbers; indexing makes an object."""
 
     def __init__(self, arrays: PolygonArrays, numbers: IntArray) -> None:
         self._arrays, self._numbers = arrays, numbers
@@ -212,7 +214,7 @@ class PolygonSelection(Sequence[Polygon]):
         return self._arrays.polygon(int(self._numbers[place]))
 
     def arrays(self) -> PolygonArrays:
-        """Return them as arrays of their own."""
+        """Return the selected polygons as flat arrays, copied."""
         return self._arrays.take(self._numbers)
 
     @property

@@ -24,14 +24,14 @@ from engine.types import FloatArray, IntArray
 
 
 class OverlayOptions(Options, total=False):
-    """Further keyword options of overlays."""
+    """Keyword options of overlays, besides the common ones."""
 
     grid: float | None
 
 
 @functools.lru_cache(64)
 def _all_of(n_rings: int) -> IntArray:
-    """Return all rings as one group."""
+    """Return the group offsets of all n_rings as one group: [0, n_rings]; cached."""
     return np.array([0, n_rings])
 
 
@@ -80,9 +80,8 @@ _Place = tuple[Fraction, Fraction]
 
 
 class Lost(NamedTuple):
-    """Parts of an exact result that rounding lost: shells of pieces, and holes, by their ring numbers.
-
-    piece_offsets: of the exact result. unit: the unit of the coordinates.
+    """Parts of an exact result that rounding removed: pieces by their shells, and holes, by ring numbers.
+    piece_offsets: of the exact result. unit: factor from the exact rings' coordinates to the caller's.
     """
 
     exact: Exact
@@ -92,12 +91,12 @@ class Lost(NamedTuple):
     unit: Fraction = Fraction(1)
 
     def shells(self) -> list[list[tuple[float, float]]]:
-        """Return the shells of pieces, rounded."""
+        """Return the shells of lost pieces, as rounded vertices."""
         places = self.exact.some(self.pieces).places()
         return [[(nearest(x), nearest(y)) for x, y in ring] for ring in places]
 
     def parts(self, budget: Budget) -> tuple[Collapse, ...]:
-        """Return the pieces, then the holes, each in lexicographic order; raises as `Budget.check`."""
+        """Return the lost pieces, then the lost holes, each sorted lexicographically; raises as `Budget.check`."""
         if not self.pieces and not self.holes:
             return ()
         ends = dict(pairwise(self.piece_offsets.tolist()))
@@ -126,7 +125,7 @@ class Lost(NamedTuple):
 
 
 def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
-    """Return a ring from its smallest vertex on, and that vertex rounded."""
+    """Return the vertices of a ring rotated to begin with the smallest (x, then y), and that vertex rounded."""
     (places,) = ring.places()
     k = places.index(min(places))
     x, y = places[k]
@@ -134,7 +133,7 @@ def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
 
 
 def nearest(value: Fraction) -> float:
-    """Return the nearest double."""
+    """Return the double nearest to a fraction."""
     return nearest_quotient(*value.as_integer_ratio())
 
 
@@ -293,9 +292,8 @@ class Overlay(ByValue):
 
     @property
     def piece_areas(self) -> FloatArray:
-        """Areas of the pieces of the exact result, holes take_pairs off: (n_pieces_exact,), the nearest doubles.
-
-        Where rounding lost, joined or parted none these are those of `pieces`, in their order.
+        """Areas of the pieces of the exact result, holes subtracted: (n_pieces_exact,), the nearest doubles. Where
+        rounding lost, joined or parted none these are those of `pieces`, in their order.
         """
         return self.exact.nearest_areas(np.append(np.flatnonzero(self.exact.are_shells()), self.exact.n_rings))
 
@@ -303,7 +301,7 @@ class Overlay(ByValue):
 def build_overlay(
     vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, exact: Exact, **fields: Any
 ) -> Overlay:
-    """Return an `Overlay` of read-only arrays; the counts of its exact result default to its own."""
+    """Make an `Overlay` of read-only arrays; counts of the exact result default to those of the arrays."""
     fields.update(vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets, exact=exact)
     if "n_pieces_exact" not in fields:
         fields["n_pieces_exact"], fields["n_holes_exact"] = (

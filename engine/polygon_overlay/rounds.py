@@ -31,7 +31,7 @@ from engine.running.budget import Budget
 from engine.types import OPEN, BoolArray, FloatArray, IntArray, read_only
 
 MAX_ROUNDS: Final = 12
-"""Rounds before snapping: on 4,296 results of public test pairs all but 14 had ended by then."""
+"""Rounds before snapping: of 4,296 results of public test pairs all but 14 ended earlier."""
 
 
 Arranger = Callable[[PairResults, Budget], PairResults]
@@ -40,10 +40,9 @@ Arranger = Callable[[PairResults, Budget], PairResults]
 def make_valid_after_rounding(
     first: PairResults, exact: Exact, rearrange: Arranger, may_snap: bool, budget: Budget, snap: Arranger | None = None
 ) -> Overlay | None:
-    """Arrange a pair until it is valid; None if ``rearrange`` cannot, or snapping is needed but not possible.
-
-    exact: the rings that ``first`` is rounded from. rearrange: arranges rounded rings, with evidence. may_snap: the
-    rings are those of ``exact``, not scaled. snap: puts valid rings on whole numbers (grid.py).
+    """Arrange the rounded rings of a pair until they are valid; None if ``rearrange`` cannot, or snapping is needed but
+    not possible. exact: the rings that ``first`` is rounded from. rearrange: arranges rounded rings, with evidence.
+    may_snap: the rings are those of ``exact``, not scaled. snap: moves valid rings to integer points (grid.py).
     """
     rings, displacement = first, float(first.displacement[0])
     rounds = int(displacement > 0.0)
@@ -85,7 +84,9 @@ def make_valid_after_rounding(
 
 
 def _changes(first: PairResults, rings: PairResults, origins: IntArray, exact: Exact) -> dict[str, Any]:
-    """Return the counts of joined, parted and lost parts of a pair, as fields of `Overlay`."""
+    """Return the counts of joined, parted and lost pieces and holes of a pair, as fields of `Overlay`. origins: rows
+    (ring of `rings`, ring of `first` that it comes from).
+    """
     is_shell, was_shell = _shells(rings), _shells(first)
     of_shells = is_shell[origins[:, 0]]
     pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
@@ -100,14 +101,16 @@ def _changes(first: PairResults, rings: PairResults, origins: IntArray, exact: E
 
 
 def _shells(pair: PairResults) -> BoolArray:
-    """Return by ring whether it is a shell."""
+    """Return, by ring of a pair, whether it is the shell of a piece."""
     is_shell = np.zeros(pair.counts[0, 1], np.bool_)
     is_shell[pair.piece_offsets[:-1]] = True
     return is_shell
 
 
 def _compose_origins(evidence: IntArray, origins: IntArray) -> IntArray:
-    """Return the origins of rings, composed with those of the round before."""
+    """Return rows (ring, original ring): the evidence (ring, ring of the round before) composed with that round's
+    origins.
+    """
     offsets = np.searchsorted(origins[:, 0], np.arange(evidence[:, 1].max(initial=-1) + 2))
     sizes = np.diff(offsets)[evidence[:, 1]]
     through = origins[places_of(offsets, evidence[:, 1]), 1]
@@ -115,14 +118,15 @@ def _compose_origins(evidence: IntArray, origins: IntArray) -> IntArray:
 
 
 def build_valid_overlay(rings: PairResults, first: PairResults, exact: Exact, **fields: Any) -> Overlay:
-    """Return the `Overlay` of valid rings; first: the rings before; fields: what became of its parts."""
+    """Make the `Overlay` of valid rings; first: the rings before rounding; fields: what became of their parts."""
     n_pieces, n_rings = first.counts[0, :2].tolist()
     arrays = read_only(rings.vertices), read_only(rings.ring_offsets), read_only(rings.piece_offsets)
     return build_overlay(*arrays, exact, n_pieces_exact=n_pieces, n_holes_exact=n_rings - n_pieces, **fields)
 
 
 def _snap_exact_rings(first: PairResults, exact: Exact, budget: Budget) -> tuple[PairResults, float]:
-    """Return the exact rings snapped to the lattice of their largest coordinate, and half a pixel's diagonal."""
+    """Return the exact rings snapped to the lattice of the largest coordinate's ulp, and half the diagonal of a pixel.
+    """
     spacing = ulp(float(np.abs(first.vertices).max()))
     snapped, along = snap_rings(exact.some(range(first.counts[0, 1])).places(), frexp(spacing)[1] - 1, budget)
     vertices = np.array([vertex for ring in snapped for vertex in ring])
@@ -133,7 +137,7 @@ def _snap_exact_rings(first: PairResults, exact: Exact, budget: Budget) -> tuple
 
 
 def n_moved(images: FloatArray, vertices: FloatArray, are_whole: bool = False) -> int:
-    """Return how many vertices are not among ``images``; are_whole: the vertices are whole numbers."""
+    """Return how many of `vertices` are not among ``images``; are_whole: all vertices are integers."""
     if are_whole:  # order: few images are, and a search among all takes longer than an overlay
         images = images[(images == np.rint(images)).all(axis=1)]
     known, places = (np.ascontiguousarray(each).view(np.complex128).ravel() for each in (images, vertices))
@@ -141,11 +145,11 @@ def n_moved(images: FloatArray, vertices: FloatArray, are_whole: bool = False) -
 
 
 def count_changes(is_exact: BoolArray, origins: IntArray, n_parts: int) -> tuple[list[int], int, int]:
-    """Return the lost exact parts, the number of joins and the number of partings.
+    """Return the numbers of lost exact parts, the number of joins, and the number of partings.
 
-    is_exact: which rings of the exact result are such parts. origins: rows of an output part and an exact part that it
-    comes from. n_parts: output parts. Linked by origins, a group of e exact and o output parts counts e - 1 joins and
-    o - 1 partings; an output part without origin counts as parted.
+    is_exact: which rings of the exact result are such parts. origins: rows (output part, exact part it comes from).
+    n_parts: output parts. Linked by origins, a group of e exact and o output parts counts e - 1 joins and o - 1
+    partings; an output part without origin counts as parted.
     """
     survivors = np.unique(origins[:, 1])
     is_lost = is_exact.copy()
@@ -163,8 +167,8 @@ def count_changes(is_exact: BoolArray, origins: IntArray, n_parts: int) -> tuple
 
 
 class ValidPairs(NamedTuple):
-    """pairs: (n,) int64, their numbers; rings: their rings, pair after pair; ulps: the largest displacement of a
-    vertex, in units in the last place of the largest coordinate.
+    """Pairs that are valid after rounding: their numbers (n,) int64; their rings, pair after pair; ulps: the largest
+    displacement of a vertex, in units in the last place of the largest coordinate.
     """
 
     pairs: IntArray
@@ -173,10 +177,9 @@ class ValidPairs(NamedTuple):
 
 
 def make_pairs_valid(first: PairResults, rearrange: Arranger, budget: Budget) -> ValidPairs:
-    """Arrange the pairs of ``first`` that are MAY_CROSS until they are valid, all in one call of ``rearrange`` a round.
-
-    Left out are those that become OPEN, or are not valid after the last round. Only rings are returned: lost and joined
-    parts are computed for single pairs, on request. Raises as `Budget.check`.
+    """Arrange the MAY_CROSS pairs of ``first`` until they are valid, all in one call of ``rearrange`` a round. Pairs
+    that become OPEN, or are not valid after the last round, are omitted. Only rings are returned: lost and joined parts
+    are computed for single pairs, on request. Raises as `Budget.check`.
     """
     pairs = np.flatnonzero(first.status == PairStatus.MAY_CROSS)
     rings = take_pairs(first, pairs)
@@ -212,7 +215,9 @@ def make_pairs_valid(first: PairResults, rearrange: Arranger, budget: Budget) ->
 
 
 def _ulps_moved(first: PairResults, pairs: IntArray, valid: PairResults, doubtful: IntArray) -> float:
-    """Return `ValidPairs.ulps` of ``valid``, the ``pairs`` of ``first``; doubtful: those that may have new vertices."""
+    """Return `ValidPairs.ulps` of ``valid``, which are ``pairs`` of ``first``; doubtful: pairs that may have new
+    vertices.
+    """
     ulps = 0.5
     for k in range(len(doubtful)):
         before, now = take_pairs(first, pairs[doubtful[k : k + 1]]), take_pairs(valid, doubtful[k : k + 1])

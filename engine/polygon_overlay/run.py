@@ -49,20 +49,20 @@ SELECTED: Final = {  # by the label of a face: in neither, in the subject, in th
 }
 SELECTED_ARRAYS: Final = {name: np.array(selected, np.uint8) for name, selected in SELECTED.items()}
 EACH_PART: Final = np.arange(4, dtype=np.uint8)
-"""Selects what lies in the subject alone, in the clip alone and in both, as parts 1, 2 and 3 of one result."""
+"""Selection of three parts in one result: subject alone, clip alone and both, as parts 1, 2 and 3."""
 NOT_REDUCED: Final = Loaded(0, 0, 0, 0.0)
-"""Placeholder of the result of reduce_pair."""
+"""In place of a result of `reduce_pair`: the pair is loaded in full."""
 UNNAMED: Final = Nesting(np.zeros(0, np.int64), np.zeros(0), int(Rule.PAIR))
-"""The nesting of two polygons."""
+"""The nesting of two polygons, without provenance of rings."""
 _MANY: Final = 500
-"""Vertices of a pair from which on blocks of edges are tested first."""
+"""Smallest number of vertices of a pair for which blocks of edges are tested first."""
 _MANY_IN_RING: Final = 64
-"""Vertices by ring from which on: blocks of small rings are no better than their edges."""
+"""Smallest number of vertices a ring for that: blocks of small rings are no better than their edges."""
 _BLOCK: Final = 16
 _BLOCKS_GROW: Final = 10_000
-"""Edges of a block; vertices from which on blocks are twice as large."""
+"""Edges of a block (_BLOCK); number of vertices from which blocks are twice as large."""
 _MOST: Final = 0.5
-"""Largest fraction of edges that may be active so that a reduction pays."""
+"""Largest fraction of edges that may be active for a reduction to pay."""
 _BY_CONTACT: Final = 300
 _BY_VERTEX: Final = 200
 """Upper bounds in bytes of scratch and output."""
@@ -72,10 +72,9 @@ _FEW_CONTACTS: Final = 1024
 def run_kernel(
     subjects: PolygonArrays, clips: PolygonArrays, selected: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
 ) -> PairResults:
-    """Overlay polygons pair by pair; raises as `Budget.check`.
-
-    selected: as of `overlay_pairs`, one of `SELECTED_ARRAYS`, or `EACH_PART`. nesting: of the rings of subjects, each a
-    source of its own, as of `overlay_pairs`.
+    """Overlay polygons pair by pair; raises as `Budget.check`. selected: as of `overlay_pairs`, one of
+    `SELECTED_ARRAYS`, or `EACH_PART`. nesting: of the rings of subjects, each a source of its own, as of
+    `overlay_pairs`.
     """
     n_vertices, n_rings = map(sum, zip(subjects.largest_counts(), clips.largest_counts(), strict=True))
     is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and selected[3] < 2
@@ -91,10 +90,9 @@ def run_blocks(
     subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], selected: FlagArray, budget: Budget,
     nesting: Nesting = UNNAMED, size: int = 0, max_active: float = _MOST,
 ) -> PairResults | None:  # fmt: skip
-    """Overlay polygons pair by pair; with a ``size``, one pair reduced by blocks of so many edges.
-
-    Then None where a fraction ``max_active`` or more of the edges is active, or the pair is not DONE: doubtful rounded
-    rings are arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair.
+    """Overlay polygons pair by pair; with a ``size``, one pair reduced by blocks of so many edges. In that case None if
+    a fraction ``max_active`` or more of the edges is active, or the pair is not DONE: doubtful rounded rings are
+    arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair.
     """
     n, (n_vertices, n_rings) = len(subjects.polygon_offsets) - 1, largest
     first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
@@ -138,7 +136,7 @@ def run_blocks(
 
 
 def _expand(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> list[Any]:
-    """Return vertices, sources and ring offsets with the left-out vertices reinserted."""
+    """Return vertices, sources and ring offsets of a part with its n_left_out omitted vertices inserted."""
     n = len(part[0]) + n_left_out
     expanded = [np.empty((n, 2)), np.empty((n, 2), np.int32), np.empty_like(part[2])]
     entry_of(expand_rings)(*part[:3], subject.vertices, clip.vertices, budget.flag, *expanded)
@@ -149,7 +147,7 @@ def _expand(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArr
 def _run_pair(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting
 ) -> PairResults:
-    """Overlay one pair; large ones are charged to the budget first."""
+    """Overlay one pair; the memory of large ones is charged to the budget first."""
     if (n_vertices := len(subject.vertices) + len(clip.vertices)) >= _MANY:
         budget.take(_BY_VERTEX * n_vertices)
     first, second = (PolygonArrays(*side, one_polygon(len(side.offsets) - 1)) for side in (subject, clip))
@@ -160,10 +158,9 @@ def overlay_compiled(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
-    """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN.
-
-    grid: the grid whose units the coordinates are in; those of the overlay are not. A scene outside the kernel's range
-    is scaled into it by a power of two where that is exact.
+    """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN. grid: the
+    coordinates are in its units. A scene outside the kernel's range is scaled into it by a power of two, if that is
+    exact.
     """
     pair, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
     if pair.status[0] == OPEN:
@@ -206,7 +203,7 @@ def overlay_compiled(
 
 
 def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
-    """Arrange the rounded rings of each pair again, each a source of its own."""
+    """Arrange the rounded rings of each pair by the rule AGAIN, each ring a source of its own."""
     n_rings = rings.counts[:, 1]
     items = summed(n_rings)
     shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))
@@ -217,13 +214,13 @@ def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResult
 
 
 def as_overlay(vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings) -> Overlay:
-    """Return an `Overlay` whose rounded rings have the topology of the exact ones; all arrays are read-only."""
+    """Make an `Overlay` whose rounded rings have the topology of the exact ones; all arrays are read-only."""
     fields = {"largest_displacement": displacement, "rounds": int(displacement > 0.0)}
     return build_overlay(vertices, exact.offsets, piece_offsets, exact, **fields)
 
 
 def overlay_few(subject: Polygon, clip: Polygon, selected: FlagArray) -> Overlay | None:
-    """Return the overlay of two polygons, without a deadline; None if they are large, or not DONE."""
+    """Return the overlay of two small polygons, without a deadline; None if they are large, or not DONE."""
     first, second = RingArrays(subject.vertices, subject.ring_offsets), RingArrays(clip.vertices, clip.ring_offsets)
     if len(first.vertices) + len(second.vertices) > FEW_VERTICES:
         return None
@@ -265,7 +262,7 @@ def overlay_few(subject: Polygon, clip: Polygon, selected: FlagArray) -> Overlay
 def _fields(
     subject: RingArrays, clip: RingArrays, vertices: bytes, sources: bytes, rings: tuple[bytes, bytes] | None
 ) -> dict[str, Any]:
-    """Return the fields of an `Overlay` that are made when one of them is read."""
+    """Return the fields of an `Overlay` computed on first access, from the kernel's output as bytes."""
     places = np.frombuffer(vertices).reshape(-1, 2)
     ring_offsets, piece_offsets = one_polygon(len(places)), one_polygon(1)
     if rings is not None:

@@ -42,16 +42,14 @@ _FIRST: Final = 1
 _SECOND: Final = 2
 _BOTH: Final = 3
 _OF_A_CROSSING: Final = 3
-"""Number of parts that meet where two edges cross."""
+"""Number of parts that meet where exactly two edges cross."""
 _BLOCK: Final = 1024
-"""Pairs that are evaluated together: the overhead of numpy's calls is that of some hundred pairs."""
+"""Pairs evaluated together: the overhead of numpy's calls is that of some hundred pairs."""
 
 
 class Touching(NamedTuple):
-    """Lines and points of some pairs.
-
-    lines, points: the pair of each. vertices (n, 2) float64 of all lines, offsets of each into them; places (n_points,
-    2) float64.
+    """Lines and points of many pairs of polygons. lines, points: the pair of each line and point. vertices (n, 2)
+    float64 of all lines, offsets of lines into them; places (n_points, 2) float64.
     """
 
     lines: IntArray
@@ -100,10 +98,11 @@ def touching(
 
 
 def _may_touch(arranged: PairResults) -> BoolArray:
-    """Return by pair whether it may touch: not where floats prove every sign and edges cross only in pairs of one each.
+    """Return, by pair, False if it provably has no common line or isolated point.
 
-    At such a crossing two edges are named by three of the four wedges. Else either a third edge is named, at most
-    twice; or, where so many edges pass that opposite wedges are in one part, any two are named an even number of times.
+    That is where floats prove every sign and edges cross only in pairs of one each. At such a crossing two edges are
+    named by three of the four wedges. Else either a third edge is named, at most twice; or, where so many edges pass
+    that opposite wedges are in one part, any two are named an even number of times.
     """
     pairs = np.repeat(np.arange(len(arranged.status)), arranged.counts[:, 2])
     is_crossing = arranged.sources[:, 1] >= 0
@@ -116,9 +115,8 @@ def _may_touch(arranged: PairResults) -> BoolArray:
 
 
 def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
-    """Return by vertex the number of its place within its pair; pairs: by ring.
-
-    Valid rounded rings have no two exact places with the same doubles.
+    """Return, by vertex, a number that vertices at one point of one pair share; pairs: by ring. Valid rounded rings
+    have no two exact points with the same doubles.
     """
     keys = *arranged.vertices.T, np.repeat(pairs, np.diff(arranged.ring_offsets))
     order = np.lexsort(keys)
@@ -132,7 +130,8 @@ def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
 
 
 def _extract(arranged: PairResults, parts: IntArray, pairs: IntArray, places: IntArray) -> Touching:
-    """Return the lines and points of rings; parts, pairs: by ring; places: by vertex the number of its place."""
+    """Return the lines and points of arranged rings; parts, pairs: by ring; places: by vertex the number of its point.
+    """
     rings, after = ring_of_vertices(arranged.ring_offsets), next_in_rings(arranged.ring_offsets)
     n_places = int(places.max(initial=0)) + 1
     part = parts[rings]
@@ -154,9 +153,8 @@ def _extract(arranged: PairResults, parts: IntArray, pairs: IntArray, places: In
 def _order_lines(
     offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: BoolArray
 ) -> tuple[IntArray, IntArray]:
-    """Return the edges of lines, by their first vertices, line after line, and where each line begins.
-
-    goes_on: by vertex, whether at most two edges of lines meet there.
+    """Return the edges of lines, by their first vertices, line after line, and the index of the first edge of each
+    line. goes_on: by vertex, whether at most two edges of lines meet there.
     """
     sizes = np.diff(offsets)
     is_head = is_line & ~(is_line[np.arange(len(rings)) - 1] & goes_on)
@@ -173,7 +171,7 @@ def _order_lines(
 
 
 def concatenate_touching(parts: list[Touching]) -> Touching:
-    """Return the lines and points of all parts, concatenated."""
+    """Concatenate the lines and points of all parts."""
     lines, vertices, offsets, points, places = zip(*parts)
     return Touching(
         np.concatenate(lines), np.concatenate(vertices), concatenate_offsets(offsets), np.concatenate(points),
@@ -185,9 +183,8 @@ Place = tuple[float, float]
 
 
 def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touching:
-    """Return the lines and points to which rounding collapsed closed rings, given with their pairs.
-
-    A ring at one place is a point; else its edges, split at other vertices on them, each once, joined to lines.
+    """Return the lines and points to which rounding collapsed closed rings, given as (pair, vertices). A ring at one
+    place is a point; else its edges, split at other vertices on them, each once, joined to lines.
     """
     lines: list[tuple[int, list[Place]]] = []
     points: list[tuple[int, Place]] = []
@@ -205,7 +202,7 @@ def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touch
 
 
 def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
-    """Return the edges of a ring split at its vertices, decided exactly, each once and sorted."""
+    """Return the edges of a ring split at its vertices (exact), each once, sorted."""
     places = np.array(sorted(set(ring)))
     edges: set[tuple[Place, Place]] = set()
     for start, end in zip(ring, ring[1:] + ring[:1]):
@@ -223,7 +220,7 @@ def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
 
 
 def _join_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
-    """Return chains of edges, joined wherever exactly two meet."""
+    """Return polylines of edges, joined at each point where exactly two edges meet."""
     neighbours: dict[Place, list[Place]] = {}
     for start, end in edges:
         neighbours.setdefault(start, []).append(end)

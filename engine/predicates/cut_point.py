@@ -44,21 +44,22 @@ from engine.types import FloatArray
 
 CUT_BOUND: Final = 64.0 * U2
 POINT_BOUND: Final = 48.0 * U2
-"""Of `point_at`, times |p| + |t (q - p)|: t has 18 u^2; the low parts, none above u (|p| + 3.1 |t (q - p)|), lose 17
-u^2 in five sums and two products, their product that is left out 3.1 u^2, the test 6 u^2: below 45 u^2.
+"""Error bound of `point_at`, times |p| + |t (q - p)|. t has 18 u^2; the low parts, none above u (|p| + 3.1 |t (q -
+p)|), lose 17 u^2 in five sums and two products, their product that is left out 3.1 u^2, the test 6 u^2: below 45 u^2.
 """
 T_BOUND: Final = 24.0 * U2
-"""Of t in double-double, relative: 18 u^2 where it is a quotient of double-doubles, and the test of its rounding."""
+"""Relative error bound of t as a double-double: 18 u^2 for a quotient of double-doubles, and the test of its rounding.
+"""
 TINY: Final = 2.0**-1070
 """Added to bounds for products that underflow: at most four of 2^-1074."""
 _SCALE: Final = 2.0**600
 _NEXT: Final = 4
-"""Neighbours that `nearest` tries: a guess is off by one or two units."""
+"""Neighbouring doubles that `nearest` tries: a guess is off by one or two units."""
 
 
 @merged
 def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float, float, float]:
-    """Return p + t (q - p) for t as a double-double as a sum of two doubles, and t (q - p) and q - p, rounded."""
+    """Return p + t (q - p) as a sum of two doubles, t = th + tl, then t (q - p) and q - p, rounded."""
     dh, dl = two_diff(q, p)
     mh, ml = two_prod(th, dh)
     sh, sl = two_sum(p, mh)
@@ -67,9 +68,7 @@ def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float,
 
 @inline
 def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[float, bool]:
-    """Return p + t (q - p) and whether it is certainly the nearest double; t is known within 18 u^2 + `slack` of
-    itself.
-
+    """Return p + t (q - p), and whether it is the proven nearest double; t is known to 18 u^2 + `slack`, relative.
     Coordinates below 2^1000. A zero is never certified unless p = q.
     """
     sh, low, mh, _ = point_along(p, q, th, tl)
@@ -81,7 +80,9 @@ def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[fl
 def side_of(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, x: float, step: float, e: Components
 ) -> int:
-    """Return the exact sign of (p w_q + q w_p) / (w_p + w_q) - (x + step); `e` has 6 (n_wp + n_wq) places."""
+    """Return the exact sign of (p w_q + q w_p) / (w_p + w_q) - (x + step), for weights given as expansions. `e` is a
+    workspace of 6 (n_wp + n_wq) places.
+    """
     n = 0
     ah, al = two_diff(p, x)
     bh, bl = two_diff(q, x)
@@ -100,10 +101,10 @@ def side_of(
 def nearest(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, sum_h: float, sum_l: float, e: Components
 ) -> tuple[float, bool]:
-    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and False where numbers are out of range.
+    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and False if numbers are out of range.
 
-    wp, wq: positive compressed expansions (or zero, not both) of components within 2^-240 .. 2^240; sum: of both, to
-    4 u^2. `e`: see `side_of`. p and q must not be so far apart in size that products underflow. Subnormal results are
+    wp, wq: positive compressed expansions (or zero, not both) of components within 2^-240 .. 2^240; sum: of both, to 4
+    u^2. `e`: see `side_of`. p and q must not be so far apart in size that products underflow. Subnormal results are
     rounded correctly too, on numbers times 2^600.
     """
     if p == q or n_wp == 0:
@@ -154,8 +155,7 @@ def parameter_and_point(
     segment: FloatArray, wp: Components, n_wp: int, wq: Components, n_wq: int, axis: int, at: float, point: FloatArray,
     e: Components,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Set `point` to the nearest doubles of the point with these weights; return t and whether all are certified.
-
+    """Set `point` to the nearest doubles of the crossing with weights wp, wq; return t, and whether all are certified.
     axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`.
     """
     sum_h, sum_l = dd_add(

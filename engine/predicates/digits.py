@@ -26,14 +26,16 @@ from engine.types import IntArray
 
 BITS: Final = 28
 MOST: Final = 60
-"""Digits of a stored number: its value at a plane of at most `MOST_OF_ROW` digits fits a `SLOT`."""
+"""Most digits of a stored number, so that its value at a plane of at most `MOST_OF_ROW` digits fits a `SLOT`."""
 MOST_OF_ROW: Final = 30
 MOST_SUMMED: Final = 120
 SLOT: Final = 128
-"""Room for an intermediate number: two places, and digits of a sum of products."""
+"""Size of an intermediate number on the heap: two entries, and the digits of a sum of products."""
 MOST_DIGITS: Final = SLOT - 4
 QUOTIENT_BOUND: Final = 128.0 * U2
-"""Of a quotient of two numbers known by their five leading digits (2^-6 u^2), each read with five dd_add (20 u^2)."""
+"""Relative error bound of a quotient of numbers known by five leading digits (2^-6 u^2), each read with five dd_add (20
+u^2).
+"""
 FARTHEST: Final = 900
 """Doubles made from numbers lie within 2^-900 .. 2^900, so that none is subnormal."""
 _MASK: Final = (1 << BITS) - 1
@@ -42,7 +44,7 @@ _BASE: Final = 2.0**BITS
 
 @inline
 def normalise(heap: IntArray, a: int) -> None:
-    """Carry, and drop zeros at both ends; caller guarantees room above for all but the sign."""
+    """Carry the digits of the number at index a, and drop zeros at both ends; caller guarantees room for a carry."""
     n, first, carry = heap[a], a + 2, 0
     for i in range(first, first + n):
         total = heap[i] + carry
@@ -69,7 +71,7 @@ def normalise(heap: IntArray, a: int) -> None:
 
 @inline
 def store_double(heap: IntArray, a: int, x: float) -> None:
-    """Store a finite double at place a."""
+    """Store a finite double as a number at index a of the heap."""
     fraction, exponent = math.frexp(x)
     whole, exponent = int(fraction * 2.0**53), exponent - 53
     place = exponent // BITS
@@ -81,7 +83,7 @@ def store_double(heap: IntArray, a: int, x: float) -> None:
 
 @inline
 def sign_of(heap: IntArray, a: int) -> int:
-    """Return the sign of the number at place a."""
+    """Return the sign (-1, 0, 1) of the number at index a of the heap."""
     n = heap[a]
     if n == 0:
         return 0
@@ -90,7 +92,9 @@ def sign_of(heap: IntArray, a: int) -> int:
 
 @inline
 def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
-    """Store the sum of the products ``terms[i] = (a, b, factor)``, factor 1 or -1, at place c; False where too long."""
+    """Store the sum of ``factor * a * b`` over n_terms rows ``terms[i] = (a, b, factor)`` at index c; False if it is
+    too long. a, b: indices of numbers. factor: 1 or -1.
+    """
     bottom, top, n_summed = 0, 0, 0
     for i in range(n_terms):
         a, b = terms[i, 0], terms[i, 1]
@@ -123,7 +127,7 @@ def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
 
 @inline
 def negate(heap: IntArray, a: int) -> None:
-    """Negate the number at place a."""
+    """Negate the number at index a of the heap."""
     for i in range(a + 2, a + 2 + heap[a]):
         heap[i] = -heap[i]
     normalise(heap, a)
@@ -131,7 +135,9 @@ def negate(heap: IntArray, a: int) -> None:
 
 @inline
 def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
-    """Return the five leading digits as a double-double, and its exponent in digits."""
+    """Return the five leading digits of the number at index a as a double-double, and the exponent of their unit in
+    digits.
+    """
     n = heap[a]
     h, low, taken = 0.0, 0.0, min(n, 5)
     for i in range(taken):
@@ -141,9 +147,8 @@ def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
 
 @inline
 def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, free: int) -> tuple[float, bool]:
-    """Return the double nearest to x / w, ties to even, for w > 0; False where it is out of range or too long.
-
-    one: the place of the number 1. free: a place with three working slots.
+    """Return the double nearest to x / w, ties to even, for w > 0; False if it is out of range or too long. x, w, one:
+    indices of numbers, one that of 1. free: index of three working slots.
     """
     if heap[x] == 0:
         return 0.0, True
@@ -172,7 +177,7 @@ def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, 
 
 
 def packed_numbers(numbers: list[list[int]]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return a heap of the numbers, row by row, and their places; None where one has more than `MOST_OF_ROW` digits."""
+    """Return a heap of the numbers, row by row, and their indices; None if one has more than `MOST_OF_ROW` digits."""
     heap: list[int] = []
     places = np.zeros((len(numbers), len(numbers[0])), np.int64)
     for i, row in enumerate(numbers):

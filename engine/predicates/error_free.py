@@ -57,12 +57,12 @@ def plain_fma(a: float, b: float, c: float) -> float:
 
 
 def plain_workspace(size: int) -> list[float]:
-    """Return a list of `size` zeros: the twin of `workspace`."""
+    """Return a list of `size` zeros: the twin of `workspace` in plain Python."""
     return [0.0] * size
 
 
 def _fma_intrinsic(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """Return a b + c rounded once (llvm.fma.f64)."""
+    """Typing and code of `fma` for numba: a b + c rounded once (llvm.fma.f64)."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         double = ir.DoubleType()
@@ -75,7 +75,9 @@ def _fma_intrinsic(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 def _workspace_intrinsic(typing_context: Any, size: Any) -> Any:
-    """Return an uninitialised float64 array of a literal size on the caller's stack; it must not be returned."""
+    """Typing and code of `workspace` for numba: an uninitialised float64 array on the caller's stack, not to be
+    returned. size: a literal.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         from numba.np.arrayobj import make_array, populate_array  # 0.1 s to import, and only the compiler needs it
@@ -100,7 +102,7 @@ workspace: Any = plain_workspace if numba_config.DISABLE_JIT else intrinsic(pref
 
 @inline
 def two_sum(a: float, b: float) -> tuple[float, float]:
-    """Return (s, e) with s = fl(a + b) and s + e = a + b exactly."""
+    """Return (s, e): s = fl(a + b), and s + e = a + b exactly."""
     s = a + b
     b_part = s - a
     a_part = s - b_part
@@ -109,31 +111,31 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
 
 @inline
 def fast_two_sum(a: float, b: float) -> tuple[float, float]:
-    """Return (s, e) with s + e = a + b exactly; caller guarantees |a| >= |b| or a = 0."""
+    """Return (s, e): s = fl(a + b), and s + e = a + b exactly; caller guarantees |a| >= |b| or a = 0."""
     s = a + b
     return s, b - (s - a)
 
 
 @inline
 def two_diff(a: float, b: float) -> tuple[float, float]:
-    """Return (s, e) with s = fl(a - b) and s + e = a - b exactly."""
+    """Return (s, e): s = fl(a - b), and s + e = a - b exactly."""
     return two_sum(a, -b)
 
 
 @inline
 def two_prod(a: float, b: float) -> tuple[float, float]:
-    """Return (p, e) with p = fl(a b) and p + e = a b exactly (precondition: see the module)."""
+    """Return (p, e): p = fl(a b), and p + e = a b exactly (precondition: see the module)."""
     p = a * b
     return p, fma(a, b, -p)
 
 
 U2: Final = 2.0**-106
-"""u^2: the unit in which the errors of double-double operations are counted."""
+"""u^2, the unit in which errors of double-double operations are counted."""
 
 
 @inline
 def dd_add(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
-    """Return a + b."""
+    """Return a + b of two double-doubles, as a double-double."""
     sh, sl = two_sum(ah, bh)
     th, tl = two_sum(al, bl)
     vh, vl = fast_two_sum(sh, sl + th)
@@ -142,27 +144,27 @@ def dd_add(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
 
 @inline
 def dd_sub(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
-    """Return a - b."""
+    """Return a - b of two double-doubles, as a double-double."""
     return dd_add(ah, al, -bh, -bl)
 
 
 @inline
 def dd_mul(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
-    """Return a b."""
+    """Return the product of two double-doubles, as a double-double."""
     ch, cl = two_prod(ah, bh)
     return fast_two_sum(ch, cl + fma(ah, bl, al * bh))
 
 
 @inline
 def dd_scale(ah: float, al: float, b: float) -> tuple[float, float]:
-    """Return a b for a double b (error 2 u^2)."""
+    """Return a double-double times a double b, as a double-double (error 2 u^2)."""
     ch, cl = two_prod(ah, b)
     return fast_two_sum(ch, fma(al, b, cl))
 
 
 @inline
 def dd_div(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
-    """Return a / b; b is not zero."""
+    """Return the quotient of two double-doubles, as a double-double; b is not zero."""
     th = ah / bh
     rh, rl = dd_scale(bh, bl, th)
     return fast_two_sum(th, ((ah - rh) + (al - rl)) / bh)
@@ -181,6 +183,6 @@ def is_correctly_rounded(h: float, low: float, bound: float) -> bool:
 
 @inline
 def even_of(x: float, other: float) -> float:
-    """Return which of two adjacent doubles has the even significand."""
+    """Return whichever of two adjacent doubles has the even significand."""
     half = 0.5 * (x / abs(other - x))
     return x if math.floor(half) == half else other

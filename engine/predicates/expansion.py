@@ -30,13 +30,14 @@ exact (multiples of 2^-172 after a difference, of 2^-688 after a product of four
 
 @inline
 def is_safe(x: float) -> bool:
-    """Return whether x is zero or of a size for which products of degree four are exact as expansions."""
+    """Return whether x is zero or within SMALLEST .. LARGEST, so that products of degree four are exact as expansions.
+    """
     return x == 0.0 or SMALLEST <= abs(x) <= LARGEST
 
 
 @called
 def grow(e: Components, n: int, b: float) -> int:
-    """Add the double b to e in place."""
+    """Add the double b to the expansion e of n components in place; return the new length."""
     q, n_out = b, 0
     for i in range(n):
         q, h = two_sum(q, e[i])
@@ -51,7 +52,7 @@ def grow(e: Components, n: int, b: float) -> int:
 
 @inline
 def grow_product(e: Components, n: int, a: float, b: float) -> int:
-    """Add a b to e in place; two places."""
+    """Add a b to the expansion e in place, two more places; return the new length."""
     for part in two_prod(a, b)[::-1]:  # the tail first; a loop, because two calls compile twice as long
         if part != 0.0:
             n = grow(e, n, part)
@@ -60,7 +61,7 @@ def grow_product(e: Components, n: int, a: float, b: float) -> int:
 
 @inline
 def add(e: Components, n: int, f: Components, m: int) -> int:
-    """Add the expansion f of m components to e in place; m places."""
+    """Add the expansion f of m components to e in place, m more places; return the new length."""
     for i in range(m):
         n = grow(e, n, f[i])
     return n
@@ -68,7 +69,7 @@ def add(e: Components, n: int, f: Components, m: int) -> int:
 
 @inline
 def add_scaled(e: Components, n: int, f: Components, m: int, b: float) -> int:
-    """Add b times the expansion f of m components to e in place; 2 m places."""
+    """Add b times the expansion f of m components to e in place, 2 m more places; return the new length."""
     for i in range(m):
         n = grow_product(e, n, f[i], b)
     return n
@@ -76,7 +77,8 @@ def add_scaled(e: Components, n: int, f: Components, m: int, b: float) -> int:
 
 @inline
 def add_product(e: Components, n: int, f: Components, m: int, g: Components, k: int) -> int:
-    """Add the product of the expansions f (m components) and g (k components) to e in place; 2 m k places."""
+    """Add the product of expansions f (m components) and g (k) to e in place, 2 m k more places; return the new length.
+    """
     for i in range(k):
         n = add_scaled(e, n, f, m, g[i])
     return n
@@ -84,7 +86,7 @@ def add_product(e: Components, n: int, f: Components, m: int, g: Components, k: 
 
 @inline
 def scale(f: Components, m: int, b: float, e: Components) -> int:
-    """Set e to b times the expansion f of m components; 2 m places, e is not f."""
+    """Set e to b times the expansion f of m components, 2 m places, e not f; return the length."""
     n_out = 0
     q = 0.0
     for i in range(m):
@@ -105,8 +107,8 @@ def scale(f: Components, m: int, b: float, e: Components) -> int:
 
 @called
 def compress(e: Components, n: int) -> int:
-    """Rewrite e in place with as few components as its bits need; its last component is then within an ulp of its
-    value.
+    """Rewrite e in place with as few components as its bits need; return the new length. The last component is then
+    within an ulp of the value.
     """
     if n < 2:
         return n
@@ -131,7 +133,7 @@ def compress(e: Components, n: int) -> int:
 
 @inline
 def sign(e: Components, n: int) -> int:
-    """Return the sign of e: -1, 0 or 1."""
+    """Return the sign (-1, 0, 1) of an expansion of n components."""
     if n == 0:
         return 0
     return 1 if e[n - 1] > 0.0 else -1
@@ -139,7 +141,7 @@ def sign(e: Components, n: int) -> int:
 
 @inline
 def magnitude(e: Components, n: int) -> int:
-    """Replace e by its magnitude, compressed."""
+    """Replace e by its absolute value, compressed; return the new length."""
     n = compress(e, n)
     if sign(e, n) < 0:
         for i in range(n):

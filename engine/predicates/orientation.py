@@ -74,7 +74,7 @@ OUT_OF_RANGE = 1 << 20  # no power of two brings this axis into the range
 
 @inline
 def orient2d_filter(a: Point2, b: Point2, c: Point2) -> int:
-    """Return the sign of orient2d where rounding cannot have changed it, else UNDECIDED."""
+    """Return the sign of orient2d(a, b, c) if rounding cannot have changed it, else UNDECIDED."""
     left = (a.x - c.x) * (b.y - c.y)
     right = (a.y - c.y) * (b.x - c.x)
     det = left - right
@@ -84,7 +84,9 @@ def orient2d_filter(a: Point2, b: Point2, c: Point2) -> int:
 
 @inline
 def orient2d(a: Point2, b: Point2, c: Point2) -> int:
-    """Return 1 for a left turn at b on the way a, b, c, -1 for a right turn, 0 on a line, or UNDECIDED."""
+    """Return 1 if a, b, c turn left, -1 if they turn right, 0 if they are collinear, or UNDECIDED (exponents out of
+    range).
+    """
     side = orient2d_filter(a, b, c)
     if side != UNDECIDED:
         return side
@@ -93,7 +95,7 @@ def orient2d(a: Point2, b: Point2, c: Point2) -> int:
 
 @merged
 def rounded_determinant(u: Point3, v: Point3, w: Point3) -> tuple[float, float]:
-    """Return the determinant of three rounded differences, positive as for `orient3d`, and its permanent."""
+    """Return the determinant of three differences in floats, positive as of `orient3d`, and its permanent."""
     vx_wy, wx_vy = v.x * w.y, w.x * v.y
     wx_uy, ux_wy = w.x * u.y, u.x * w.y
     ux_vy, vx_uy = u.x * v.y, v.x * u.y
@@ -108,7 +110,7 @@ def rounded_determinant(u: Point3, v: Point3, w: Point3) -> tuple[float, float]:
 
 @inline
 def orient3d_filter(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return the sign of orient3d where rounding cannot have changed it, else UNDECIDED."""
+    """Return the sign of orient3d(a, b, c, d) if rounding cannot have changed it, else UNDECIDED."""
     u, v, w = minus(a, d), minus(b, d), minus(c, d)
     det, permanent = rounded_determinant(u, v, w)
     threshold = BOUND_3D * permanent + GUARD_3D * (1.0 + (abs(u.z) + abs(v.z) + abs(w.z)))
@@ -117,7 +119,8 @@ def orient3d_filter(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def orient3d(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return 1 if d is on the side the normal (b - a) x (c - a) points to, -1 opposite, 0 coplanar, or UNDECIDED."""
+    """Return 1 if d is on the side to which the normal (b - a) x (c - a) points, -1 opposite, 0 coplanar, or UNDECIDED.
+    """
     side = orient3d_filter(a, b, c, d)
     if side != UNDECIDED:
         return side
@@ -126,8 +129,7 @@ def orient3d(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
-    """Return k so that values between the two magnitudes, times 2^k, lie in [2^bottom, 2^top], or OUT_OF_RANGE.
-
+    """Return k such that magnitudes smallest .. largest, times 2^k, lie in [2^bottom, 2^top], or OUT_OF_RANGE.
     smallest: of the nonzero magnitudes (infinity if there is none); largest: of all.
     """
     if largest == 0.0:
@@ -149,14 +151,14 @@ def smaller_nonzero(smallest: float, value: float) -> float:
 
 @inline
 def _shift_of(a: float, b: float, c: float, d: float, bottom: int, top: int) -> int:
-    """Return the `axis_shift` of four coordinates."""
+    """Return the `axis_shift` for four coordinates of one axis."""
     smallest = smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(float("inf"), a), b), c), d)
     return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), bottom, top)
 
 
 @called
 def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
-    """Return the sign of orient2d from an expansion, or UNDECIDED."""
+    """Return the sign of orient2d(a, b, c) by an expansion; UNDECIDED if exponents are out of its range."""
     # case: on one axis-parallel line, or two equal points; whatever the exponents
     if (a.x == c.x and b.x == c.x) or (a.y == c.y and b.y == c.y):
         return 0
@@ -182,7 +184,7 @@ def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
 
 @called
 def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return the sign of orient3d from an expansion, or UNDECIDED."""
+    """Return the sign of orient3d(a, b, c, d) by an expansion; UNDECIDED if exponents are out of its range."""
     # case: all four in one axis-parallel plane (flush boxes, lattices), whatever the exponents
     if (
         (a.x == d.x and b.x == d.x and c.x == d.x)
@@ -235,7 +237,7 @@ def _are_equal(p: Point3, q: Point3) -> bool:
 
 @inline
 def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return the sign of orient3d(a, b, c, d) in double-doubles where the bound proves it, else UNDECIDED."""
+    """Return the sign of orient3d(a, b, c, d) if double-doubles prove it, else UNDECIDED."""
     total, total_tail, permanent, heights, lows, smallest = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
     p, q, r = a, b, c
     for _ in range(3):  # z of p, times the minor of r and q; a loop, because three copies compile three times as long
@@ -265,7 +267,7 @@ def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def _add_scaled_minor(e: Components, n: int, m: Components, length: int, z: float, z_tail: float) -> int:
-    """Add (z + z_tail) times the minor m to e; return the new length of e."""
+    """Add (z + z_tail) times the expansion m to e; return the new length of e."""
     if z_tail != 0.0:
         n = add_scaled(e, n, m, length, z_tail)
     return add_scaled(e, n, m, length, z)
@@ -273,17 +275,19 @@ def _add_scaled_minor(e: Components, n: int, m: Components, length: int, z: floa
 
 @kernel
 def orient3d_batch(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, sides: Int8Array) -> None:
-    """Fill sides (n,) int8 with orient3d of the rows of a, b, c, d (n, 3) float64."""
+    """Fill sides (n,) int8 with orient3d of row i of a, b, c, d (n, 3) float64."""
     for item in range(sides.shape[0]):
         sides[item] = orient3d(as_point3(a, item), as_point3(b, item), as_point3(c, item), as_point3(d, item))
 
 
 def tie_sign_exact(ax: Any, ay: Any, bx: Any, by: Any) -> int:
-    """Return the sign of orient2d(a, b, q + (eps, eps^2)) where orient2d(a, b, q) is 0; for numbers of any kind."""
+    """Return the sign of orient2d(a, b, q + (eps, eps^2)), given that orient2d(a, b, q) is 0; 0 if a = b. Any number
+    type.
+    """
     if ay != by:
         return 1 if ay > by else -1
     return 1 if bx > ax else -1 if bx < ax else 0
 
 
 tie_sign: Any = inline(tie_sign_exact)
-"""The same, compiled for float64."""
+"""`tie_sign_exact`, compiled for float64."""

@@ -22,22 +22,20 @@ from engine.predicates.expansion import Components, add_scaled, grow_product, si
 from engine.types import UNDECIDED
 
 EXACT_DIFFERENCES: Final = 24.0 * 2.0**-106
-"""Bound of the second stage, whose leading products are exact: four products of a tail, below u of a product each, are
-rounded once, and six sums of such terms.
+"""Relative error bound of `compare_in_pairs`, whose leading products are exact: four products of a tail, below u of a
+product each, are rounded once, and six sums of such terms.
 """
 
 TINY: Final = 2.0**-1000
-"""Added to the bound: covers products that underflow, so that the filter is safe for every finite input."""
+"""Added to bounds: covers products that underflow, so that the filter is right for every finite input."""
 
 
 @inline
 def compare_ratios_filter(
     a: float, a_bound: float, b: float, b_bound: float, c: float, c_bound: float, d: float, d_bound: float
 ) -> int:
-    """Return the sign of |a b| - |c d| for numbers known within a bound each, else UNDECIDED.
-
-    ``||a b| - |exact|| <= |a| b_bound + |b| a_bound + a_bound b_bound``; 2^-50 of each product covers every rounding
-    here.
+    """Return the sign of |a b| - |c d| for numbers known to +- their bounds, or UNDECIDED. ``||a b| - |exact|| <= |a|
+    b_bound + |b| a_bound + a_bound b_bound``; 2^-50 of each product covers every rounding.
     """
     a, b, c, d = abs(a), abs(b), abs(c), abs(d)
     left, right = a * b, c * d
@@ -68,9 +66,8 @@ def compare_differences(
 
 @inline
 def compare_in_pairs(ah: float, al: float, bh: float, bl: float, ch: float, cl: float, dh: float, dl: float) -> int:
-    """Return the sign of a b - c d for exact differences (h, l) where the products' leading parts decide it.
-
-    Else UNDECIDED, for infinities and NaN too; underflow is covered.
+    """Return the sign of a b - c d if the products' leading parts prove it, else UNDECIDED; a = ah + al and so on,
+    exact. UNDECIDED for infinities and NaN; underflow is covered.
     """
     left, left_tail = two_prod(ah, bh)
     right, right_tail = two_prod(ch, dh)
@@ -93,7 +90,7 @@ def minor(
     by: float,
     by_tail: float,
 ) -> int:
-    """Set e to (ax + ax_tail)(by + by_tail) - (ay + ay_tail)(bx + bx_tail); return its length, at most 16."""
+    """Set expansion e to (ax + ax_tail)(by + by_tail) - (ay + ay_tail)(bx + bx_tail); return its length, at most 16."""
     n = grow_product(e, 0, ax, by)
     n = grow_product(e, n, -ay, bx)
     if ax_tail != 0.0:
@@ -111,7 +108,9 @@ def minor(
 
 @inline
 def add_absolute_product(e: Components, n: int, a: Components, na: int, b: Components, nb: int, factor: int) -> int:
-    """Add factor |a b| (factor is 1 or -1) to the expansion e in place, for expansions a and b; 2 na nb places."""
+    """Add factor |a b| (factor 1 or -1) to expansion e in place, for expansions a and b; 2 na nb more places. Returns
+    the new length.
+    """
     flip = float(factor * sign(a, na) * sign(b, nb))
     for i in range(na):
         n = add_scaled(e, n, b, nb, flip * a[i])

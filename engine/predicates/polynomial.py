@@ -41,7 +41,7 @@ N_TERM = 1024  # components of one term: fewer than its bits, 53 (16 + 1) = 901,
 
 @inline
 def _fill_powers(points: FloatArray, row: int, powers: Components) -> None:
-    """Set powers[axis * N_POWERS + k] to the rounded k-th power of the coordinate, for every axis of the point."""
+    """Set powers[axis * N_POWERS + k] to the k-th power of coordinate ``axis`` of a point, rounded."""
     for axis in range(points.shape[1]):
         value = float(points[row, axis])
         power = 1.0
@@ -54,11 +54,12 @@ def _fill_powers(points: FloatArray, row: int, powers: Components) -> None:
 def sign_of_polynomial_filter(
     powers: IntArray, coefficients: FloatArray, degree: int, points: FloatArray, row: int, blur: float
 ) -> int:
-    """Return the sign of the sum of coefficient * prod(p[k] ** powers[k]) on all of the blurred p = points[row] where
-    rounding cannot have changed it, else UNDECIDED.
+    """Return the sign of sum(coefficient * prod(p[k] ** powers[k])) if it is proven for all p within `blur` of
+    points[row].
 
-    powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller guarantees finite
-    numbers, but for points with a blur, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS.
+    Else UNDECIDED. powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller
+    guarantees finite numbers, but for points with a blur, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <=
+    MAX_TERMS.
     """
     table = workspace(N_TABLE)
     _fill_powers(points, row, table)
@@ -86,7 +87,7 @@ def sign_of_polynomial_filter(
 
 @inline
 def _term_exponent(powers: IntArray, coefficients: FloatArray, points: FloatArray, row: int, i_term: int) -> int:
-    """Return k with |term| < 2^k, NO_TERM for a term that is zero."""
+    """Return k such that term i_term of a polynomial at a point is below 2^k in magnitude; NO_TERM for a zero term."""
     if coefficients[i_term] == 0.0:
         return NO_TERM
     exponent = frexp(float(coefficients[i_term]))[1]
@@ -99,7 +100,9 @@ def _term_exponent(powers: IntArray, coefficients: FloatArray, points: FloatArra
 
 @called
 def sign_of_polynomial_exact(powers: IntArray, coefficients: FloatArray, points: FloatArray, row: int) -> int:
-    """Return the sign from an expansion, or UNDECIDED; arguments as for `sign_of_polynomial_filter`."""
+    """Return the sign of a polynomial at a point by an expansion, or UNDECIDED; arguments as of
+    `sign_of_polynomial_filter`.
+    """
     top = NO_TERM
     for i_term in range(coefficients.shape[0]):
         top = max(top, _term_exponent(powers, coefficients, points, row, i_term))

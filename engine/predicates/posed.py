@@ -38,7 +38,7 @@ from engine.predicates.vectors import minus
 from engine.types import UNDECIDED, FloatArray, Point3
 
 UNPOSED = -1
-"""Number of the pose that leaves a point where it is."""
+"""Pose number of a point without a pose."""
 
 ERROR_SHARE = 2.0**-50
 ERROR_FLOOR = 2.0**-1070
@@ -54,7 +54,7 @@ N_TOTAL = 1100
 
 
 class PosedPoint3(NamedTuple):
-    """A point before its pose, and the row of its pose in an array of poses, or UNPOSED."""
+    """A point before its pose, and the row of that pose in an array of poses, or UNPOSED."""
 
     x: float
     y: float
@@ -64,7 +64,7 @@ class PosedPoint3(NamedTuple):
 
 @inline
 def posed_error(poses: FloatArray, pose: int, reach: float) -> float:
-    """Return a bound on the rounding of each posed coordinate, for points whose coordinates are at most `reach`."""
+    """Return a bound on the rounding of each coordinate of `posed_point`, for points with coordinates up to `reach`."""
     if pose == UNPOSED:
         return 0.0
     largest = 0.0
@@ -78,7 +78,7 @@ def posed_error(poses: FloatArray, pose: int, reach: float) -> float:
 
 @inline
 def posed_point(poses: FloatArray, p: PosedPoint3) -> Point3:
-    """Return the posed point, each coordinate within `posed_error` of the exact one."""
+    """Return R p + t, rounded, each coordinate within `posed_error`; p itself if UNPOSED."""
     if p.pose == UNPOSED:
         return Point3(p.x, p.y, p.z)
     return Point3(_rounded(poses, p, 0), _rounded(poses, p, 1), _rounded(poses, p, 2))
@@ -86,7 +86,7 @@ def posed_point(poses: FloatArray, p: PosedPoint3) -> Point3:
 
 @inline
 def _rounded(poses: FloatArray, p: PosedPoint3, axis: int) -> float:
-    """Return one posed coordinate in floating point."""
+    """Return coordinate ``axis`` of R p + t in floating point."""
     r, i = p.pose, 3 * axis
     x, y, z = float(poses[r, i]) * p.x, float(poses[r, i + 1]) * p.y, float(poses[r, i + 2]) * p.z
     return x + y + z + float(poses[r, 9 + axis])
@@ -94,7 +94,7 @@ def _rounded(poses: FloatArray, p: PosedPoint3, axis: int) -> float:
 
 @inline
 def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> int:
-    """Return orient3d of the exact points behind a, b, c, d, each coordinate off by at most `error`, or UNDECIDED."""
+    """Return orient3d of points known to +- `error` a coordinate; UNDECIDED if that could change the sign."""
     u, v, w = minus(a, d), minus(b, d), minus(c, d)
     det, permanent = rounded_determinant(u, v, w)
     moved = ENLARGED_TWO * error
@@ -109,10 +109,8 @@ def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -
 def orient3d_posed(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
 ) -> int:
-    """Return orient3d of four posed points, or UNDECIDED.
-
-    poses (n, 12) float64: R by rows, then t; caller guarantees det R > 0 and entries of R of at most 1.01.
-    error: the largest `posed_error` of the points.
+    """Return orient3d of four points under their poses, exact, or UNDECIDED. poses (n, 12) float64: R by rows, then t;
+    caller guarantees det R > 0 and entries of R of at most 1.01. error: the largest `posed_error` of the points.
     """
     side = orient3d_rounded(
         posed_point(poses, a), posed_point(poses, b), posed_point(poses, c), posed_point(poses, d), error
@@ -124,7 +122,8 @@ def orient3d_posed(
 
 @called
 def orient3d_posed_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
-    """Return orient3d of four posed points from an expansion, or UNDECIDED; arguments as for `orient3d_posed`."""
+    """Return orient3d of four points under their poses by an expansion, or UNDECIDED; arguments as of `orient3d_posed`.
+    """
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
         return orient3d_exact(
             Point3(a.x, a.y, a.z), Point3(b.x, b.y, b.z), Point3(c.x, c.y, c.z), Point3(d.x, d.y, d.z)
@@ -150,7 +149,7 @@ def orient3d_posed_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: P
 
 @called
 def are_equal_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3) -> bool:
-    """Return whether two posed points are equal, exactly; False where exponents are out of range."""
+    """Return whether two points under their poses are equal, exactly; False if exponents are out of range."""
     shift, w = _common_shift(poses, a, a, b, b), workspace(N_DIFFERENCE)
     if shift == OUT_OF_RANGE:
         return False
@@ -162,7 +161,7 @@ def are_equal_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3) -> bool:
 
 @inline
 def _add_product_of(m: Components, n: int, w: Components, lengths: Components, f: int, g: int, factor: float) -> int:
-    """Add factor (1 or -1) times the product of the differences in slots f and g of w to m."""
+    """Add ``factor`` (1 or -1) times the product of differences f and g of w to expansion m; return its new length."""
     for i in range(int(lengths[f])):
         for k in range(int(lengths[g])):
             n = grow_product(m, n, factor * w[f * N_DIFFERENCE + i], w[g * N_DIFFERENCE + k])
@@ -173,7 +172,7 @@ def _add_product_of(m: Components, n: int, w: Components, lengths: Components, f
 def _set_difference(
     w: Components, start: int, poses: FloatArray, p: PosedPoint3, q: PosedPoint3, axis: int, shift: int
 ) -> int:
-    """Set w[start:] to 2^shift times the exact difference of a posed coordinate of p and q; return its length."""
+    """Set w[start:] to 2^shift (p - q) on one axis under both poses, exactly, as an expansion; return its length."""
     e = workspace(N_DIFFERENCE)
     n = 0
     for end in range(2):
@@ -189,7 +188,7 @@ def _set_difference(
 
 @inline
 def _factors(poses: FloatArray, p: PosedPoint3, axis: int, k: int, shift: int, factor: float) -> tuple[float, float]:
-    """Return the two factors of term k (x, y, z, translation) of factor * 2^shift times a posed coordinate."""
+    """Return two doubles whose product is term k (x, y, z, translation) of factor 2^shift times a posed coordinate."""
     value = factor * (p.x if k == 0 else (p.y if k == 1 else p.z))
     if p.pose == UNPOSED:
         entry = 1.0 if k == axis else 0.0
@@ -202,7 +201,7 @@ def _factors(poses: FloatArray, p: PosedPoint3, axis: int, k: int, shift: int, f
 
 @inline
 def _common_shift(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
-    """Return the power of two that brings all coordinates into the range of the exact stage, or OUT_OF_RANGE."""
+    """Return the power of two that scales all coordinates into the range of the exact stage, or OUT_OF_RANGE."""
     largest, smallest, smallest_entry = 0.0, float("inf"), 1.0
     for k in range(4):
         p = a if k == 0 else (b if k == 1 else (c if k == 2 else d))

@@ -30,14 +30,14 @@ Exact = TypeVar("Exact", int, Fraction)
 
 
 def minus(u: Sequence[Exact], v: Sequence[Exact]) -> tuple[Exact, ...]:
-    """Return u - v."""
+    """Return u - v of two vectors of 2 or 3 numbers."""
     if len(u) == 2:
         return u[0] - v[0], u[1] - v[1]
     return u[0] - v[0], u[1] - v[1], u[2] - v[2]
 
 
 def dot(u: Sequence[Exact], v: Sequence[Exact]) -> Exact:
-    """Return u . v."""
+    """Return u . v of two vectors of 2 or 3 numbers."""
     if len(u) == 2:
         return u[0] * v[0] + u[1] * v[1]
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
@@ -54,14 +54,14 @@ def cross(u: Sequence[Exact], v: Sequence[Exact]) -> tuple[Exact, Exact, Exact]:
 
 
 def largest_axis(u: Sequence[Exact]) -> int:
-    """Return the first axis of the largest magnitude, -1 for the zero vector."""
+    """Return the first axis on which a vector has its largest magnitude, -1 for the zero vector."""
     sizes = [abs(value) for value in u]
     largest = max(sizes)
     return sizes.index(largest) if largest else -1
 
 
 def determinant(matrix: Sequence[Sequence[Exact]]) -> Exact | int:
-    """Return the determinant of a matrix of at most 3 rows; 1 for none."""
+    """Return the determinant of a matrix of 0 to 3 rows; 1 for none."""
     if len(matrix) == 3:
         return dot(matrix[0], cross(matrix[1], matrix[2]))
     if len(matrix) == 2:
@@ -74,43 +74,43 @@ Number = float | int | Fraction
 
 
 def sign_of(value: Number) -> int:
-    """Return -1, 0 or 1."""
+    """Return the sign of a number: -1, 0 or 1."""
     return (value > 0) - (value < 0)
 
 
 def common_integers(values: Sequence[Number]) -> tuple[list[int], int]:
-    """Return integers and their common positive denominator (not the least one)."""
+    """Return integers n and a positive integer w with values[i] = n[i] / w (w not always the least)."""
     ratios = [value.as_integer_ratio() for value in values]
     common = math.lcm(*(bottom for _, bottom in ratios))
     return [top * (common // bottom) for top, bottom in ratios], common
 
 
 def reduced(numbers: Sequence[int]) -> tuple[int, ...]:
-    """Return integers without their common divisor."""
+    """Return integers divided by their greatest common divisor."""
     divisor = math.gcd(*numbers)
     return tuple(x // divisor for x in numbers) if divisor > 1 else tuple(numbers)
 
 
 def scaled_integers(values: Sequence[Number]) -> list[int]:
-    """Return the values times a common positive factor that makes all of them integers."""
+    """Return the values times a common positive factor that makes them integers."""
     return common_integers(values)[0]
 
 
 def orient2d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Number]) -> int:
-    """Return the sign of (b - a) x (c - a): 1 for a left turn, -1 for a right turn, 0 on a line."""
+    """Return the sign of (b - a) x (c - a): 1 for a left turn, -1 for a right turn, 0 if collinear."""
     ax, bx, cx = scaled_integers((a[0], b[0], c[0]))
     ay, by, cy = scaled_integers((a[1], b[1], c[1]))
     return sign_of((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
 
 
 def orient3d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Number], d: Sequence[Number]) -> int:
-    """Return 1 if d lies on the side the normal (b - a) x (c - a) points to, -1 opposite, 0 on the plane."""
+    """Return 1 if d lies on the side to which the normal (b - a) x (c - a) points, -1 opposite, 0 on the plane."""
     p, q, r, s = zip(*(scaled_integers(axis) for axis in zip(a, b, c, d)))
     return sign_of(dot(cross(minus(q, p), minus(r, p)), minus(s, p)))
 
 
 def side_rational(row: Sequence[Number], point: Sequence[Number]) -> int:
-    """Return the sign of dot(row, (point, 1)), for a row of one number more than the point, in any dimension."""
+    """Return the sign of dot(row, (point, 1)), the row one number longer than the point, in any dimension."""
     *normal, offset = scaled_integers(row)
     *scaled_point, one = scaled_integers((*point, 1))
     return sign_of(sum(n * p for n, p in zip(normal, scaled_point)) + offset * one)
@@ -137,9 +137,8 @@ def polynomial_sign_rational(
 
 
 def nearest_float(value: Number) -> float:
-    """Return the double nearest to `value`, ties to even; what rounds to zero is +0.0.
-
-    Raises: `NotRepresentableError` where the nearest double would be infinite.
+    """Return the double nearest to `value`, ties to even; zero as +0.0. Raises: `NotRepresentableError` if the nearest
+    double would be infinite.
     """
     top, bottom = value.as_integer_ratio()
     try:
@@ -157,7 +156,8 @@ def nearest(numerator: int, denominator: int) -> float:
 
 
 def nearest_pair(numerator: int, denominator: int) -> tuple[float, float]:
-    """Return a quotient as a double-double: the double nearest to it, and the double nearest to the remainder."""
+    """Return numerator / denominator as a double-double: the nearest double, and the double nearest to the remainder.
+    """
     head = nearest(numerator, denominator)
     n, d = head.as_integer_ratio()
     return head, nearest(numerator * d - n * denominator, denominator * d)
@@ -182,28 +182,28 @@ def nearest_with_root(u: int, v: int, w: int, z: int) -> float:
 
 
 COMFORTABLE: Final = 64
-"""Scenes whose largest coordinate lies within 2^-64 .. 2^64 stay as they are; kernels are exact to 2^-120 .. 2^120."""
+"""Scenes whose largest coordinate lies within 2^-64 .. 2^64 are not scaled; kernels are exact to 2^-120 .. 2^120."""
 SMALLEST_NORMAL: Final = 2.0**-1022
 
 
 def largest_of(*arrays: FloatArray) -> float:
-    """Return the largest magnitude of any coordinate; not finite if one is not."""
+    """Return the largest magnitude in some arrays; not finite if a number is not."""
     return max((max(array.max().item(), -array.min().item()) for array in arrays if array.size), default=0.0)
 
 
 def are_all_safe(numbers: FloatArray) -> bool:
-    """Return whether every number satisfies `is_safe`."""
+    """Return whether every number is zero or in the range of `is_safe`."""
     sizes = np.abs(numbers)
     return bool(((sizes == 0.0) | ((sizes >= SMALLEST) & (sizes <= LARGEST))).all())
 
 
 def exponent_of(*arrays: FloatArray) -> int:
-    """Return e such that the largest coordinate is below 2^e, and 0 where no scaling is needed."""
+    """Return e such that all coordinates are below 2^e; 0 if no scaling is needed."""
     return exponent_above(largest_of(*arrays))
 
 
 def exponent_above(largest: float) -> int:
-    """Return e such that a coordinate is below 2^e, and 0 where no scaling is needed."""
+    """Return e such that a coordinate of size `largest` is below 2^e; 0 if no scaling is needed."""
     exponent = frexp(largest)[1]
     return 0 if largest == 0.0 or abs(exponent) <= COMFORTABLE else exponent
 
@@ -219,7 +219,7 @@ def shifted(array: FloatArray, exponent: int | IntArray) -> FloatArray | None:
 
 
 def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
-    """Return plane rows for points multiplied by 2^-exponent, each times a power of two; None if that is not exact."""
+    """Return plane rows for points times 2^-exponent, each row times a power of two; None if that is not exact."""
     offsets = shifted(rows[:, -1], -exponent)
     if offsets is None:
         return None
@@ -237,10 +237,9 @@ def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
 
 
 def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, BoolArray]:
-    """Return points 2^exponent, and which of them may have been rounded twice.
-
-    Those are the ones that this rounds: up to and including the smallest normal number. Where nothing is rounded here,
-    the nearest double of unlimited exponent is the nearest double.
+    """Return points 2^exponent, and which of them may have been rounded twice. Those are the ones rounded here: up to
+    and including the smallest normal number. If nothing is rounded here, the nearest double of unlimited exponent is
+    the nearest double.
     """
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(points, exponent)

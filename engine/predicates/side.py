@@ -37,7 +37,7 @@ NO_TERM = -(1 << 20)  # exponent of a zero term
 
 @inline
 def side_of_plane_filter(h: HalfSpace3, p: Point3) -> int:
-    """Return the sign of a x + b y + c z + d where rounding cannot have changed it, else UNDECIDED."""
+    """Return the sign of a x + b y + c z + d if rounding cannot have changed it, else UNDECIDED."""
     ax, by, cz = h.a * p.x, h.b * p.y, h.c * p.z
     value = ax + by + cz + h.d
     threshold = BOUND_PLANE * (abs(ax) + abs(by) + abs(cz) + abs(h.d)) + GUARD
@@ -55,10 +55,9 @@ def side_of_plane(h: HalfSpace3, p: Point3) -> int:
 
 @inline
 def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return the value of a row at a point as a double-double, and its error bound.
-
-    Products are exact, or lose 2^-1074 by underflow; their tails and those of sums, together below 4 u S, are added
-    with six roundings. An intermediate infinity gives NaN.
+    """Return a x + b y + c z + d as a double-double, and its error bound. Products are exact, or lose 2^-1074 by
+    underflow; their tails and those of sums, together below 4 u S, are added with six roundings. An intermediate
+    infinity gives NaN.
     """
     x, y, z = point
     ah, al = two_prod(a, x)
@@ -74,7 +73,7 @@ def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, 
 
 @called
 def _side_exact(h: HalfSpace3, p: Point3) -> int:
-    """Return the result of `side_of_plane` by an expansion; a zero product leaves no component."""
+    """Return as `side_of_plane`, by an expansion."""
     e = workspace(8)
     if (
         is_exact_product(h.a, p.x)
@@ -97,14 +96,14 @@ def _side_exact(h: HalfSpace3, p: Point3) -> int:
 
 @inline
 def is_exact_product(a: float, b: float) -> bool:
-    """Return whether `two_prod` of a and b is exact and a sum of few such products cannot overflow."""
+    """Return whether `two_prod` of a and b is exact, and a sum of a few such products cannot overflow."""
     magnitude = abs(a * b)
     return SMALLEST_PRODUCT <= magnitude <= LARGEST_PRODUCT or a == 0.0 or b == 0.0
 
 
 @inline
 def product_exponent(a: float, b: float) -> int:
-    """Return k with |a b| < 2^k, NO_TERM for a zero product."""
+    """Return k with |a b| < 2^k; NO_TERM for a zero product."""
     if a == 0.0 or b == 0.0:
         return NO_TERM
     return frexp(a)[1] + frexp(b)[1]
@@ -112,13 +111,13 @@ def product_exponent(a: float, b: float) -> int:
 
 @inline
 def is_left_out(exponent: int, shift: int) -> bool:
-    """Return whether a term of this exponent, shifted so, would lose bits below the smallest subnormal."""
+    """Return whether a term below 2^exponent, times 2^shift, would lose bits below the smallest subnormal."""
     return exponent != NO_TERM and exponent + shift < LOWEST_SHIFT
 
 
 @inline
 def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
-    """Return the sign of e, or UNDECIDED if left-out terms could change it."""
+    """Return the sign of expansion e, or UNDECIDED if omitted terms could change it."""
     if is_incomplete and (n == 0 or abs(e[n - 1]) < CLEAR):
         return UNDECIDED
     return sign(e, n)
@@ -126,7 +125,9 @@ def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
 
 @inline
 def grow_shifted_product(e: Components, n: int, a: float, b: float, exponent: int) -> int:
-    """Add the product of the significands of a and b, times 2^exponent, to e, unless zero or left out (two places)."""
+    """Add the product of the significands of a and b, times 2^exponent, to expansion e, two more places. Not if it is
+    zero or would lose bits. Returns the new length.
+    """
     if a == 0.0 or b == 0.0 or exponent < LOWEST_SHIFT:
         return n
     p, tail = two_prod(frexp(a)[0], frexp(b)[0])

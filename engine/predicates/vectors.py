@@ -14,60 +14,60 @@ from engine.types import FloatArray, IntArray, Point2, Point3
 
 @inline
 def as_point2(points: FloatArray, row: int) -> Point2:
-    """Return row `row` of points (n, 2) float64."""
+    """Return row ``row`` of points (n, 2) float64 as a point."""
     return Point2(float(points[row, 0]), float(points[row, 1]))
 
 
 @inline
 def as_point3(points: FloatArray, row: int) -> Point3:
-    """Return row `row` of points (n, 3) float64."""
+    """Return row ``row`` of points (n, 3) float64 as a point."""
     return Point3(float(points[row, 0]), float(points[row, 1]), float(points[row, 2]))
 
 
 @merged
 def corners_of(vertices: FloatArray, triangles: IntArray, triangle: int) -> tuple[Point3, Point3, Point3]:
-    """Return the corners of a triangle."""
+    """Return the corners of triangle ``triangle`` (m, 3) as points."""
     a, b = as_point3(vertices, triangles[triangle, 0]), as_point3(vertices, triangles[triangle, 1])
     return a, b, as_point3(vertices, triangles[triangle, 2])
 
 
 @merged
 def minus(a: Point3, b: Point3) -> Point3:
-    """Return a - b."""
+    """Return the vector a - b."""
     return Point3(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
 @merged
 def negative(a: Point3) -> Point3:
-    """Return -a."""
+    """Return the vector -a."""
     return Point3(-a.x, -a.y, -a.z)
 
 
 @merged
 def dot(a: Point3, b: Point3) -> float:
-    """Return a . b."""
+    """Return the scalar product a . b."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
 @merged
 def cross(a: Point3, b: Point3) -> Point3:
-    """Return a x b."""
+    """Return the cross product a x b."""
     return Point3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
 @merged
 def length(a: Point3) -> float:
-    """Return |a|."""
+    """Return the Euclidean length |a|."""
     return float(np.sqrt(dot(a, a)))
 
 
 @merged
 def largest_of(a: Point3) -> float:
-    """Return the largest magnitude of a component."""
+    """Return the largest magnitude of a coordinate of a."""
     return max(abs(a.x), abs(a.y), abs(a.z))
 
 
 @merged
 def along(a: Point3, b: Point3, t: float) -> Point3:
-    """Return a + t (b - a)."""
+    """Return the point a + t (b - a)."""
     return Point3(a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z))
