@@ -40,7 +40,7 @@ from engine.running.budget import Budget
 from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray
 
 Line = tuple[int, int, int]
-"""(a, b, c): a x + b y + c w is positive to the left of the directed line; its direction is (b, -a)."""
+"""(a, b, c): a x + b y + c w > 0 for points (x, y, w) left of the directed line; its direction is (b, -a)."""
 
 _CHUNK: Final = 1 << 14  # pairs of one step: 3 ms, and temporaries stay in cache
 
@@ -51,16 +51,16 @@ _POLL = 64  # exact steps of some microseconds between two polls
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """Edges that meet only in their ends.
+    """Edges that meet in their ends only.
 
     | field | by | meaning |
     | --- | --- | --- |
     | nodes | - | all points; some may belong to no edge |
     | tails, heads | edge | its ends; the tail is lexicographically smaller (x, then y) |
     | lines | edge | the line through it, directed from tail to head |
-    | masks | edge | exclusive or of the masks (bits, or frozen sets) of all input segments that cover it |
-    | cover | edge | inclusive or of them |
-    | n_exact | - | pairs of segments decided in integers |
+    | masks | edge | exclusive or of the masks (bits, or frozen sets) of all input segments that contain it |
+    | cover | edge | inclusive or of these masks |
+    | n_exact | - | number of pairs of segments decided in integers |
     """
 
     nodes: NodeTable
@@ -72,33 +72,32 @@ class Arrangement:
     n_exact: int
 
     def origin(self, half_edge: int) -> int:
-        """Return the node where a half-edge begins: 2 e runs along edge e, 2 e + 1 back."""
+        """Return the node where a half-edge begins: half-edge 2 e runs from tail to head of edge e, 2 e + 1 from head
+        to tail."""
         return (self.heads if half_edge & 1 else self.tails)[half_edge >> 1]
 
 
 line_through = cross
-"""The line from one point to another, distinct one."""
+"""line_through(a, b): the line through two distinct points, directed from a to b."""
 
 
 def side(line: Line, point: Homogeneous) -> int:
-    """Return 1, 0 or -1: `point` lies to the left of `line`, on it, to the right."""
+    """Return 1 if `point` is left of `line`, 0 if on it, -1 if right of it."""
     value = line[0] * point[0] + line[1] * point[1] + line[2] * point[2]
     return (value > 0) - (value < 0)
 
 
 def crossing(first: Line, second: Line) -> Homogeneous:
-    """Return the point where two lines meet that are not parallel."""
+    """Return the intersection point of two lines that are not parallel."""
     return reduced(*cross(first, second))
 
 
 def arrange(
     nodes: NodeTable, segments: Sequence[tuple[int, int]], masks: Sequence[Any], budget: Budget | None = None
 ) -> Arrangement:
-    """Return the arrangement of `segments`, pairs of numbers in `nodes`; crossings are added to `nodes`.
-
-    masks: by segment the sources it bounds: the bits of an integer, or a frozenset. Segments of zero length are left
-    out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves.
-    """
+    """Return the arrangement of `segments`, given as pairs of node indices; nodes for crossings are added to `nodes`.
+    masks: of each segment the sources that it bounds: the bits of an integer, or a frozenset. Segments of zero length
+    are left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves open."""
     budget = budget or Budget()
     merged: dict[tuple[int, int], list[Any]] = {}
     for count, ((start, end), mask) in enumerate(zip(segments, masks)):
@@ -121,7 +120,8 @@ def arrange(
 def _intersect_all(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], budget: Budget
 ) -> tuple[dict[int, set[int]], int]:
-    """Return by segment the nodes inside it, if any, and the number of pairs decided in integers."""
+    """Return the nodes in the interior of each segment (segments without any are left out), and the number of pairs
+    decided in integers."""
     on_segment: dict[int, set[int]] = {}
     if not ends:
         return on_segment, 0
@@ -152,7 +152,7 @@ def _intersect_all(
 
 
 def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
-    """Return the signs of orient2d for rows of points, `UNDECIDED` where the bound does not prove it."""
+    """Return the signs of orient2d for rows of points, UNDECIDED where the error bound does not prove the sign."""
     left = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
     right = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
     turn = left - right
@@ -164,10 +164,9 @@ def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
 
 
 def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray, budget: Budget) -> Int8Array:
-    """Return for each of `pairs` whether its segments MISS, CROSS in a point inside both, or are UNDECIDED.
-
-    coordinates: (n_nodes, 2) float64, exact. segments: (n_segments, 2) int64 nodes. pairs: (n_pairs, 2) int64 segments.
-    Segments that share an end and are proven not collinear count as MISS: that end is their only common point.
+    """Return for each pair of segments MISS, CROSS (one common point, interior to both) or UNDECIDED. coordinates:
+    (n_nodes, 2) float64, exact. segments: (n_segments, 2) int64 nodes. pairs: (n_pairs, 2) int64 segments. Segments
+    that share an end and are proven not collinear are a MISS: that end is their only common point.
     """
     result = np.full(len(pairs), UNDECIDED, np.int8)
     for start in range(0, len(pairs), _CHUNK):
@@ -191,7 +190,8 @@ def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray,
 def _intersect_pair(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], i: int, j: int, on_segment: dict[int, set[int]]
 ) -> None:
-    """Add the common nodes of the segments `i` and `j` that lie inside one of them to `on_segment`."""
+    """Add to on_segment[i] and on_segment[j] the common nodes of segments i and j that are interior to the segment;
+    exact. A crossing becomes a new node."""
     points, (a, b), (c, d) = nodes.points, ends[i], ends[j]
     line_i, line_j = lines[i], lines[j]
     side_c, side_d = side(line_i, points[c]), side(line_i, points[d])
@@ -223,7 +223,7 @@ def _split(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], merged: list[list[Any]],
     on_segment: dict[int, set[int]], n_exact: int, budget: Budget,
 ) -> Arrangement:  # fmt: skip
-    """Cut every segment at its nodes and unite the edges that several segments share."""
+    """Cut every segment at the nodes in its interior, and merge equal edges of several segments."""
     by_place = cmp_to_key(nodes.compare)
     edges: dict[tuple[int, int], list[Any]] = {}
     carriers: list[Line] = []
@@ -250,11 +250,9 @@ def _split(
 def arrange_rings(
     coordinates: FloatArray, ring_offsets: Sequence[int], ring_masks: Sequence[Any] | None, budget: Budget | None = None
 ) -> Arrangement:
-    """Return the arrangement of closed rings.
-
-    coordinates: (n_vertices, 2) float64, ring after ring, no first vertex repeated. ring_offsets: n_rings + 1 numbers.
-    ring_masks: the mask of each ring's edges; None: the mask of each edge is the set of the number of its first vertex.
-    """
+    """Return the arrangement of closed rings. coordinates: (n_vertices, 2) float64, ring after ring, no first vertex
+    repeated. ring_offsets: n_rings + 1 numbers. ring_masks: the mask of each ring's edges; None: an edge's mask is the
+    frozenset with the index of its first vertex."""
     nodes, numbers = float_nodes(coordinates, budget)
     segments: list[tuple[int, int]] = []
     masks: list[Any] = [] if ring_masks is not None else [frozenset((k,)) for k in range(len(numbers))]
@@ -273,7 +271,7 @@ _HALF = Fraction(1, 2)
 
 
 class _Segment:
-    """A segment in integer fractions of a lattice spacing."""
+    """A segment with integer coordinates in a fraction `1 / unit` of the lattice spacing."""
 
     def __init__(self, start: Point, end: Point) -> None:
         (ax, ay), (bx, by) = (start, end) if start[0] <= end[0] else (end, start)
@@ -281,9 +279,8 @@ class _Segment:
         self.ends = [value.numerator * (self.unit // value.denominator) for value in (ax, ay, bx, by)]
 
     def passes(self, pixel: Pixel) -> bool:
-        """Return whether it intersects the half-open pixel: unless one corner proves that it enters and leaves on one
-        side.
-        """
+        """Return whether the segment meets a half-open pixel: their boxes meet, and the pixel has corners on both sides
+        of its line."""
         ax, ay, bx, by = self.ends
         left, low = ((2 * centre - 1) * (self.unit // 2) for centre in pixel)
         right, high = left + self.unit, low + self.unit
@@ -301,12 +298,12 @@ class _Segment:
 def snap_rings(
     rings: Sequence[Sequence[Point]], spacing_exponent: int, budget: Budget | None = None
 ) -> tuple[list[list[tuple[float, float]]], list[int]]:
-    """Return the rings snapped to the lattice of spacing ``2**spacing_exponent``, without repeated vertices.
+    """Return rings snapped to the lattice of spacing ``2**spacing_exponent``, and by vertex the input edge it starts.
 
-    And by vertex the number of the input vertex, among all of ``rings``, whose edge continues from there.
-
-    rings: exact vertices; edges meet only in vertices. Every coordinate must be below ``2**53`` spacings, so that
-    lattice points are doubles. A ring may shrink to fewer than three vertices.
+    The second list has, for each vertex of the result, the index of the input vertex (over all ``rings``) whose edge
+    the ring follows from there. Repeated vertices are left out; a ring may shrink to fewer than three. rings: exact
+    vertices; edges meet only in vertices. Every coordinate must be below ``2**53`` spacings, so that lattice points are
+    doubles.
     """
     budget = budget or Budget()
     unit = Fraction(2) ** spacing_exponent
@@ -338,10 +335,8 @@ def snap_rings(
 
 
 def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Point) -> list[int]:
-    """Return the pixels that the segment may pass: those near its box and its line, conservatively.
-
-    hot: sorted; centres: the same as floats.
-    """
+    """Return the indices in `hot` of the pixels near the box and the line of a segment, all that it may pass among
+    them. hot: sorted lattice points; centres: the same as floats."""
     (x0, x1), (y0, y1) = (sorted((floor(a), floor(b))) for a, b in zip(start, end))
     first, last = bisect_left(hot, (x0 - 1, y0 - 1)), bisect_left(hot, (x1 + 2, y1 + 3))
     a, b = np.array(start, np.float64), np.array(end, np.float64)

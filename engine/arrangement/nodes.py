@@ -20,7 +20,7 @@ from engine.running.budget import Budget
 from engine.types import FloatArray
 
 Homogeneous = tuple[int, int, int]
-"""(x, y, w), w > 0, without a common factor."""
+"""(x, y, w) with w > 0 and gcd 1: the point (x / w, y / w)."""
 
 _POLL = 1024  # points, a microsecond each, between two polls
 
@@ -41,7 +41,7 @@ def nearest_quotient(numerator: int, denominator: int) -> float:
 
 
 def reduced(x: int, y: int, w: int) -> Homogeneous:
-    """Return the point (x, y, w), w not 0, without common factor and with w > 0."""
+    """Return (x, y, w), w not 0, divided by the common factor, with w > 0."""
     divisor = gcd(x, y, w)
     if w < 0:
         divisor = -divisor
@@ -49,11 +49,9 @@ def reduced(x: int, y: int, w: int) -> Homogeneous:
 
 
 class NodeTable:
-    """Exact points without repetition, numbered in order of arrival.
-
-    points[i]: the point as integers. xs[i], ys[i]: the doubles nearest to its coordinates.
-    exponent: a coordinate is ``x / w * 2**exponent``.
-    """
+    """Exact points without duplicates, numbered in the order in which they were added. points[i]: the point as
+    `Homogeneous`. xs[i], ys[i]: the doubles nearest to its coordinates. exponent: a coordinate is ``x / w *
+    2**exponent``."""
 
     __slots__ = ("_down", "_index", "_n_floats", "_up", "exponent", "points", "xs", "ys")
 
@@ -67,7 +65,7 @@ class NodeTable:
         self._up, self._down = max(exponent, 0), max(-exponent, 0)
 
     def add(self, point: Homogeneous) -> int:
-        """Return the number of `point`, which must be `reduced`; a new point gets the next number."""
+        """Return the index of `point`, which must be `reduced`; a new point is appended."""
         number = self._index.get(point)
         if number is None:
             x, y, w = point
@@ -76,7 +74,7 @@ class NodeTable:
         return number
 
     def add_float(self, point: Homogeneous, x: float, y: float) -> int:
-        """Like `add`, for a point whose coordinates are exactly the doubles `x` and `y`."""
+        """Return the index of `point` as `add` does; its coordinates are exactly the doubles `x` and `y`."""
         number = self._index.get(point)
         if number is None:
             is_first = self._n_floats == len(self.points)
@@ -86,7 +84,7 @@ class NodeTable:
 
     @property
     def all_floats(self) -> bool:
-        """Whether every point so far was given as floats."""
+        """Whether all points were added by `add_float`."""
         return self._n_floats == len(self.points)
 
     def _new(self, point: Homogeneous, x: float, y: float) -> int:
@@ -97,7 +95,8 @@ class NodeTable:
         return number
 
     def compare(self, first: int, second: int) -> int:
-        """Return -1, 0 or 1: `first` is lexicographically smaller than, equal to, larger than `second` (x, then y)."""
+        """Return -1, 0 or 1 as point `first` is lexicographically (x, then y) less than, equal to or greater than
+        `second`."""
         a, b = self.xs[first], self.xs[second]
         if a != b:
             return -1 if a < b else 1
@@ -130,7 +129,7 @@ class NodeTable:
 
 
 def float_nodes(coordinates: FloatArray, budget: Budget | None = None) -> tuple[NodeTable, list[int]]:
-    """Return a table of the rows of `coordinates`, (n, 2) float64, finite, and the number of each row."""
+    """Return a table of the distinct rows of `coordinates`, (n, 2) float64, finite, and the index of each row in it."""
     doubles = [value for row in coordinates.tolist() for value in row]
     ratios = [value.as_integer_ratio() for value in doubles]
     # Denominators are powers of two: the largest is common to all.
@@ -156,7 +155,8 @@ Rational = int | float | Fraction
 def rational_nodes(
     coordinates: Iterable[Sequence[Rational]], budget: Budget | None = None
 ) -> tuple[NodeTable, list[int]]:
-    """Return a table of the points `coordinates`, (x, y) of ints, floats or fractions, and the number of each."""
+    """Return a table of the distinct points (x, y) of ints, floats or fractions, and the index of each input point in
+    it."""
     nodes, numbers = NodeTable(0), []
     for k, (x, y) in enumerate(coordinates):
         if budget is not None and k % _POLL == 0:

@@ -41,13 +41,9 @@ from engine.types import BoolArray, FloatArray, IntArray
 
 @dataclass(slots=True)
 class Piece:
-    """One region: a shell and the holes in it, each by the half-edges that leave its corners.
-
-    The first corner of a ring is the lexicographically smallest (x, then y).
-
-    evidence: the union of the evidence of the region's faces; hole_evidence: the same for each hole, of the regions on
-    the other side of its ring.
-    """
+    """One connected region: a shell and the holes in it; a ring is the list of half-edges that leave its corners. The
+    first corner of a ring is the lexicographically smallest (x, then y). evidence: union of the evidence of the
+    region's faces; hole_evidence: for each hole, that of the region on the other side of its ring."""
 
     shell: list[int] = field(default_factory=list)
     holes: list[list[int]] = field(default_factory=list)
@@ -56,10 +52,11 @@ class Piece:
 
 
 def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequence[frozenset[int]]) -> list[Piece]:
-    """Return the regions of the faces marked `inside`, in lexicographic order of their shells.
+    """Return the connected regions of the faces marked `inside`, in lexicographic order of their shells.
 
-    inside, evidence: by face; face 0 must be outside, marked 0; faces of two marks are two regions. Shells run
-    counter-clockwise, holes clockwise, also in lexicographic order: independent of the order of the input.
+    inside, evidence: by face; face 0 must be marked 0, outside; faces of different marks belong to different regions.
+    Shells run counter-clockwise, holes clockwise and in lexicographic order: the result does not depend on the order of
+    the input.
     """
     arrangement, faces = subdivision.arrangement, subdivision.faces
     bounds = [inside[left] != inside[right] for left, right in polled(zip(faces[0::2], faces[1::2]))]
@@ -100,7 +97,7 @@ def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequ
 
 
 def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int, int]:
-    """Return the lexicographic rank (x, then y) of each node that has boundary edges."""
+    """Return the lexicographic rank (x, then y) of each node with boundary edges."""
     nodes = arrangement.nodes
     used = sorted((node for node, fan in enumerate(polled(fans)) if fan), key=nodes.xs.__getitem__)
     in_order: list[int] = []
@@ -115,7 +112,8 @@ def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int,
 
 
 def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Sequence[int]) -> list[list[int]]:
-    """Return the cycles of `following` through `starts` as half-edges, cut where they pass a node twice."""
+    """Return the cycles through `starts` as lists of half-edges, cut into simple rings where a cycle visits a node
+    twice. following: the half-edge after each half-edge."""
     seen = [False] * len(following)
     rings: list[list[int]] = []
     for start in polled(starts):
@@ -144,9 +142,8 @@ def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Se
 def _corners(
     arrangement: Arrangement, fans: Sequence[Sequence[int]], rank: dict[int, int], ring: list[int]
 ) -> tuple[list[int], bool]:
-    """Return the half-edges that leave the corners of a simple ring, from the first corner on; and whether it is a
-    shell.
-    """
+    """Return the half-edges that leave the corners of a simple ring, from the lexicographically first corner on, and
+    whether the ring is a shell (counter-clockwise)."""
     lines = arrangement.lines
     corners: list[int] = []
     first, is_shell = -1, False
@@ -168,7 +165,7 @@ _PRECISIONS = (160, 640)  # bits of the largest term that are used; the second f
 
 @dataclass(frozen=True, slots=True)
 class ExactRings:
-    """Rings of exact vertices; a coordinate is ``x / w * 2**exponent``. Clockwise rings count as negative."""
+    """Rings of exact vertices; a coordinate is ``x / w * 2**exponent``. Areas of clockwise rings are negative."""
 
     rings: tuple[tuple[Homogeneous, ...], ...]
     exponent: int
@@ -178,11 +175,11 @@ class ExactRings:
         return len(self.rings)
 
     def exact_rings(self) -> ExactRings:
-        """Return the rings themselves; those of an overlay may have to be computed first."""
+        """Return self; the class for rings of an overlay has a method of this name that computes them."""
         return self
 
     def some(self, rings: Sequence[int]) -> ExactRings:
-        """Return the rings with these numbers."""
+        """Return the rings of these indices."""
         return ExactRings(tuple(self.rings[ring] for ring in rings), self.exponent)
 
     def places(self) -> list[list[tuple[Fraction, Fraction]]]:
@@ -193,7 +190,7 @@ class ExactRings:
         ]
 
     def _terms(self) -> list[tuple[int, int]]:
-        """Return numerators and denominators that add up to twice the area in units of ``4**exponent``."""
+        """Return fractions (numerator, denominator) whose sum is twice the area in units of ``4**exponent``."""
         whole = 0
         rest: list[tuple[int, int]] = []
         for ring in self.rings:
@@ -206,12 +203,12 @@ class ExactRings:
         return [(whole, 1), *rest]
 
     def area(self) -> Fraction:
-        """Return the exact area; its length grows with the number of crossings."""
+        """Return the exact area of all rings together; the length of the fraction grows with the crossings."""
         numerator, denominator = _sum(self._terms())
         return Fraction(numerator, 2 * denominator) * Fraction(4) ** self.exponent
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
-        """Return (n,) float64, the doubles nearest to the areas of the rings groups[k] .. groups[k + 1] - 1."""
+        """Return (n,) float64: for each k the double nearest to the area of rings groups[k] .. groups[k + 1] - 1."""
         return np.array([self.some(range(a, b)).nearest_area() for a, b in pairwise(groups.tolist())], np.float64)
 
     def nearest_area(self) -> float:
@@ -225,12 +222,12 @@ class ExactRings:
         return _nearest(*_sum(terms), 2 * self.exponent - 1)
 
     def are_shells(self) -> BoolArray:
-        """Return by ring whether its exact area is positive, also where that is no double."""
+        """Return for each ring whether its exact area is positive, even if that is too small or large for a double."""
         return np.array([_is_positive(self.some([ring])._terms()) for ring in range(self.n_rings)], np.bool_)
 
 
 def _is_positive(terms: Sequence[tuple[int, int]]) -> bool:
-    """Return whether the sum of terms is positive, by bounds or else exactly."""
+    """Return whether a sum of fractions (numerator, denominator) is positive: by bounds, else exactly."""
     for low, high, _ in _bounds(terms):
         if low > 0 or high < 0:
             return low > 0
@@ -238,7 +235,7 @@ def _is_positive(terms: Sequence[tuple[int, int]]) -> bool:
 
 
 def _bounds(terms: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
-    """Yield a lower and an upper bound of the sum of terms, times 2**shift, and that shift."""
+    """Yield (low, high, shift) with low <= 2**shift * (sum of the fractions) <= high, first coarse, then finer."""
     longest = max(abs(numerator).bit_length() - denominator.bit_length() for numerator, denominator in terms)
     for precision in _PRECISIONS:
         low = sum(_floor(numerator, denominator, precision - longest) for numerator, denominator in terms)
@@ -256,7 +253,7 @@ def _nearest(numerator: int, denominator: int, exponent: int) -> float:
 
 
 def _sum(terms: Iterable[tuple[int, int]]) -> tuple[int, int]:
-    """Return the sum of fractions as one, not reduced; by halves, so that long numbers are added to long ones."""
+    """Return a sum of fractions as one fraction, not reduced; in pairs, so that numbers of like length are added."""
     level: Sequence[tuple[int, int]] = list(terms)
     while len(level) > 1:  # bound: each turn halves the list
         odd = level[-1:] if len(level) % 2 else []

@@ -28,12 +28,8 @@ from engine.running.budget import poll, polled
 
 @dataclass(frozen=True, slots=True)
 class Subdivision:
-    """The faces of an arrangement.
-
-    around: by node its outgoing half-edges, counter-clockwise, beginning after straight down.
-    faces: by half-edge the face to its left; face 0 is the unbounded one.
-    n_faces: number of faces.
-    """
+    """The faces of an arrangement. around: by node its outgoing half-edges, counter-clockwise, from straight down on.
+    faces: by half-edge the face left of it; face 0 is the unbounded one. n_faces: number of faces."""
 
     arrangement: Arrangement
     around: list[list[int]]
@@ -49,7 +45,7 @@ def turn_of(first: Line, second: Line) -> int:
 
 
 def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
-    """Return by node its outgoing half-edges, counter-clockwise, beginning after straight down."""
+    """Return by node its outgoing half-edges, counter-clockwise, from straight down on."""
     lines = arrangement.lines
 
     # Lines run right or straight up, so all outgoing half-edges of even number lie within one half turn, the odd ones
@@ -71,7 +67,7 @@ def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
 
 
 def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[int]:
-    """Return by half-edge the next one around the face to its left (-1 for those not in `around`)."""
+    """Return by half-edge the next half-edge around the face left of it; -1 for half-edges not in `around`."""
     following = [-1] * n_half_edges
     for fan in polled(around):
         before = fan[-1] if fan else -1
@@ -82,7 +78,7 @@ def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[
 
 
 def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
-    """Return by half-edge the number of its cycle under `following`, and the number of cycles."""
+    """Return by half-edge the index of its cycle under the permutation `following`, and the number of cycles."""
     cycle = [-1] * len(following)
     n_cycles = 0
     for start in polled(range(len(following))):
@@ -96,10 +92,7 @@ def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
 
 
 def subdivide(arrangement: Arrangement) -> Subdivision:
-    """Return the faces of `arrangement`; cost: linear, plus one vertical ray for each connected component of the edges.
-
-    Polls the deadline of the current call, like all functions here.
-    """
+    """Return the faces of `arrangement`; cost: linear, plus a vertical ray per connected component of the edges."""
     around = half_edges_around(arrangement)
     cycle, n_cycles = cycles_of(next_half_edges(around, 2 * len(arrangement.tails)))
     # Cycle n_cycles stands for the boundary at infinity; joined to it, a cycle bounds the unbounded face.
@@ -117,7 +110,7 @@ def subdivide(arrangement: Arrangement) -> Subdivision:
 
 
 def _first_nodes(arrangement: Arrangement) -> list[int]:
-    """Return the first node (x, then y) of each connected component of the edges."""
+    """Return the lexicographically first node (x, then y) of each connected component of the edges."""
     compare = arrangement.nodes.compare
     joined = UnionFind(len(arrangement.nodes.points))
     for tail, head in polled(zip(arrangement.tails, arrangement.heads)):
@@ -132,11 +125,12 @@ def _first_nodes(arrangement: Arrangement) -> list[int]:
 
 
 def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, winds: bool = False) -> list[Any]:
-    """Return by face the exclusive or of the masks of the edges between it and infinity (label propagation).
+    """Return by face the exclusive or of the masks of the edges on a path from infinity to that face (label
+    propagation).
 
-    masks: by edge; default: those of the arrangement. Bit k of a label: the face lies in source k (even-odd), if each
-    source is a set of closed rings. winds: masks are the rings along each edge minus those against it, and labels are
-    winding numbers.
+    masks: by edge; None: those of the arrangement. Bit k of a label: the face lies in source k (even-odd), if each
+    source is a set of closed rings. winds: masks are numbers, rings along each edge minus rings against it, and labels
+    are winding numbers.
     """
     masks = subdivision.arrangement.masks if masks is None else masks
     faces = subdivision.faces
@@ -159,11 +153,9 @@ def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, wi
 
 
 class EdgesBelow:
-    """The edges of an arrangement, indexed for vertical rays down from a node, an infinitesimal step to its right.
-
-    Arrays of rounded coordinates prune (rounding is monotone), integers decide. Edges that begin at the node's x count,
-    edges that end there and vertical ones do not.
-    """
+    """The edges of an arrangement, for vertical rays down from a node, moved right by an infinitesimal step. Arrays of
+    rounded coordinates exclude most edges (rounding is monotone), integers decide. The ray meets an edge with tail.x <=
+    x < head.x, so no vertical edge."""
 
     __slots__ = ("_arrangement", "_high", "_low", "_x_max", "_x_min")
 
@@ -175,7 +167,8 @@ class EdgesBelow:
         self._low, self._high = np.minimum(ys[tails], ys[heads]), np.maximum(ys[tails], ys[heads])
 
     def find(self, node: int) -> int:
-        """Return the edge next below `node` (the node not on it), -1 where there is none."""
+        """Return the first edge below `node`, -1 if there is none; the node must not lie on an edge that does not end
+        in it."""
         nodes, lines = self._arrangement.nodes, self._arrangement.lines
         tails, heads = self._arrangement.tails, self._arrangement.heads
         x, y, point = nodes.xs[node], nodes.ys[node], nodes.points[node]
@@ -195,7 +188,7 @@ class EdgesBelow:
 
 
 def _is_above(first: Line, second: Line, point: Homogeneous) -> bool:
-    """Return whether `first` runs above `second` just right of `point`; both run to the right."""
+    """Return whether line `first` is above line `second` at x just right of `point`; both are directed to the right."""
     # On a x + b y + c w = 0 with b > 0 and w = 1: y = -(a x + c) / b, and the slope is -a / b.
     height = (first[0] * point[0] + first[2] * point[2]) * second[1]
     other = (second[0] * point[0] + second[2] * point[2]) * first[1]

@@ -33,7 +33,7 @@ class UnionFind:
 
 @merged
 def root_of(parent: Any, i: int) -> int:
-    """Return the representative of i in a forest, halving the path."""
+    """Return the root of the tree that contains i in a forest of parents, halving the path."""
     while parent[i] != i:  # bound: the path, which only gets shorter
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -42,7 +42,7 @@ def root_of(parent: Any, i: int) -> int:
 
 @merged
 def unite(parent: Any, i: int, j: int) -> None:
-    """Unite the sets of i and j; the smallest member is the root."""
+    """Unite the sets of i and j in a forest of parents; the smallest member becomes the root."""
     i, j = root_of(parent, i), root_of(parent, j)
     if i < j:
         parent[j] = i

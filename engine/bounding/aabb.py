@@ -48,12 +48,12 @@ def place_boxes(
     boxes: FloatArray, reaches: FloatArray, radii: FloatArray, kinds: IntArray, rows: IntArray, rotations: FloatArray,
     translations: FloatArray, low: FloatArray, high: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill low and high (n, d), rounded outward.
+    """Fill low and high (n, d) with boxes of posed bodies, rounded outward.
 
-    boxes (n_kinds, 2, d), of a ball its centre twice; reaches (n_kinds,): how far the body's points are at most from
-    the middle of the box (of a ball: its centre from there); radii (n_kinds,), 0.0 for others; kinds (n,) int64: the
-    row of each body in these; rows (n,) int64: of each body's pose in rotations (n_poses, d, d) and translations
-    (n_poses, d), -1 for none.
+    boxes (n_kinds, 2, d): low and high of each kind of body, of a ball its centre twice. reaches (n_kinds,): largest
+    distance of the body's points (of a ball: its centre) from the middle of the box. radii (n_kinds,): of balls, 0.0
+    for others. kinds (n,) int64: kind of each body. rows (n,) int64: row of its pose in rotations (n_poses, d, d) and
+    translations (n_poses, d), -1 for none.
     """
     dimension = low.shape[1]
     for body in range(low.shape[0]):
@@ -89,7 +89,8 @@ _ENLARGED: Final = 2.0**-20
 
 @allocating_kernel
 def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array) -> None:
-    """Fill the discs (n_nodes, 8, 8) of the inner nodes of a tree from its blocks (`lanes/faces.py`) and boxes."""
+    """Fill discs (n_nodes, 8, 8) at the inner nodes of a tree, from its blocks of triangles (`lanes/faces.py`) and its
+    boxes."""
     n_nodes = child.shape[0]
     parents = np.full(n_nodes, -1, np.int64)  # 8 times the parent, and the lane
     for node in range(n_nodes):
@@ -120,15 +121,15 @@ def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, dis
 
 @inline
 def _corner(rows: Float32Array, node: int, lane: int, corner: int) -> Point3:
-    """Return a corner of a triangle of a block; of boxes the first is the centre."""
+    """Return corner `corner` (0, 1, 2) of the triangle in a lane of a block; of boxes, corner 0 is the centre."""
     x, y, z = rows[node, 3 * corner, lane], rows[node, 3 * corner + 1, lane], rows[node, 3 * corner + 2, lane]
     return Point3(float(x), float(y), float(z))
 
 
 @inline
 def _set_normals(blocks: Float32Array, child: Int32Array, parents: IntArray, normals: FloatArray) -> None:
-    """Set normals (n_nodes, 3), zeros on entry, to the direction of the sum of the normals of all faces below each
-    node."""
+    """Set normals (n_nodes, 3), zero on entry, to the unit vector along the sum of the normals of all triangles below a
+    node. parents: 8 * parent node + lane; -1 for the root."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
             continue
@@ -156,8 +157,8 @@ def _set_reached(
     blocks: Float32Array, child: Int32Array, boxes: Float32Array, parents: IntArray, normals: FloatArray,
     reached: FloatArray,
 ) -> None:  # fmt: skip
-    """Set reached (n_nodes, 3): minimum and maximum of dot(corner, normal) over the corners below a node, and their
-    largest squared distance from the axis, relative to the middle of the node's box."""
+    """Set reached (n_nodes, 3): least and largest dot(corner, normal) over the triangles below a node, and the largest
+    squared distance of a corner from the axis; relative to the centre of the node's box."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
             continue

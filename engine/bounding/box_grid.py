@@ -39,11 +39,11 @@ from engine.running.budget import Budget
 from engine.types import FlagArray, FloatArray, IntArray
 
 _FASTEST: Final = 1e300
-"""Most cells per unit: keeps the product finite where all values of an axis lie within some subnormals."""
+"""Bound on cells per unit: keeps the product in `cell_of` finite where all values of an axis are nearly equal."""
 
 
 class Axis(NamedTuple):
-    """The cells along one axis."""
+    """A uniform division of an interval into cells; `cells_per_unit` is 0.0 for an empty interval."""
 
     low: float
     high: float
@@ -53,49 +53,49 @@ class Axis(NamedTuple):
 
 @inline
 def cell_of(value: float, low: float, cells_per_unit: float, n_cells: int) -> int:
-    """Return the cell of a value that is not below `low`."""
+    """Return the index of the cell that contains `value` >= `low`; values above the last cell count to it."""
     return int(min((value * 0.5 - low * 0.5) * cells_per_unit, n_cells - 1.0))
 
 
 def make_axis(low: float, high: float, n_cells: int) -> Axis:
-    """Return `n_cells` cells from low to high, one where there is no extent."""
+    """Return an `Axis` of `n_cells` cells from low to high, of one cell where low = high."""
     extent = high * 0.5 - low * 0.5
     return Axis(low, high, 0.0, 1) if extent <= 0.0 else Axis(low, high, min(n_cells / extent, _FASTEST), n_cells)
 
 
 BLOCK: Final = 1 << 18
-"""Most pairs yielded in one block: n boxes have up to n^2 / 2 pairs, which need not fit into memory; sorting a block
+"""Number of pairs in a block, since n boxes have up to n^2 / 2 pairs, which need not fit into memory; sorting a block
 takes some 20 ms."""
 _FEW, _FEWEST = 96, 256
-"""Below _FEW boxes all pairs are compared; from _FEWEST boxes on a grid is built."""
+"""Fewer than _FEW boxes: all pairs are compared. From _FEWEST boxes on a grid is built; between, a sweep."""
 _LARGE: Final = 64
 _ENLARGED: Final = 1.0 + 2.0**-20
 _MOST_PER_CELL: Final = 48
-"""Average number of boxes in the cell of a box beyond which a sweep is no slower than the grid."""
+"""Mean number of boxes that share a box's cell, from which a sweep is as fast as the grid."""
 
 
 CornerGrid = namedtuple("CornerGrid", "boxes numbers cells starts row layer")
-"""Boxes by cell, the large ones last; or, without cells, all as large ones.
+"""Boxes sorted by the cell of their low corner, large boxes last; without cells (a sweep) every box counts as large.
 
-boxes (n, 6): low, then high. numbers (n,): which box each is. cells (n,): its cell, -1 where it is large. starts
-(n_cells + 1,) int32: where each cell begins among them. row, layer: how far the next cell on y and on z is; 0
-without cells where the first column of `boxes` ascends.
+boxes (n, 6): low, then high. numbers (n,): index of each box in the input. cells (n,): cell of each box, -1 for a large
+box. starts (n_cells + 1,) int32: first box of each cell. row, layer: cells from one to the next along y and z; row 0:
+boxes are sorted by their first coordinate, for a sweep.
 """
 
 
 def pairs_of_boxes(low: FloatArray, high: FloatArray, flag: FlagArray, block: int = BLOCK) -> Iterator[IntArray]:
     """Yield the pairs ``(n_pairs, 2)``, first < second, of closed boxes ``(n, d)`` that have a common point, in blocks.
 
-    Each block is sorted; a later block may hold smaller indices. A block has about `block` pairs, or all pairs of one
-    box if these are more. Polls `flag` (1,) uint8 and stops early, with an invalid block, when it is set: the caller
-    checks the flag after each block.
+    Each block is sorted, and has about `block` pairs, or all pairs of one box if these are more; a later block may have
+    smaller indices. Stops early, with an invalid block, once `flag` (1,) uint8 is set: the caller checks it after each
+    block.
     """
     for keys in _keys_of_pairs(low, high, flag, block):
         yield np.stack([keys // len(low), keys % len(low)], axis=1)
 
 
 def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> IntArray:
-    """Return all pairs of `pairs_of_boxes` in one sorted array. Raises: as `Budget.check`."""
+    """Return the pairs of `pairs_of_boxes` as one sorted array (n_pairs, 2). Raises: as `Budget.check`."""
     blocks = [np.zeros(0, np.int64)]
     for block in _keys_of_pairs(low, high, budget.flag, BLOCK):
         budget.check()
@@ -111,7 +111,7 @@ def all_pairs_of_boxes(low: FloatArray, high: FloatArray, budget: Budget) -> Int
 
 
 def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: FlagArray, block: int) -> Iterator[IntArray]:
-    """Yield the blocks of `pairs_of_boxes`; each pair is encoded as first * n + second."""
+    """Yield the pairs of `pairs_of_boxes` in sorted blocks, each pair as the key first * n + second."""
     n_boxes = len(low)
     grid = _sweep_grid(low, high, np.arange(n_boxes), 1) if n_boxes < _FEW else None
     grid = grid or (_build_grid(low, high) if n_boxes >= _FEWEST else None) or _sorted_along_axis(low, high)
@@ -125,7 +125,7 @@ def _keys_of_pairs(low: FloatArray, high: FloatArray, flag: FlagArray, block: in
 
 @np.errstate(all="ignore")
 def _sorted_along_axis(low: FloatArray, high: FloatArray) -> CornerGrid:
-    """Return the boxes sorted by their low bounds on the axis where they are thinnest relative to the whole extent."""
+    """Return a `CornerGrid` for a sweep along the axis where the boxes are thinnest, relative to the whole extent."""
     finite = np.isfinite(low) & np.isfinite(high)
     width = np.where(finite, high, -np.inf).max(axis=0) - np.where(finite, low, np.inf).min(axis=0)
     share = np.where(finite, high - low, 0.0).sum(axis=0) / width
@@ -143,7 +143,7 @@ def _sweep_grid(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) 
 
 @np.errstate(all="ignore")
 def _build_grid(low: FloatArray, high: FloatArray) -> CornerGrid | None:
-    """Return the grid of boxes (n, d), or None if a sweep is faster."""
+    """Return the `CornerGrid` of boxes (n, d), or None where a sweep is faster."""
     n_boxes, dimension = low.shape
     extent = np.empty(n_boxes)
     _measure_extents(low, high, extent)
@@ -169,7 +169,7 @@ def _build_grid(low: FloatArray, high: FloatArray) -> CornerGrid | None:
 
 @kernel
 def _measure_extents(low: FloatArray, high: FloatArray, extent: FloatArray) -> None:
-    """Fill extent (n,) with the largest side of each box, infinite where a bound is or the side overflows."""
+    """Fill extent (n,) with the largest side of each box, infinite where a bound is infinite or the side overflows."""
     for box in range(low.shape[0]):
         side = 0.0
         for axis in range(low.shape[1]):
@@ -181,7 +181,7 @@ def _measure_extents(low: FloatArray, high: FloatArray, extent: FloatArray) -> N
 
 @kernel
 def _corner_ranges(low: FloatArray, extent: FloatArray, widest: float, span: FloatArray) -> None:
-    """Fill span (2, 3) with the least and greatest low corner of the boxes that are not large."""
+    """Fill span (2, 3) with the least and largest low corner among boxes of extent <= `widest`."""
     for box in range(low.shape[0]):
         if extent[box] <= widest:
             for axis in range(low.shape[1]):
@@ -194,8 +194,8 @@ def _sort_into_cells(
     low: FloatArray, high: FloatArray, extent: FloatArray, widest: float, least: FloatArray, width: FloatArray,
     grid: CornerGrid,
 ) -> int:  # fmt: skip
-    """Fill the arrays of the grid; return the sum over cells of the squared number of boxes. boxes and starts are zero
-    on entry."""
+    """Fill the arrays of `grid`; boxes and starts are zero on entry. Return the sum of (number of boxes)^2 over the
+    cells."""
     starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
     cells = np.empty(n_boxes, np.int64)
     n_small = 0
@@ -230,7 +230,7 @@ def _sort_into_cells(
 
 @inline
 def _boxes_intersect(boxes: FloatArray, box: int, other: int) -> bool:
-    """Return whether two closed boxes have a common point; without branches, because a branch would be mispredicted."""
+    """Return whether two closed boxes have a common point; without branches, which would be mispredicted."""
     return (
         (boxes[box, 0] <= boxes[other, 3])
         & (boxes[other, 0] <= boxes[box, 3])
@@ -245,8 +245,8 @@ def _boxes_intersect(boxes: FloatArray, box: int, other: int) -> bool:
 def _append_run(
     boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, keys: IntArray, n_pairs: int
 ) -> int:
-    """Append the keys of the pairs of a box and the boxes of a run that intersect it; return the new number of keys.
-    One key beyond that number may be overwritten."""
+    """Append to keys the pairs of `box` with those boxes start .. stop - 1 that it intersects; return the new number of
+    keys. The entry after the last key may be overwritten."""
     n_boxes, own = numbers.shape[0], numbers[box]
     for other in range(start, stop):
         number = numbers[other]
@@ -257,10 +257,8 @@ def _append_run(
 
 @kernel
 def _collect_pairs(grid: CornerGrid, start: int, enough: int, keys: IntArray, flag: FlagArray) -> tuple[int, int]:
-    """Write the keys first * n + second of the pairs of boxes from place `start` on, until there are at least `enough`.
-
-    Returns the number of keys and the place to continue from.
-    """
+    """Write keys first * n + second for the boxes from index `start` on, until there are at least `enough`. Returns the
+    number of keys, and the index to go on from."""
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer
     n_boxes, n_small, n_pairs = numbers.shape[0], int(starts[-1]), 0
     for box in range(start, n_boxes):

@@ -39,29 +39,30 @@ HEURISTIC_DEPTH = 40
 """Below this depth runs are halved, so no block lies deeper than `MAX_DEPTH`."""
 MAX_DEPTH = HEURISTIC_DEPTH + 40  # 2^40 items and more do not fit into memory
 STACK = WIDTH * (MAX_DEPTH + 1)
-"""Bound on the nodes waiting in a descent of a tree: eight for each level."""
+"""Bound on the number of nodes on the stack while a tree is descended: eight for each level."""
 UNUSED = np.float32(-1e30)
 ENLARGED = 2.0**-21
-"""Relative enlargement of half widths, as a part of |centre| + half width: low and high are off by 2^-24 of themselves
-in float32, their middle and half difference by as much each, and both are rounded once more."""
+"""Enlargement of half widths relative to |centre| + half width: low and high are rounded by 2^-24 of themselves, so are
+their mean and half difference, and both results once more."""
 LEAST = 2.0**-100
 """Absolute enlargement of half widths: above all underflow, below every difference that a query can detect."""
 _SAMPLE = 31
 _HUGE = 2.0**1022
-"""Half of an extent whose origin is its middle: from an end, twice as far could be no double."""
+"""Half extent from which the origin is the middle: from a point near an end the difference to the other end could
+overflow."""
 
 _FEW_ROWS = 64
 _FEW_ITEMS, _FEW_BINS = 64, 8
 """A run of at most _FEW_ITEMS items is split with _FEW_BINS bins, because the bins would cost more than the items."""
 _FINITE = 1e30
 _NO_BOX = np.float32(np.inf)
-"""Bound of the empty box, which leaves any box that it is joined to unchanged."""
+"""Bound of the empty box; its union with a box is that box."""
 _WORK = 1 << 18
-"""Items processed, or nodes filled, between two deadline checks: about 10 ms."""
+"""Number of items processed, or nodes filled, between two checks of the deadline: about 10 ms."""
 
 
 class Bvh(NamedTuple):
-    """Arrays of the tree, laid out as in the table above."""
+    """Arrays of the tree; boxes and child as in the table of this module."""
 
     boxes: Float32Array
     child: Int32Array
@@ -71,13 +72,13 @@ class Bvh(NamedTuple):
 
 
 Items = namedtuple("Items", "boxes centres order")
-"""The items, in the order of the tree: boxes (n, 8), as lanes/boxes.py has them; centres (n, 8), boxes without extent;
-order (n,), which item it is."""
+"""Boxes from which the tree is built, in the order of its leaves: boxes (n, 8), as lanes/boxes.py has them; centres (n,
+8), boxes without extent; order (n,), index of each box in the input."""
 
 BinaryTree = namedtuple("BinaryTree", "boxes centres left runs")
-"""A binary tree whose leaves are runs of at most eight items: boxes and centres (2 n - 1, 8), around the items of a
-node and around their centres; left, the left child, the right one follows, or -1; runs (2 n - 1, 2), first item and
-end."""
+"""A binary tree whose leaves are runs of at most eight items: boxes and centres (2 n - 1, 8), the bounds of a node's
+items and of their centres; left, index of the left child (the right child follows), or -1; runs (2 n - 1, 2), first
+item of the node and end."""
 
 Bins = namedtuple("Bins", "boxes centres numbers costs")
 """Bins of the surface-area heuristic along an axis.
@@ -86,15 +87,13 @@ Bins = namedtuple("Bins", "boxes centres numbers costs")
 |---|---|---|
 | boxes, centres | (16, 8) | bounds of the items, and of their centres |
 | numbers | (16,) | number of items |
-| costs | (16,) | cost of the items of this bin and all bins to the right |
+| costs | (16,) | cost of the items of this bin and of all bins right of it |
 """
 
 
 def build_bvh(boxes: FloatArray) -> Bvh:
-    """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1.
-
-    Cost: n log n; the two stored arrays take some 45 bytes an item. Raises: what `poll` does.
-    """
+    """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1. Cost: n log n;
+    the two stored arrays take some 45 bytes an item. Raises: what `poll` does."""
     n_items, origin = len(boxes), np.empty(3)
     n_halves = 2 * n_items - 1
     own, around = np.empty((2, n_items, WIDTH), np.float32), np.empty((2, n_halves, WIDTH), np.float32)
@@ -116,7 +115,7 @@ def build_bvh(boxes: FloatArray) -> Bvh:
 
 
 def cache_aligned(array: Any) -> Any:
-    """Return a read-only copy aligned to a cache line, unless the array is small."""
+    """Return a read-only copy of an array, aligned to a cache line unless it is small."""
     aligned_copy = aligned(array.shape, array.dtype) if len(array) > _FEW_ROWS else np.empty_like(array)
     aligned_copy[:] = array
     aligned_copy.setflags(write=False)
@@ -125,8 +124,8 @@ def cache_aligned(array: Any) -> Any:
 
 @kernel
 def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: BinaryTree) -> float:
-    """Write the boxes in the coordinates of the tree to items, the origin (3,), and the root of the binary tree; return
-    the scale."""
+    """Write the boxes in tree coordinates to items, and set origin (3,) and the root of the binary tree; return the
+    scale."""
     n_items, half = boxes.shape[0], 0.0
     for axis in range(3):
         low, high = boxes[0, axis], boxes[0, 3 + axis]
@@ -154,7 +153,7 @@ def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: Bina
 
 @allocating
 def _middle_of(boxes: FloatArray, axis: int) -> float:
-    """Return the median of a sample of the centres of boxes along an axis."""
+    """Return the median, over a sample of boxes, of their centre's coordinate on an axis."""
     n_seen, step = 0, (len(boxes) - 1) // _SAMPLE + 1
     sorted_centres = np.empty(_SAMPLE)
     for item in range(0, len(boxes), step):
@@ -169,24 +168,22 @@ def _middle_of(boxes: FloatArray, axis: int) -> float:
 
 @inline
 def _set_empty(halves: Any, node: int) -> None:
-    """Set the boxes of a node, or of a bin, to the empty box."""
+    """Set the bounds of a node (or bin) to the empty box."""
     fill(halves.boxes, node, _NO_BOX)
     fill(halves.centres, node, _NO_BOX)
 
 
 @inline
 def _include(halves: Any, node: int, others: Any, other: int) -> None:
-    """Join the boxes and centres of an item (or bin) to those of a node (or bin)."""
+    """Enlarge the bounds of a node (or bin) by those of an item (or bin)."""
     join(halves.boxes, node, others.boxes, other)
     join(halves.centres, node, others.centres, other)
 
 
 @allocating_kernel
 def _build_binary_tree(items: Items, halves: BinaryTree, stack: IntArray, state: IntArray) -> None:
-    """Continue to build the binary tree, for at most `_WORK` items.
-
-    stack: rows (node, depth) waiting. state: the number of rows waiting, the number of nodes. Caller guarantees 2 n - 1
-    rows of nodes, the first filled.
+    """Continue building the binary tree, for about `_WORK` items. stack: (node, depth) of nodes to be split. state:
+    length of the stack, number of nodes. Caller guarantees 2 n - 1 rows of nodes, the first filled.
     """
     n_stack, n_nodes, n_seen = state[0], state[1], 0
     boxes, centres = np.empty((N_BINS, WIDTH), np.float32), np.empty((N_BINS, WIDTH), np.float32)
@@ -220,11 +217,8 @@ def _build_binary_tree(items: Items, halves: BinaryTree, stack: IntArray, state:
 def _collapse_to_eight(
     items: Items, halves: BinaryTree, boxes: Float32Array, child: Int32Array, stack: IntArray, state: IntArray
 ) -> None:
-    """Continue to collapse binary nodes into nodes of eight children, largest boxes first, for at most `_WORK` / 8
-    nodes.
-
-    stack: rows (binary node, node) waiting. state: the number of rows waiting, the number of nodes filled or waiting.
-    """
+    """Continue merging binary nodes into nodes of eight children, largest boxes first, for at most `_WORK` / 8 nodes.
+    stack: (binary node, node) to be filled. state: length of the stack, number of nodes filled or on it."""
     n_stack, n_nodes = state[0], state[1]
     gathered, left, runs = np.empty(WIDTH, np.int64), halves.left, halves.runs
     for _ in range(_WORK // WIDTH):
@@ -265,7 +259,7 @@ def _collapse_to_eight(
 
 @inline
 def _set_lane(boxes: Float32Array, node: int, lane: int, rows: Float32Array, row: int) -> None:
-    """Store a box in a lane as centre and enlarged half widths."""
+    """Store a box (low, -high) in a lane of a node, as centre and enlarged half widths."""
     for axis in range(3):
         low, high = float(rows[row, axis]), -float(rows[row, 4 + axis])
         boxes[node, axis, lane] = 0.5 * (low + high)
@@ -280,8 +274,8 @@ def _half_area(rows: Float32Array, row: int) -> float:
 
 @inline
 def _partition(items: Items, halves: BinaryTree, node: int, bins: Bins, parts: int) -> int:
-    """Partition the run of a node by the heuristic and set the boxes of its children `parts` and `parts` + 1; return
-    the start of the right part, or the start of the run if there is no useful cut."""
+    """Sort the items of a node into two children, nodes parts and parts + 1, by the surface-area heuristic; set their
+    bounds. Returns the index of the right child's first item; the node's first item if there is no useful cut."""
     start, end, low, width, axis = halves.runs[node, 0], halves.runs[node, 1], np.float32(0.0), np.float32(-1.0), 0
     for candidate in range(3):
         smallest, largest = halves.centres[node, candidate], -halves.centres[node, 4 + candidate]
@@ -322,8 +316,7 @@ def _bin_of(centre: float, low: float, scale: float, n_bins: int) -> int:
 
 @inline
 def _cheapest_cut(boxes: Float32Array, scratch: int, bins: Bins, n_bins: int) -> int:
-    """Return the number of bins left of the cheapest cut, 0 if no cut has a finite cost. Overwrites the row `scratch`
-    of boxes."""
+    """Return how many bins are left of the cheapest cut, 0 if no cut has a finite cost. Overwrites boxes[scratch]."""
     fill(boxes, scratch, _NO_BOX)
     number = 0
     for index in range(n_bins - 1, 0, -1):

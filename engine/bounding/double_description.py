@@ -43,15 +43,15 @@ class _Ray:
 
 
 def corners_of_half_spaces(rows: Sequence[Sequence[float]], budget: Budget | None = None) -> Corners:
-    """Return the corners of the points with ``row . (p, 1) >= 0`` for all rows.
+    """Return the `Corners` of the set of points p with ``row . (p, 1) >= 0`` for all rows.
 
-    Rows of finite floats, one number more than a point has; redundant and parallel rows are welcome.
-    Cost: rows times corners in integer arithmetic, pairs of rays a new row parts; milliseconds for tens of rows.
-    Raises: TooComplexError beyond 20,000 corners, DeadlineExceededError, CancelledError.
+    rows: finite floats, one more than a point has coordinates; redundant and parallel rows are allowed. Cost: rows
+    times corners in integer arithmetic, pairs of rays that a new row separates; milliseconds for tens of rows. Raises:
+    TooComplexError beyond 20,000 corners, DeadlineExceededError, CancelledError.
 
-    >>> triangle = corners_of_half_spaces([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-2.0, -2.0, 1.0]])
-    >>> sorted((float(x), float(y)) for x, y in triangle.points), triangle.is_bounded
-    ([(0.0, 0.0), (0.0, 0.5), (0.5, 0.0)], True)
+        >>> triangle = corners_of_half_spaces([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-2.0, -2.0, 1.0]])
+        >>> sorted((float(x), float(y)) for x, y in triangle.points), triangle.is_bounded
+        ([(0.0, 0.0), (0.0, 0.5), (0.5, 0.0)], True)
     """
     budget = budget or Budget()
     size = len(rows[0])
@@ -74,7 +74,9 @@ def corners_of_half_spaces(rows: Sequence[Sequence[float]], budget: Budget | Non
 def _add(
     constraint: Vector, number: int, lines: list[Vector], rays: list[_Ray], budget: Budget
 ) -> tuple[list[Vector], list[_Ray]]:
-    """Return the lines and rays of a cone intersected with the half-space of a constraint."""
+    """Return the lines and rays of the cone (lines, rays) intersected with the half-space constraint . x >= 0. number:
+    index of the constraint, its bit in `_Ray.zeros`.
+    """
     bit, slopes = 1 << number, [_dot(constraint, line) for line in lines]
     i_line = next((i for i, slope in enumerate(slopes) if slope != 0), None)
     if i_line is None:
@@ -88,10 +90,9 @@ def _add(
 
 
 def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: Budget) -> list[_Ray]:
-    """Return the rays of a pointed cone intersected with the half-space of a constraint.
-
-    n_common: adjacent rays lie on a face of dimension 2, so they share at least this many constraints.
-    """
+    """Return the rays of a pointed cone intersected with the half-space constraint . x >= 0. n_common: least number of
+    constraints that are zero on two adjacent rays, which lie on a common face of dimension 2. bit: of this constraint
+    in `_Ray.zeros`."""
     before: list[tuple[_Ray, int]] = []
     behind: list[tuple[_Ray, int]] = []
     survivors: list[_Ray] = []
@@ -118,7 +119,7 @@ def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: 
 
 
 def _project_onto(constraint: Vector, vector: Vector, line: Vector, slope: int) -> Vector:
-    """Return `vector` moved along the line onto the plane of the constraint, times a positive number."""
+    """Return a positive multiple of `vector` + s line, with s such that it lies on the plane of the constraint."""
     value = _dot(constraint, vector)
     return reduced([slope * x - value * y for x, y in zip(vector, line)])
 

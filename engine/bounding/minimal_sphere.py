@@ -74,14 +74,15 @@ def minimal_sphere(points: FloatArray, budget: Budget | None = None) -> MinimalS
 
 
 def minimal_sphere_of_rationals(points: list[Rational], budget: Budget | None = None) -> MinimalSphere:
-    """Return the smallest sphere around points with rational coordinates, at least one."""
+    """Return the smallest sphere that encloses points with rational coordinates, at least one."""
     rounded = np.array([[nearest_float(x) for x in point] for point in points])
     slack = math.sqrt(rounded.shape[1]) * float(np.spacing(np.abs(rounded)).max())
     return _Walk(rounded, points.__getitem__, slack, budget or Budget()).sphere()
 
 
 class _Walk:
-    """State of one search: points in float64, their exact coordinates on demand, and a bound on the difference."""
+    """State of one search: points in float64, their exact coordinates by index, and a bound on the distance between the
+    two."""
 
     def __init__(self, points: FloatArray, exact: Callable[[int], Rational], slack: float, budget: Budget) -> None:
         self.points = points
@@ -106,7 +107,7 @@ class _Walk:
         return MinimalSphere(near, radius, center, square, tuple(sorted(support)), self.n_candidates, self.n_rational)
 
     def _ball_of(self, indices: tuple[int, ...]) -> tuple[tuple[int, ...], Rational, Fraction]:
-        """Return support, centre and squared radius of the smallest ball of a few points; the first lies on its
+        """Return support, centre and squared radius of the smallest ball of some points; points[indices[0]] is on its
         surface."""
         places = [self.exact(index) for index in indices]
         common = math.lcm(*(x.denominator for place in places for x in place))
@@ -117,10 +118,9 @@ class _Walk:
         return tuple(indices[i] for i in ball.support), center, Fraction(ball.square, scale * scale)
 
     def _distances(self, center: FloatArray) -> tuple[FloatArray, Fraction]:
-        """Return the squared distances from `center` in the square of a unit, and that unit, a power of two.
-
-        error: a difference, a square and a sum of at most three terms: each size is within ``8 _UNIT size + _TINY`` of
-        the exact one, in this unit, in which the largest component of a vector is between 1/2 and 1.
+        """Return the squared distances of the points from `center` in units of unit^2, and unit, a power of two. error:
+        a difference, a square and a sum of at most three terms: each result is within ``8 _UNIT result + _TINY`` of the
+        exact one; the largest component of a vector is between 1/2 and 1 unit.
         """
         with np.errstate(over="ignore", under="ignore"):
             vectors, unit = self.points - center, Fraction(1)
@@ -133,7 +133,8 @@ class _Walk:
             return (vectors * vectors).sum(axis=1), unit * Fraction(2) ** exponent
 
     def _farthest_outside(self, center: Rational, square: Fraction) -> int | None:
-        """Return a point outside the exact ball, about the farthest by float64 distances; None if there is none."""
+        """Return the index of a point outside the exact ball, about the farthest one; None if the ball contains all
+        points."""
         rounded = np.array([nearest_float(x) for x in center])
         sizes, unit = self._distances(rounded)
         shift = [(x - Fraction(y)) / unit for x, y in zip(center, rounded.tolist())]
@@ -156,7 +157,8 @@ class _Walk:
         return self._exactly_farthest(candidates.tolist(), center, square)
 
     def _exactly_farthest(self, candidates: list[int], center: Rational, square: Fraction) -> int | None:
-        """Return the candidate farthest outside the ball, in integers; None if none is outside."""
+        """Return the candidate that is farthest outside the ball by integer arithmetic; None if the ball contains all
+        candidates."""
         common = math.lcm(*(x.denominator for x in center))
         tops = [x.numerator * (common // x.denominator) for x in center]
         farthest, largest = None, square
@@ -172,10 +174,8 @@ class _Walk:
         return farthest
 
     def _radius_about(self, center: FloatArray) -> float:
-        """Return the smallest double whose closed ball about `center` contains every point.
-
-        bound: each iteration takes the distance of a point outside the last radius, so radii grow strictly.
-        """
+        """Return the smallest double whose closed ball about `center` contains every point. bound: each iteration takes
+        the distance of a point outside the last radius, so radii grow strictly."""
         place = tuple(map(Fraction, center.tolist()))
         outside: int | None = int(self._distances(center)[0].argmax())
         radius = 0.0
@@ -188,19 +188,19 @@ class _Walk:
 
 
 def _round_up(value: Fraction) -> float:
-    """Return a double not below `value`, capped at the largest useful one."""
+    """Return a double >= value, at most about 1e100."""
     return float(min(value, Fraction(10) ** 100)) * (1.0 + 4.0 * _UNIT) + _TINY
 
 
 def excess_double_double(
     points: FloatArray, center: FloatArray, shift: list[Fraction], square: Fraction, unit: Fraction
 ) -> tuple[FloatArray, float]:
-    """Return squared distance minus `square` for each point, and the bound on its error; both in `unit` squared.
+    """Return |p - c|^2 - `square` for each point p and the exact centre c, and a bound on the error; both in units of
+    unit^2.
 
-    center, shift: the exact centre is ``center + unit * shift``; the shift is below an ulp of the centre. unit: a power
-    of two in which no vector has a component above 1.
-    bound: the vector is a double-double from the exact difference, its square and the sum lose less than 2^-98 each
-    (components at most 1, three terms); what the rounded shift loses enters twice per axis.
+    center, shift: c = center + unit * shift, with |shift| below an ulp of the centre. unit: a power of two in which no
+    component of p - c is above 1. bound: p - c is a double-double from the exact difference; its square and the sum
+    lose less than 2^-98 each (components at most 1, three terms); what the rounded shift loses enters twice per axis.
     """
     factor = 0.25 if unit >= 2**1020 else 1.0  # differences must not overflow; what underflow takes is below 2^-2000
     exponent = math.frexp(unit * Fraction(factor))[1] - 1
@@ -224,7 +224,7 @@ def excess_double_double(
 
 
 def _two_square(a: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the rounded squares and their exact errors (Dekker's splitting; sizes at most 1)."""
+    """Return the rounded squares of a and their exact errors (Dekker's splitting; |a| at most 1)."""
     product, wide = a * a, a * 134217729.0  # 2^27 + 1
     top = wide - (wide - a)
     rest = a - top
@@ -232,10 +232,8 @@ def _two_square(a: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def root_up(square: Fraction) -> float:
-    """Return the smallest double whose square is at least `square` >= 0.
-
-    Raises: NotRepresentableError if that is beyond float64.
-    """
+    """Return the smallest double whose square is at least `square` >= 0. Raises: NotRepresentableError if that is
+    beyond float64."""
     top, bottom = square.numerator, square.denominator
     shift = max(0, 128 - top.bit_length() + bottom.bit_length()) // 2 + 1  # 64 bits and more in the root
     root = nearest_float(Fraction(math.isqrt((top << 2 * shift) // bottom), 1 << shift))
@@ -263,11 +261,9 @@ class IntBall:
 
 
 def smallest_ball(points: Sequence[IntPoint], through: int) -> IntBall:
-    """Return the smallest ball of points; ``points[through]`` is known to lie on its surface.
-
-    Support sets of at most dimension + 1 points are tried from the smallest up; the smallest ball is unique and has
-    such a support, so the first ball that contains all points is it. For at most dimension + 2 points: 15 sets.
-    """
+    """Return the smallest ball of integer points; ``points[through]`` must be on its surface. Support sets of at most
+    dimension + 1 points are tried from the smallest up; the smallest ball is unique and has such a support, so the
+    first ball that contains all points is that ball. For at most dimension + 2 points: 15 sets."""
     others = [index for index in range(len(points)) if index != through]
     for size in range(min(len(others), len(points[0])) + 1):
         for chosen in combinations(others, size):
@@ -278,7 +274,7 @@ def smallest_ball(points: Sequence[IntPoint], through: int) -> IntBall:
 
 
 def _ball_through(points: Sequence[IntPoint], support: tuple[int, ...]) -> IntBall | None:
-    """Return the smallest ball through all points of `support` if its centre lies in their convex hull, else None."""
+    """Return the smallest ball through all points of `support`, or None if its centre is not in their convex hull."""
     first, *others = (points[index] for index in support)
     steps = [tuple(x - x0 for x, x0 in zip(point, first)) for point in others]
     gram = [[sum(a * b for a, b in zip(u, v)) for v in steps] for u in steps]

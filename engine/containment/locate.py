@@ -32,21 +32,19 @@ from engine.types import UNDECIDED, Accuracy, BoolArray, FloatArray, Int8Array
 SMALL_BATCH: Final = 1024
 """Largest number of points of the fast path: more are a chunk of the general path."""
 _SMALL: Final = 32
-"""Edges of a polygon that is always decided in one pass, whatever the number of points."""
+"""Number of edges up to which a polygon is always decided in one pass over its edges, however many points there are."""
 _NO_FLAG: Final = np.zeros(1, np.uint8)
 _KEYS: Final = {Choice.PASS: "pass_plan", Choice.LISTS: "list_plan", Choice.CELLS: "plan"}
 
 Plan: TypeAlias = tuple[Any, tuple[Any, ...], str]
-"""Compiled code, the arguments between points and locations, and the name of the method."""
+"""(compiled kernel, its arguments between points and locations, name of the method for `Accuracy.method`)."""
 Located: TypeAlias = tuple[Int8Array, int, int, str]
-"""Locations (n,), number of points beyond the filter, number decided in rationals, and the method."""
+"""(locations (n,) int8, number of points that the filter left open, number decided in rationals, name of the method).
+"""
 
 
 def locate_small_batch(points: object, solid: Solid) -> Located | None:
-    """Locate a small batch on the fast path; return None if the caller must use the general path.
-
-    Raises as `locate` does.
-    """
+    """Locate a small batch on the fast path; None where the general path must be taken. Raises as `locate` does."""
     if not isinstance(solid, Solid):
         return None
     array: Any = points
@@ -92,8 +90,8 @@ def _with_exact_fallback(array: FloatArray, solid: Solid, locations: Int8Array, 
 
 
 def _plan_of(solid: Solid, n_points: int) -> Plan | None:
-    """Return the cached plan of a solid, made if possible; None if policy.py chooses cells or no kernel is compiled
-    yet."""
+    """Return the `Plan` of a solid for a batch of `n_points`, made at first use; None if `policy.py` chooses cells, or
+    if the kernel is not compiled yet."""
     if isinstance(solid, Polygon) and len(solid.vertices) <= _SMALL:
         return _cached_plan(solid, "plan", polygon_by(solid, Choice.PASS, UNLIMITED))
     if isinstance(solid, Polygon):

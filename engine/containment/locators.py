@@ -43,7 +43,7 @@ Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 
 
 class Counts(NamedTuple):
-    """Numbers of points of a chunk that were beyond the filter, and that were decided in rationals."""
+    """Of the points of a chunk: how many the filter left open, and how many were decided in rationals."""
 
     beyond: int
     rational: int
@@ -58,23 +58,22 @@ class Locator(NamedTuple):
     """Locates the points (n, dim) of a chunk into int8 (n,). Raises NotFiniteError unless a callable decides."""
     decisions: Literal["exact", "float64"] = "exact"
     for_batch: Callable[[int, Budget], Locator] | None = None
-    """Returns the locator for a number of points, if the choice depends on it; may build a structure that amortises."""
+    """Returns the locator for a number of points, where the choice depends on that number; may build a structure."""
     direct: tuple[Any, ...] = ()
-    """The kernel and its arguments between points and locations, if the locator is that kernel with its fallback
-    alone."""
+    """(kernel, its arguments between points and locations), where the locator is that kernel with its exact fallback
+    only; else ()."""
     is_long: bool = False
-    """Whether a call takes long whatever the number of points, so that a batch should be one chunk."""
+    """Whether a call takes long however few points there are, so that a batch should not be cut into chunks."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
-        """Return the locator for a batch of `n_points`."""
+        """Return the locator for a batch of `n_points` points."""
         return self if self.for_batch is None else self.for_batch(n_points, budget)
 
 
 def with_exact_fallback(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) -> Fill:
-    """Wrap a filter kernel with an exact fallback for UNDECIDED points.
-
-    kernel: returns how many points were beyond its filter (UNDECIDED ones included), or NOT_FINITE. Raises:
-    NotFiniteError, which names no point; what `Budget.check` raises, also if the kernel stopped early.
+    """Return a `Fill` that calls a filter kernel, then `rest` for the points that the kernel leaves UNDECIDED. kernel:
+    returns how many points its filter left open (UNDECIDED ones included), or NOT_FINITE. Raises: NotFiniteError, which
+    names no point; what `Budget.check` raises, also where the kernel stopped early.
     """
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
@@ -93,7 +92,8 @@ def with_exact_fallback(kernel: Callable[[FloatArray, Int8Array, Budget], int], 
 
 
 def settle(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray, budget: Budget) -> int:
-    """Locate the points of a chunk at the indices `items` by `fill`; return how many it decided in rationals."""
+    """Locate points[items] by `fill` and write the results to locations[items]; return how many were decided in
+    rationals."""
     if not len(items):
         return 0
     results = np.empty(len(items), np.int8)
@@ -103,9 +103,8 @@ def settle(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray
 
 
 def locator_of(solid: Solid) -> Locator:
-    """Return the locator of `solid`; prepares nothing yet.
-
-    Raises: UnsupportedSolidError.
+    """Return the `Locator` for the type of `solid`; its structures are prepared at the first call. Raises:
+    UnsupportedSolidError.
     """
     row = row_of(solid)
     if row.locator is not None:
@@ -117,7 +116,7 @@ def locator_of(solid: Solid) -> Locator:
 
 
 def exact_fallback(solid: Solid, pose: Pose | None = None) -> Fill:
-    """Return the fill that decides each point in rational arithmetic."""
+    """Return a `Fill` that locates each point in rational arithmetic, in `solid` under `pose` (None: not moved)."""
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         for item, point in enumerate(points.tolist()):
@@ -145,23 +144,23 @@ def _by_choice(method: str, choose: Callable[[int, Budget], Locator]) -> Locator
 
 
 def rows_locator(solid: HalfSpace | Convex) -> Locator:
-    """Return the locator of a half-space or convex solid, by the signs of its planes."""
+    """Return the locator of a half-space or convex solid: signs of the plane equations at the point."""
     rows = rows_of(solid)
     return by_kernel("half_spaces", locate_in_half_spaces, solid, rows, np.ones(len(rows), np.bool_))
 
 
 def ball_locator(solid: Sphere) -> Locator:
-    """Return the locator of a ball, by the squared distance from the centre."""
+    """Return the locator of a ball: sign of r^2 - |p - c|^2."""
     return by_kernel("squared_distance", locate_in_ball, solid, solid.center, 0.0, solid.radius)
 
 
 def box_locator(solid: Aabb) -> Locator:
-    """Return the locator of a box, by comparisons of coordinates."""
+    """Return the locator of an axis-aligned box: comparisons of coordinates."""
     return by_kernel("comparison", locate_in_box, solid, EXACT, solid.min, solid.max)
 
 
 def triangle_locator(solid: Triangle) -> Locator:
-    """Return the locator of a planar triangle, or of the prism over a triangle of space."""
+    """Return the locator of a planar triangle, or of the prism over a triangle in space."""
     if solid.dimension == 2:
         return _by_choice(
             "same_side", lambda *_: by_kernel("same_side", locate_in_rings, solid, EXACT, edges_of(solid))
@@ -177,7 +176,7 @@ def polygon_locator(solid: Polygon) -> Locator:
 
 
 def polygon_by(solid: Polygon, choice: int, budget: Budget) -> Locator:
-    """Return the locator of a polygon by the structure that policy.py chose, built if missing."""
+    """Return the locator of a polygon by one structure, built at first use; choice: PASS, LISTS (slabs) or CELLS."""
     if choice == Choice.CELLS:
         return by_kernel("ring_cells", locate_in_rings, solid, EXACT, ring_cells_of(solid, budget.flag, budget.check))
     rings = edges_of(solid) if choice == Choice.PASS else rings_of(solid, budget.check)
@@ -192,7 +191,7 @@ def polyhedron_locator(solid: Polyhedron) -> Locator:
 
 
 def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
-    """Return the locator of a polyhedron by the structure that policy.py chose, built if missing."""
+    """Return the locator of a polyhedron by one structure, built at first use; choice: PASS, LISTS (tree) or CELLS."""
     if choice == Choice.PASS:
         by_pass = by_kernel("ray_parity", locate_by_pass, solid, solid.vertices, solid.triangles)
         return by_pass._replace(is_long=len(solid.triangles) > LONG_PASS)
@@ -203,7 +202,7 @@ def polyhedron_by(solid: Polyhedron, choice: int, budget: Budget) -> Locator:
 
 
 def implicit_locator(solid: Implicit) -> Locator:
-    """Return the locator of an implicit solid, by the sign of its polynomial or callable."""
+    """Return the locator of an implicit solid: sign of its polynomial, or of the caller's function."""
     if solid.function is not None:
         return Locator("callable", _call(solid), "float64")
     degree = int(solid.powers.sum(axis=1).max())
@@ -211,7 +210,7 @@ def implicit_locator(solid: Implicit) -> Locator:
 
 
 def _call(solid: Implicit) -> Fill:
-    """Return the fill that evaluates the sign of the caller's function."""
+    """Return a `Fill` that takes the sign of the caller's function at each point."""
     function = solid.function
     assert function is not None
 
@@ -232,7 +231,8 @@ def _call(solid: Implicit) -> Fill:
 
 
 def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator] = locator_of) -> Locator:
-    """Return the locator of a CSG tree: each distinct leaf is located once a chunk, then locations are combined."""
+    """Return the locator of a CSG tree: each distinct leaf is located once a chunk, and the tree combines the
+    locations."""
     leaves: dict[int, Locator] = {}
     fold_csg_tree(solid, lambda leaf: leaves.setdefault(id(leaf), leaf_locator(leaf)), lambda *_: None)
 

@@ -26,27 +26,27 @@ from engine.solids.polygon import Polygon
 
 
 class Choice(IntEnum):
-    """Structure by which the points of a batch are located."""
+    """Structure by which the points of a batch are located in a polygon or polyhedron."""
 
     PASS = 0
     """One pass over all faces or edges."""
     LISTS = 1
-    """A tree, or slabs."""
+    """A tree of boxes (polyhedron), or horizontal slabs (polygon)."""
     CELLS = 2
 
 
 _FEW: Final = 192
-"""Number of points up to which the tree, called directly, is as fast as cells."""
+"""Number of points up to which the tree is as fast as cells."""
 _FEW_RAYS: Final = 256
-"""Product of points and faces up to which one pass costs less than passing a tree to the kernel."""
+"""Product of points and faces up to which one pass costs less than handing a tree to the kernel."""
 _POINTS_A_PASS: Final = 1024
 _PASS_A_FACE: Final = 20.0
 LONG_PASS: Final = 1 << 12
-"""Number of faces from which one pass takes so long that a batch should be one chunk."""
+"""Number of faces from which one pass takes so long that a batch should not be cut into chunks."""
 _TREE: Final = 40_000.0
 _TREE_A_FACE: Final = 280.0
 _SOON: Final = 1.0 / 16.0
-"""Share of the tree's cost that earlier passes may have taken: usually the second batch builds the tree."""
+"""Share of the tree's cost that passes may take before the tree is built: usually the second batch builds the tree."""
 _CELLS, _CELLS_A_FACE = 2_500_000.0, 500.0
 
 _IN_RINGS, _PASS_AN_EDGE = 5.0, 0.8
@@ -56,7 +56,7 @@ _IN_SLABS: Final = 50.0
 
 
 def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
-    """Return PASS, LISTS (the tree) or CELLS."""
+    """Return PASS, LISTS (the tree) or CELLS for the next batch of `n_points` in a polyhedron, and count its points."""
     seen, n_faces = _points_seen(solid, n_points), len(solid.triangles)
     if n_points * n_faces <= _FEW_RAYS:
         return Choice.PASS
@@ -77,7 +77,7 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
 
 
 def _cells_amortize(solid: Polyhedron, seen: int) -> bool:
-    """Return whether the points so far pay for cells; early on bad shapes, where the tree is slow."""
+    """Return whether `seen` points located by the tree would have cost more than building cells."""
     n_faces = len(solid.triangles)
     least = _CELLS + _CELLS_A_FACE * n_faces
     if seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least or seen * cost_in_tree(solid) <= least:
@@ -86,7 +86,7 @@ def _cells_amortize(solid: Polyhedron, seen: int) -> bool:
 
 
 def choose_for_rings(solid: Polygon, n_points: int) -> Choice:
-    """Return PASS, LISTS (slabs) or CELLS."""
+    """Return PASS, LISTS (slabs) or CELLS for the next batch of `n_points` in a polygon, and count its points."""
     seen, n_edges = _points_seen(solid, n_points), len(solid.vertices)
     if solid.cached("ring_cells") is not None:
         return Choice.CELLS

@@ -51,9 +51,8 @@ from engine.types import UNDECIDED, FloatArray, Int8Array, read_only
 
 
 def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
-    """Return the locator of `solid` under `pose`.
-
-    Raises: UnsupportedSolidError.
+    """Return the locator of `solid` under `pose`, which maps body coordinates to those of the points. Raises:
+    UnsupportedSolidError.
     """
     if pose is None or pose.is_identity:
         return locator_of(solid)
@@ -65,17 +64,17 @@ def posed_locator(solid: Solid, pose: Pose | None) -> Locator:
 
 
 def posed_csg(solid: Csg, pose: Pose) -> Locator:
-    """Return the locator of a CSG tree under a pose."""
+    """Return the locator of a CSG tree of which all leaves have the same pose."""
     return csg_locator(solid, lambda leaf: posed_locator(leaf, pose))
 
 
 def posed_ball(solid: Sphere, pose: Pose) -> Locator:
-    """Return the locator of a ball about the image of its centre."""
+    """Return the locator of a ball of the same radius about the image of its centre."""
     return by_kernel("squared_distance", locate_in_ball, solid, *posed_center(solid, pose), solid.radius, pose=pose)
 
 
 def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
-    """Return the locator of an implicit solid under a pose: its function at preimages."""
+    """Return the locator of a posed implicit solid: its function is evaluated at the preimages of the points."""
     if solid.function is None:
         return by_filter(terms)(solid, pose)
     unposed, frames = locator_of(solid), _frames(pose)
@@ -84,11 +83,8 @@ def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
 
 
 def by_filter(prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Callable[[Any, Pose], Locator]:
-    """Return a factory of locators: exact preimages first, then a filter at rounded ones, then the exact fallback.
-
-    prepare: (solid, check) -> the filter kernel, called with points, blurs, these arguments, locations and flag, and
-    its arguments.
-    """
+    """Return a function (solid, pose) -> `Locator` that filters preimages of points, then decides the rest exactly.
+    prepare: (solid, check) -> (kernel, *arguments) for a call kernel(points, blurs, *arguments, locations, flag)."""
 
     def locator(solid: Solid, pose: Pose) -> Locator:
         unposed = locator_of(solid)
@@ -98,34 +94,34 @@ def by_filter(prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Callable[[Any
 
 
 def box_sides(solid: Aabb, _: Check) -> tuple[Any, ...]:
-    """Return the filter kernel of a box with its arguments."""
+    """Return (kernel, low corner, high corner) for `by_filter`."""
     return locate_in_box, solid.min, solid.max
 
 
 def rows(solid: HalfSpace | Convex, _: Check) -> tuple[Any, ...]:
-    """Return the filter kernel of a solid bounded by planes with its arguments."""
+    """Return (kernel, plane rows (m, 4)) of a solid bounded by planes, for `by_filter`."""
     return locate_in_rows_blurred, rows_in_space(rows_of(solid))
 
 
 def triangle(solid: Triangle, check: Check) -> tuple[Any, ...]:
-    """Return the filter kernel of a planar triangle, or the prism over one of space with its arguments."""
+    """Return (kernel, *arguments) for `by_filter`: of a planar triangle, or of the prism over a triangle in space."""
     if solid.dimension == 2:
         return rings(solid, check)
     return locate_in_rows_blurred, rows_in_space(prism_rows(solid)[0])
 
 
 def rings(solid: Polygon | Triangle, check: Check) -> tuple[Any, ...]:
-    """Return the filter kernel of a polygon with its arguments."""
+    """Return (kernel, `Rings`) of a polygon, for `by_filter`."""
     return locate_in_rings, rings_of(solid, check)
 
 
 def faces(solid: Polyhedron, check: Check) -> tuple[Any, ...]:
-    """Return the filter kernel of a polyhedron with its arguments."""
+    """Return (kernel, `TriangleTree`) of a polyhedron, for `by_filter`."""
     return locate_by_tree, tree_of(solid, check)
 
 
 def terms(solid: Implicit, _: Check) -> tuple[Any, ...]:
-    """Return the filter kernel of a polynomial with its arguments."""
+    """Return (kernel, powers, coefficients, degree) of a polynomial, for `by_filter`."""
     return locate_by_polynomial, solid.powers, solid.coefficients, int(solid.powers.sum(axis=1).max())
 
 
@@ -162,7 +158,7 @@ def _filtered(solid: Solid, pose: Pose, unposed: Locator, prepare: Callable[[Any
 
 
 def posed_center(solid: Sphere, pose: Pose) -> tuple[FloatArray, float]:
-    """Return the exact image of the centre, correctly rounded, and a bound on the rounding; infinite beyond float64."""
+    """Return the image of a ball's centre, rounded to nearest, and a bound on the error (infinite beyond float64)."""
     exact = to_world_frame(solid.center.tolist(), pose)
     try:
         center = np.array([float(value) for value in exact])

@@ -49,8 +49,8 @@ _NO_STATUSES: Final = np.empty(0, np.int8)
 def close_rings(
     vertices: FloatArray, ring_offsets: IntArray, xs: FloatArray, ys: FloatArray, runs: Int32Array, box: FloatArray
 ) -> None:
-    """Fill xs, ys with the rings of vertices (n, 2), each closed by its first vertex, runs with one run a ring, and box
-    with xmin, xmax, ymin, ymax."""
+    """Copy rings to xs, ys, each closed by its first vertex, with one run (first, last index) a ring in runs (n_rings,
+    2). vertices: (n, 2). box: filled with xmin, xmax, ymin, ymax."""
     place, x_min, x_max, y_min, y_max = 0, np.inf, -np.inf, np.inf, -np.inf
     for ring in range(len(ring_offsets) - 1):
         first, last = ring_offsets[ring], ring_offsets[ring + 1]
@@ -69,7 +69,8 @@ def close_rings(
 def list_runs(
     ys: FloatArray, rings: Int32Array, slabs: Axis, ends: IntArray, lasts: IntArray, runs: Int32Array, is_fill: bool
 ) -> None:
-    """Count (ends[slab] += 1) or list the runs of each slab; rings (n, 2): runs; lasts (n_slabs,): -1 each."""
+    """Count (ends[slab] += 1), or with `is_fill` write to runs, the runs of edges in each horizontal slab. rings (n,
+    2): first and last index of each ring in ys. lasts (n_slabs,): -1 on entry; where the last run of a slab ends."""
     low, scale, n_slabs = slabs.low, slabs.cells_per_unit, slabs.n_cells
     for ring in range(len(rings)):
         there = cell_of(ys[rings[ring, 0]], low, scale, n_slabs)
@@ -94,7 +95,7 @@ def _place(value: float, axis: Axis) -> float:
 def mark_cells(
     xs: FloatArray, ys: FloatArray, runs: Int32Array, u: Axis, v: Axis, statuses: Int8Array, flag: FlagArray
 ) -> None:
-    """Set the status of every cell that an edge may reach into to MIXED."""
+    """Set to MIXED the status of every grid cell that an edge may reach into."""
     for run in range(len(runs)):
         bu, bv = _place(xs[runs[run, 0]], u), _place(ys[runs[run, 0]], v)
         for edge in range(runs[run, 0], runs[run, 1]):
@@ -116,7 +117,7 @@ def mark_cells(
 
 @kernel
 def propagate_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> None:
-    """Set the status of each cell that is not MIXED, from the cell to its left or below (flood fill), or by the
+    """Set the location of each cell that is not MIXED: copied from the cell left or below (flood fill), else by the
     slabs."""
     u, v, slabs = rings.u, rings.v, rings.slabs
     for row in range(v.n_cells):
@@ -143,7 +144,7 @@ def propagate_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> N
 
 
 def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, FloatArray, Int32Array, FloatArray]:
-    """Return xs and ys of rings, each closed by its first vertex, the run of each ring, and their box."""
+    """Return xs, ys (each ring closed by its first vertex), runs (n_rings, 2) and box (4,): see `close_rings`."""
     n_rings = len(ring_offsets) - 1
     xs, ys = np.empty((2, len(vertices) + n_rings))
     runs, box = np.empty((n_rings, 2), np.int32), np.empty(4)
@@ -152,7 +153,7 @@ def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArr
 
 
 def edges_of(solid: Polygon | Triangle) -> Rings:
-    """Return all edges of a polygon as `Rings` of a single slab without a grid, for rays to the right, cached."""
+    """Return the edges of a polygon as `Rings` with a single slab and no grid, made at first use."""
 
     def build() -> Rings:
         xs, ys, runs, box = closed_rings(solid.vertices, solid.ring_offsets)
@@ -164,10 +165,8 @@ def edges_of(solid: Polygon | Triangle) -> Rings:
 
 
 def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
-    """Return the slabs of a polygon, built once.
-
-    check: called between the steps; what it raises ends the building. Cost: some 10 ns an edge, and 16 to 32 bytes.
-    """
+    """Return the edges of a polygon as `Rings` by slabs, made at first use. check: called between the steps; what it
+    raises ends the construction. Cost: some 10 ns an edge, and 16 to 32 bytes."""
 
     def build() -> Rings:
         edges = edges_of(solid)
@@ -186,10 +185,8 @@ def rings_of(solid: Polygon | Triangle, check: Check = no_check) -> Rings:
 
 
 def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> Rings:
-    """Return the slabs of a polygon with a grid of cells, built once; without the grid if its extent is too small.
-
-    Cost: some 60 ns an edge, and 12 bytes.
-    """
+    """Return the edges of a polygon as `Rings` with slabs and a grid, made at first use; no grid below an extent of
+    2^-960. Cost: some 60 ns an edge, and 12 bytes."""
 
     def build() -> Rings:
         rings, (across, along) = rings_of(solid, check), mean_edges_met(solid)
@@ -213,7 +210,7 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
 
 
 def mean_edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
-    """Return the mean number of edges that a vertical and a horizontal line meet; built once."""
+    """Return how many edges a vertical and a horizontal line meet in the mean, over the polygon's box; found once."""
 
     def find() -> tuple[float, float]:
         edges, means = edges_of(solid), []
@@ -227,13 +224,13 @@ def mean_edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
 
 
 EXACT: Final = np.zeros(0)
-"""Empty blurs: the points are exact."""
+"""Blurs (0,) for points whose coordinates are exact."""
 
 
 IN_TREE, IN_TREE_A_FACE_OVER = 150.0, 2.0
-"""Nanoseconds that a point takes in a tree, and for each face box above it (policy.py)."""
+"""Nanoseconds that a point takes in a tree, and for each face box above the point (policy.py)."""
 SAMPLE: Final = 256
-"""Number of faces sampled by `mean_faces_above`."""
+"""Number of faces that `mean_faces_above` looks at."""
 
 
 class TriangleTree(NamedTuple):
@@ -245,9 +242,9 @@ class TriangleTree(NamedTuple):
     """``(m, 3)``, in the order of the tree."""
     boxes: Float32Array
     child: Int32Array
-    """As `Bvh` has them."""
+    """As in `Bvh`."""
     blocks: Float32Array
-    """``(n_nodes, 8, 8)``: the argument of `overhead` for the triangles of a node."""
+    """``(n_nodes, 8, 8)``: the triangles of each node as `overhead` takes them."""
     origin: tuple[float, float, float]
     scale: float
     low: tuple[float, float, float]
@@ -256,10 +253,8 @@ class TriangleTree(NamedTuple):
 
 
 def tree_of(solid: Polyhedron, check: Check = no_check) -> TriangleTree:
-    """Return the tree over the triangles of `solid`, built once.
-
-    check: called between the steps (a second for a million triangles); what it raises ends the building.
-    """
+    """Return the `TriangleTree` of a polyhedron, built at first use. check: called between the steps (a second for a
+    million triangles); what it raises ends the construction."""
     return solid.prepared("tree", lambda: _build_tree(solid, check), check)
 
 
@@ -282,7 +277,7 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
 
 
 def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
-    """Return a tree as a row of addresses, sizes and places."""
+    """Return the addresses (5), sizes (3) and numbers (10: origin, scale, low, high) of a tree, for `tree_at`."""
     arrays: Any = tree.vertices, tree.triangles, tree.boxes, tree.child, tree.blocks
     sizes = len(tree.vertices), len(tree.triangles), len(tree.child)
     return tuple(array.ctypes.data for array in arrays), sizes, (*tree.origin, tree.scale, *tree.low, *tree.high)
@@ -290,7 +285,7 @@ def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tupl
 
 @inline
 def tree_at(tables: Any, row: int) -> TriangleTree:
-    """Return the tree of a row of tables (n, 5 / 3 / 10) of addresses, sizes and places, see `tree_row`."""
+    """Return the tree of row `row` of tables addresses (n, 5), sizes (n, 3) and places (n, 10): see `tree_row`."""
     addresses, sizes, places = tables.addresses, tables.sizes, tables.places
     return TriangleTree(
         array_at(addresses[row, 0], (sizes[row, 0], 3), np.float64),
@@ -304,7 +299,7 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
 
 
 def mean_faces_above(solid: Polyhedron) -> float:
-    """Return the mean number of face boxes above a point; thousands on bad shapes."""
+    """Return how many face boxes a vertical line meets in the mean, from a sample of faces; thousands on bad shapes."""
 
     def find() -> float:
         some = solid.vertices[solid.triangles[:: len(solid.triangles) // SAMPLE + 1], :2]
@@ -319,18 +314,17 @@ def mean_faces_above(solid: Polyhedron) -> float:
 
 
 def cost_in_tree(solid: Polyhedron) -> float:
-    """Return the nanoseconds that a point takes in the tree."""
+    """Return the nanoseconds that a point takes in the tree of a polyhedron."""
     return IN_TREE + IN_TREE_A_FACE_OVER * mean_faces_above(solid)
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
-    """Return the walls of the prism over a triangle, as `rounded_rows` does, built once."""
+    """Return the walls of the prism over a triangle as `rounded_rows`, made at first use."""
     return solid.prepared("rounded_walls", lambda: rounded_rows(prism_walls(solid)))
 
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:
-    """Return rational rows scaled to a largest coefficient near 1 and correctly rounded, and whether that was exact.
-
+    """Return rational plane rows as float64, scaled to a largest coefficient near 1, and by row whether that is exact.
     A nonzero coefficient below 2^-900 of the largest could underflow: such a row becomes NaN, which no filter accepts.
     """
     rounded, is_exact = np.empty((len(rows), len(rows[0]))), np.empty(len(rows), np.bool_)

@@ -68,10 +68,8 @@ Bounds = tuple[list[Lanes], list[Lanes]]
 
 @traced
 def meeting(first: Rows, i: int, second: Rows, j: int, frames: Rows) -> tuple[int, int]:
-    """Return the pairs of children of node i and node j that may meet, as two 32-bit masks.
-
-    Bit 8 a + b stands for lanes a and b; the first mask has lanes a < 4, the second the others.
-    """
+    """Return the pairs of children of node i of the first tree and node j of the second whose boxes may meet, as two
+    masks. Bit 8 a + b of the first 32-bit mask: lanes a < 4 and b; of the second: lanes a + 4 and b."""
     a = [load(first, BOX_ROWS * i + row) for row in range(BOX_ROWS)]
     b = [load(second, BOX_ROWS * j + row) for row in range(BOX_ROWS)]
     image, own, their_image, theirs = _image(b, frames, 0), _ends(a), _image(a, frames, FRAME_ROWS), _ends(b)
@@ -79,7 +77,8 @@ def meeting(first: Rows, i: int, second: Rows, j: int, frames: Rows) -> tuple[in
 
 
 def are_separated(lane: int, own: Bounds, image: Bounds, their_image: Bounds, theirs: Bounds) -> Mask:
-    """Return the boxes of the second body that an axis of either tree separates from the one in a lane of the first."""
+    """Return the mask of boxes of the second tree that an axis of either tree separates from the first tree's box in
+    `lane`."""
     pairs = []
     for (low, high), (their_low, their_high) in ((own, image), (their_image, theirs)):
         for k in range(3):
@@ -89,12 +88,13 @@ def are_separated(lane: int, own: Bounds, image: Bounds, their_image: Bounds, th
 
 
 def _ends(box: list[Lanes]) -> Bounds:
-    """Return low and high of eight boxes."""
+    """Return low and high corners of eight boxes given as centre and half widths."""
     return [box[k] - box[3 + k] for k in range(3)], [box[k] + box[3 + k] for k in range(3)]
 
 
 def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
-    """Return low and high of the boxes around the images of eight boxes."""
+    """Return low and high corners of the boxes around the images of eight boxes under the map of `frames` from row
+    `first` on."""
     frame = [load(frames, first + row) for row in range(FRAME_ROWS)]
     centre = [dot(frame[3 * k : 3 * k + 3], box[:3]) + frame[SHIFT_ROW + k] for k in range(3)]
     half = [dot(frame[9 + 3 * k : 12 + 3 * k], box[3:]) + frame[MARGIN_ROW] for k in range(3)]
@@ -103,7 +103,7 @@ def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
 
 @traced
 def inside_box(boxes: Rows, node: int, low: Triple, high: Triple) -> int:
-    """Return the mask of a node's lanes that meet the box of two float32 triples."""
+    """Return the mask of a node's lanes whose boxes intersect the box from low to high, two float32 triples."""
     own_low, own_high = _ends([load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)])
     pairs = [(own_low[k], high[k]) for k in range(3)] + [(low[k], own_high[k]) for k in range(3)]
     return bits_of(~any_above(pairs))
@@ -137,19 +137,19 @@ def enter_boxes(
 
 @traced
 def fill(rows: Rows, row: int, value: Number) -> None:
-    """Set all numbers of a row to one value."""
+    """Set all eight numbers of a row to `value`."""
     store(rows, row, value)
 
 
 @traced
 def join(boxes: Rows, box: int, others: Rows, other: int) -> None:
-    """Set a row to the elementwise minimum of itself and a row of another array."""
+    """Set row `box` to the elementwise minimum of itself and row `other` of another array: the box around both."""
     store(boxes, box, lesser(load(boxes, box), load(others, other)))
 
 
 @traced
 def exchange(rows: Rows, i: int, j: int) -> None:
-    """Swap two rows."""
+    """Swap rows i and j."""
     first, second = load(rows, i), load(rows, j)
     store(rows, i, second)
     store(rows, j, first)
@@ -164,10 +164,8 @@ def discs_meeting(
     low: int, high: int, first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array,
     scales: tuple[float, float], work: Float32Array,
 ) -> tuple[int, int]:  # fmt: skip
-    """Return the pairs of children (`boxes.meeting`) whose discs may meet.
-
-    scales: of the two trees. work (DISC_ROWS or more, 8) float32.
-    """
+    """Return those of the pairs (low, high), two masks as `meeting` returns them, whose discs may meet. scales: of the
+    two trees. work (DISC_ROWS + 1 or more, 8) float32: scratch."""
     if low | high == 0:
         return low, high
     place_discs(second, j, frames, np.float32(scales[1] / scales[0]), inverse_ratio(scales[1], scales[0]), work)
@@ -178,14 +176,14 @@ def discs_meeting(
 
 @inline
 def inverse_ratio(their: float, own: float) -> Any:
-    """Return the factor that makes normals in the units of another tree unit vectors; infinity, which separates
-    nothing, if float32 loses bits of them."""
+    """Return the factor that turns normals of the other tree's units into unit vectors; infinity, which separates
+    nothing, where float32 would lose bits of them."""
     return np.float32(own / their if own / their <= 2.0**60 else np.inf)
 
 
 @traced
 def place_discs(second: Rows, j: int, frames: Rows, ratio: Number, inverse: Number, work: Rows) -> None:
-    """Write the discs of node j, in the tree of the first body, to `work`; twice the margin is added to their radii."""
+    """Write the discs of node j of the second tree, in coordinates of the first, to work; row 8: twice the margin."""
     b = [load(second, DISC_ROWS * j + row) for row in range(DISC_ROWS)]
     for k in range(3):
         turn = [load(frames, 3 * k + column) for column in range(3)]
@@ -199,7 +197,7 @@ def place_discs(second: Rows, j: int, frames: Rows, ratio: Number, inverse: Numb
 
 @traced
 def unseparated_discs(lane: int, first: Rows, i: int, work: Rows) -> int:
-    """Return the mask of the discs in `work` that no normal separates from one child of node i."""
+    """Return the mask of the discs in work that no normal separates from the disc in `lane` of node i."""
     a = [load_lane(first, DISC_ROWS * i + row, lane) for row in range(DISC_ROWS)]
     b = [load(work, row) for row in range(DISC_ROWS + 1)]
     gap = [b[k] - a[k] for k in range(3)]

@@ -37,20 +37,20 @@ from engine.types import UNDECIDED, Float32Array
 
 _UNSURE: Final = 2.0**-24
 _ROUNDING: Final = 16.0 * 2.0**-53
-"""Relative error of a component of u x v to the sizes of its two products: 2 u for the factors (rounded differences), u
+"""Relative error of a component of u x v to the sum of its two |products|: 2 u for the factors (rounded differences), u
 for the product, u for the sum; times four."""
 _FAR: Final = 4.0
 BAND: Final = np.float32(2.0**-18)
-"""Least distance from a plane of an entry at which it decides."""
+"""Least distance from a plane of a triangle's entry at which its sign is certain."""
 ROWS: Final = 14
-"""Numbers of an entry: n and d, the three m, and 1.0 in the last group of a list, else 0.0."""
+"""Numbers of an entry: n and d (4), the three m (9), and 1.0 in the last group of a list, else 0.0."""
 _LINE: Final = 16
 """Numbers of a cache line."""
 
 
 @inline
 def _set_normal(row: Float32Array, place: int, u: tuple[float, ...], v: tuple[float, ...]) -> float:
-    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return its error bound."""
+    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on its error."""
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     size = max(
         abs(u[1] * v[2]) + abs(u[2] * v[1]), abs(u[2] * v[0]) + abs(u[0] * v[2]), abs(u[0] * v[1]) + abs(u[1] * v[0])
@@ -65,7 +65,7 @@ def _set_normal(row: Float32Array, place: int, u: tuple[float, ...], v: tuple[fl
 
 @inline
 def set_nothing(row: Float32Array) -> None:
-    """Write the entry of a triangle that no segment in the cell crosses."""
+    """Write an entry that no segment in the cell crosses, for a lane without a triangle."""
     for k in range(ROWS - 1):
         row[k] = 0.0
     row[3] = -_FAR
@@ -76,10 +76,8 @@ def set_entry(
     row: Float32Array, a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...], u: tuple[float, ...],
     v: tuple[float, ...],
 ) -> None:  # fmt: skip
-    """Write the entry of a triangle to row (13,) or longer.
-
-    a, b, c: corners minus R; u, v: b - a and c - a; each difference rounded once, in units of the cell.
-    """
+    """Write the entry of a triangle to row (13,) or longer; NaN where a sign would not be certain. a, b, c: corners
+    minus R; u, v: b - a and c - a; each difference rounded once, in units of the cell."""
     normal_error = _set_normal(row, 0, u, v)
     distance = row[0] * a[0] + row[1] * a[1] + row[2] * a[2]
     reach = max(abs(a[0]), abs(a[1]), abs(a[2]))
@@ -101,8 +99,8 @@ def set_entry(
 
 @traced
 def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> int:
-    """Return the parity of the segment from R to (x, y, z) over a group of (n, 14, 8) float32, with the bit UNDECIDED
-    if a lane is within the band."""
+    """Return the parity of crossings of the segment from R to (x, y, z) with eight triangles, group `group` of (n, 14,
+    8). The bit UNDECIDED is added where a triangle is too close to be certain."""
     side, least, most = planes_of(groups, group, (x, y, z))
     is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
     is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
@@ -111,8 +109,8 @@ def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> i
 
 @merged
 def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: float) -> int:
-    """Return the parity of the segment from the reference point to w over all groups of a list, with the bit
-    UNDECIDED."""
+    """Return the parity of crossings of the segment from R to w with a cell's triangles, from group `group` to the
+    list's end. The bit UNDECIDED is added where a triangle is too close to be certain."""
     parity = group_parity(groups, group, wx, wy, wz)
     while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
         group += 1
@@ -122,7 +120,7 @@ def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: fl
 
 
 def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, Lanes, Lanes]:
-    """Return the signed distances of a point to the planes of the triangles, and the least and largest to their edge
+    """Return, for eight triangles, a point's signed distance to the plane, and the least and largest to the three edge
     planes."""
     rows = [load(groups, ROWS * group + row) for row in range(ROWS - 1)]
     side = dot(rows[0:3], point) - rows[3]
@@ -138,5 +136,5 @@ def prefetch_group(groups: Rows, group: int) -> None:
 
 
 def groups_of(n_groups: int) -> Any:
-    """Return (n_groups, 14, 8) float32, uninitialised, aligned to a cache line (a group is seven lines)."""
+    """Return an uninitialised array (n_groups, 14, 8) float32, aligned to a cache line (a group is seven lines)."""
     return aligned((n_groups, ROWS, LANES), np.float32)

@@ -87,14 +87,14 @@ from engine.lanes.tracing import LANES, Lanes, Number, Rows, Triple, traced
 from engine.types import Float32Array
 
 CORNER_ROWS: Final = 9
-"""ax ay az bx by bz cx cy cz."""
+"""Numbers of a triangle: ax ay az bx by bz cx cy cz."""
 AXES_BEFORE: Final = (1, 2, 0, 1, 2)
 """The other two axes of axis k: AXES_BEFORE[k], AXES_BEFORE[k + 1]."""
 
 
 @inline
 def longest_axis(half: tuple[float, ...]) -> int:
-    """Return the axis of the largest component of a half."""
+    """Return the axis (0, 1, 2) of the largest component of a vector."""
     x, y, z = abs(half[0]), abs(half[1]), abs(half[2])
     if x >= y and x >= z:
         return 0
@@ -105,10 +105,9 @@ def longest_axis(half: tuple[float, ...]) -> int:
 def near_triangles(
     corners: Rows, node: int, i: int, j: int, k: int, middle: Triple, r: Number, s: Number, reach: Number, slack: Number
 ) -> int:
-    """Return the mask of a block's lanes that the segment may meet. All numbers are float32.
-
-    middle: on the axes i, j, k; reach: |e_k| + slack.
-    """
+    """Return the mask of a block's lanes whose triangles a segment may meet. All numbers are float32. k: axis of the
+    largest component of the half e; i, j: the other two. middle: of the segment, on the axes i, j, k. r, s: e_i / e_k,
+    e_j / e_k. reach: |e_k| + slack."""
 
     def away(axis: int, place: int) -> Any:
         return [load(corners, CORNER_ROWS * node + axis + 3 * corner) - middle[place] for corner in range(3)]
@@ -134,9 +133,8 @@ LEAST_REACH: Final = 2.0**-50
 
 @traced
 def overhead(blocks: Rows, boxes: Rows, node: int, x: Number, y: Number, z: Number, blur: Number) -> tuple[int, int]:
-    """Return the mask of a node's lanes whose triangles are certainly above a point, and of those certainly not.
-
-    x, y: relative to the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
+    """Return the masks of a node's lanes whose triangles are certainly above a point, and certainly not above it. x, y:
+    of the point, relative to the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
     """
     rows = [load(blocks, OVERHEAD_ROWS * node + row) for row in range(OVERHEAD_ROWS)]
     u, v = [rows[k] - x for k in (0, 2, 4)], [rows[k] - y for k in (1, 3, 5)]
@@ -150,12 +148,12 @@ def overhead(blocks: Rows, boxes: Rows, node: int, x: Number, y: Number, z: Numb
 
 
 NOWHERE: Final = 1e30
-"""Coordinate of the corners of an unused lane: beyond every image and every margin."""
+"""Coordinate of all corners of an unused lane: beyond every image and every margin."""
 
 WORK_ROWS: Final = 28
 _SECOND_IMAGE, _FIRST_IMAGE, _FIRST_NORMAL, _SECOND_NORMAL = 0, 9, 18, 23
-"""Rows of the work space: corners of either block in the tree of the other; normal, and lowest and highest product of
-it, of either block in its own tree."""
+"""First rows of the work space: corners of either block in coordinates of the other tree; normals of either block with
+the least and largest product with its own corners."""
 _TINY: Final = 2.0**-120
 _BEYOND: Final = 2.0**98  # a float32 between all coordinates with their margins and `NOWHERE`
 
@@ -164,10 +162,8 @@ _BEYOND: Final = 2.0**98  # a float32 between all coordinates with their margins
 def faces_meeting(
     first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array, work: Float32Array
 ) -> tuple[int, int]:
-    """Return the pairs of triangles of block i and block j that may meet, as two masks (see `boxes.meeting`).
-
-    work (WORK_ROWS, 8) float32: scratch.
-    """
+    """Return the pairs of triangles of block i of the first tree and block j of the second that may meet, as two masks.
+    Masks as `boxes.meeting` returns them. work (WORK_ROWS, 8) float32: scratch."""
     low, high = meet_boxes(first, i, second, j, frames, work)
     if low | high == 0:
         return low, high
@@ -189,8 +185,8 @@ def _greatest(a: Lanes, b: Lanes, c: Lanes) -> Lanes:
 
 @traced
 def meet_boxes(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> tuple[int, int]:
-    """Return the pairs, as `faces_meeting` does, that the axes of the trees do not separate; write the images to
-    `work`."""
+    """Return the pairs, two masks, that no axis of either tree separates; write the blocks' images under `frames` to
+    work."""
     own, image = _bounds(first, i, second, j, frames, 0, work, _SECOND_IMAGE)
     theirs, their_image = _bounds(second, j, first, i, frames, FRAME_ROWS, work, _FIRST_IMAGE)
     masks = []
@@ -203,8 +199,8 @@ def meet_boxes(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Ro
 def _bounds(
     own_rows: Rows, own_block: int, rows: Rows, block: int, frames: Rows, frame_row: int, work: Rows, image_row: int
 ) -> tuple[Bounds, Bounds]:
-    """Return low and high of a block, widened by its margin, and of the image of another block; write that to
-    `work`."""
+    """Return (low, high) of the triangles of one block, widened by the margin, and of the images of another block's
+    triangles. The images are written to work from row image_row on."""
     own, other = _block(own_rows, own_block), _block(rows, block)
     frame = [load(frames, frame_row + row) for row in range(FRAME_ROWS)]
     margin, image = frame[MARGIN_ROW], []
@@ -219,7 +215,7 @@ def _bounds(
 
 @traced
 def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> None:
-    """Write the normals of two blocks to `work`, with the range of their own corners along them."""
+    """Write the normals of two blocks' triangles to work, with the least and largest product with their own corners."""
     for rows, block, frame_row, row in ((first, i, 0, _FIRST_NORMAL), (second, j, FRAME_ROWS, _SECOND_NORMAL)):
         own = _block(rows, block)
         p, q, r = own[0:3], own[3:6], own[6:9]
@@ -233,7 +229,8 @@ def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: R
 
 @traced
 def unseparated_faces(lane: int, work: Rows) -> int:
-    """Return the mask of the second block's triangles that no normal separates from one lane of the first."""
+    """Return the mask of the second block's triangles that no normal separates from the first block's triangle in
+    `lane`."""
 
     def rows(first: int, n_rows: int) -> list[Lanes]:
         return [load(work, first + row) for row in range(n_rows)]
@@ -253,12 +250,12 @@ def unseparated_faces(lane: int, work: Rows) -> int:
 
 FIXED_ROWS: Final = BOX_ROWS + DISC_ROWS
 GAP_ROWS: Final = 12
-"""Of work space: the corners of eight triangles, and three times their middles."""
+"""Rows of the work space: the corners of eight triangles (9), and three times their centroids (3)."""
 _MIDDLES: Final = 9
 _LEAST_SIZE: Final = 2.0**-120
 _BELOW_ONE: Final = 1.0 - 2.0**-18
 _MOST: Final = 2.0**60
-"""Largest bound in the units of either tree: squares of larger ones overflow."""
+"""Largest bound in the units of either tree, since squares of larger numbers overflow."""
 
 
 def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
@@ -266,14 +263,14 @@ def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
 
 
 def _gaps(v: Sequence[Lanes], reach: Sequence[Lanes]) -> Lanes:
-    """Return the squared length of the vector of gaps between two boxes along three axes."""
+    """Return the squared length of max(|v_k| - reach_k, 0) over three axes: squared distance of two boxes."""
     gaps = [greater(abs(x) - r, 0.0) for x, r in zip(v, reach)]
     return dot(gaps, gaps)
 
 
 def _width(disc: Sequence[Lanes], cosine: Lanes) -> Lanes:
-    """Return the half width of a disc (radius, half thickness) along a direction of length <= 1, from its product with
-    the normal."""
+    """Return the half width of a disc (radius, half thickness) along a direction; cosine: of the direction and its
+    normal."""
     radius, half = disc
     return abs(cosine) * half + root(greater((1.0 + ROUND) - cosine * cosine, ROUND)) * radius
 
@@ -283,10 +280,11 @@ def child_bounds(
     boxes: Rows, discs: Rows, node: int, fixed: Rows, frames: Rows, own: int, theirs: int, ratio: Number,
     inverse: Number, work: Rows,
 ) -> None:  # fmt: skip
-    """Write lower bounds on the distances of a node's eight children to a fixed box and disc to the first row of work.
+    """Write lower bounds on the distances of a node's eight children from a box with its disc to row 0 of work.
 
-    fixed (FIXED_ROWS, 8): in its first column a box and a disc, in the tree of the other body. own, theirs: first frame
-    rows of the maps to and from the tree of the node; ratio: the other tree's scale over this one's, and its inverse.
+    fixed (FIXED_ROWS, 8): in lane 0 the box and the disc, in coordinates of the other tree. own, theirs: first rows in
+    frames of the maps to and from the node's tree. ratio: scale of the other tree over that of the node's tree;
+    inverse: see `inverse_ratio`.
     """
     box, disc = (
         [load(rows, n * node + row) for row in range(n)] for rows, n in ((boxes, BOX_ROWS), (discs, DISC_ROWS))
@@ -321,14 +319,15 @@ def child_bounds(
 
 
 def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]:
-    """Return the least and the greatest product of a direction with three corners."""
+    """Return the least and largest product of the direction `way` with three corners."""
     p, q, r = (dot(way, corners[3 * k : 3 * k + 3]) for k in range(3))
     return lesser(p, lesser(q, r)), greater(p, greater(q, r))
 
 
 @traced
 def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
-    """Write the triangles of a block of the second body, in the tree of the first, to work."""
+    """Write the triangles of a block of the second tree, in coordinates of the first, and three times their centroids
+    to work."""
     own, corners = [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)], []
     for corner in range(3):
         for k in range(3):
@@ -341,8 +340,8 @@ def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
 
 @traced
 def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number, work: Rows) -> int:
-    """Return the mask of the triangles in work that may be within `most` of one lane of a block; unused lanes count as
-    near."""
+    """Return the mask of the triangles in work that may be within distance `most` of the triangle in `lane` of a block.
+    Unused lanes count as near."""
     own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
     theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
     d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]

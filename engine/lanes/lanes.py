@@ -49,7 +49,7 @@ _ALIGNED = 4  # of a float: numpy promises no more
 
 @instruction(lambda value: value)
 def spread(value: Number) -> Lanes:
-    """Return a number in all lanes (broadcast)."""
+    """Return eight copies of a number (broadcast)."""
     return np.full(LANES, value, np.float32)
 
 
@@ -60,7 +60,7 @@ def _emit_load(rows: EmittedArray, row: Any) -> EmittedLanes:
 
 @instruction(_emit_load)
 def load(rows: Rows, row: int) -> Lanes:
-    """Return a row."""
+    """Return row `row` of an array, eight numbers."""
     return rows.reshape(-1, LANES)[row].copy()
 
 
@@ -72,7 +72,7 @@ def _emit_load_lane(rows: EmittedArray, row: Any, lane: Any) -> EmittedLanes:
 
 @instruction(_emit_load_lane)
 def load_lane(rows: Rows, row: int, lane: int) -> Lanes:
-    """Return one number of a row in all lanes."""
+    """Return eight copies of the number in `lane` of row `row`."""
     return spread(rows.reshape(-1, LANES)[row, lane])
 
 
@@ -83,7 +83,7 @@ def _emit_store(rows: EmittedArray, row: Any, value: EmittedLanes) -> None:
 
 @instruction(_emit_store)
 def store(rows: Rows, row: int, value: Lanes) -> None:
-    """Set a row."""
+    """Set row `row` of an array to eight numbers."""
     rows.reshape(-1, LANES)[row] = value
 
 
@@ -96,7 +96,7 @@ def _emit_lane_of(value: EmittedLanes, lane: int) -> EmittedLanes:
 
 @instruction(_emit_lane_of)
 def lane_of(value: Lanes, lane: int) -> Lanes:
-    """Return one lane, a compile-time constant, in all lanes."""
+    """Return eight copies of the number in `lane`, a compile-time constant."""
     return spread(value[lane])
 
 
@@ -107,7 +107,7 @@ def _emit_select(mask: EmittedMask, a: Any, b: Any) -> EmittedLanes:
 
 @instruction(_emit_select)
 def select(mask: Mask, a: Lanes, b: Lanes) -> Lanes:
-    """Return a where the mask is true, else b."""
+    """Return, lane by lane, a where the mask is true, else b."""
     return np.where(mask, np.float32(a), np.float32(b))
 
 
@@ -120,7 +120,7 @@ def _emit_root(value: EmittedLanes) -> EmittedLanes:
 
 @instruction(_emit_root)
 def root(value: Lanes) -> Lanes:
-    """Return square roots."""
+    """Return the square root of each lane."""
     return np.sqrt(value)
 
 
@@ -130,7 +130,7 @@ def _emit_bits(mask: EmittedMask) -> EmittedWord:
 
 @instruction(_emit_bits)
 def bits_of(mask: Mask) -> int:
-    """Return a mask as a number, lane k as bit k."""
+    """Return a mask as an integer: bit k is lane k."""
     return int(np.packbits(mask, bitorder="little")[0])
 
 
@@ -142,7 +142,7 @@ def _emit_any(mask: EmittedMask) -> EmittedWord:
 
 @instruction(_emit_any)
 def any_of(mask: Mask) -> int:
-    """Return 1 where the mask is true in some lane, else 0."""
+    """Return 1 if the mask is true in some lane, else 0."""
     return int(np.any(mask))
 
 
@@ -154,14 +154,14 @@ def lowest_bit(bits: int) -> int:
 
 @instruction(lambda bits: EmittedWord(bits.builder, bits.builder.ctpop(bits.value)))
 def count_bits(bits: int) -> int:
-    """Return how many bits are set."""
+    """Return the number of set bits."""
     return int(bits).bit_count()
 
 
 @inline
 def filter_pairs(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
-    """Filter four lanes' pairs (`bytes_of`): ``remaining(lane, *arguments)`` is the mask of each lane's second
-    members."""
+    """Return those of the pairs `bits` that stay after a filter: byte k of `bits` has the partners of lane first_lane +
+    k. remaining(lane, *arguments): the mask of the partners that stay for a lane; called where a byte is not 0."""
     left = 0
     while bits != 0:  # bound: each turn ends a lane
         shift = lowest_bit(bits) & -LANES
@@ -180,10 +180,8 @@ def _emit_move(target: EmittedArray, at: Any, source: EmittedArray, first: Any, 
 
 @instruction(_emit_move)
 def move(target: Array, at: int, source: Array, first: int, n: int) -> None:
-    """Copy n numbers of `source` from `first` on to `target` from `at` on.
-
-    Flat float64 arrays, not the same one; the caller guarantees that both ranges are within them.
-    """
+    """Copy source[first : first + n] to target[at : at + n]. Flat float64 arrays, not the same; the caller guarantees
+    that both ranges are within them."""
     target[at : at + n] = source[first : first + n]
 
 
@@ -197,7 +195,7 @@ def _emit_prefetch(array: EmittedArray, place: Any) -> None:
 
 @instruction(_emit_prefetch)
 def prefetch(array: Array, place: int) -> None:
-    """Prefetch the cache line of number `place` of an array; harmless beyond its end."""
+    """Prefetch the cache line with element `place` of an array; harmless beyond its end."""
 
 
 def aligned(shape: tuple[int, ...], dtype: Any) -> Any:
@@ -212,22 +210,22 @@ def aligned(shape: tuple[int, ...], dtype: Any) -> Any:
 
 
 def lesser(a: Lanes, b: Lanes) -> Lanes:
-    """Return a where a < b, else b."""
+    """Return the minimum, lane by lane; b where the two are not ordered."""
     return select(a < b, a, b)
 
 
 def greater(a: Lanes, b: Lanes) -> Lanes:
-    """Return a where a > b, else b."""
+    """Return the maximum, lane by lane; b where the two are not ordered."""
     return select(a > b, a, b)
 
 
 def dot(a: Sequence[Lanes], b: Sequence[Lanes]) -> Lanes:
-    """Return the dot product of two triples, summed from the first."""
+    """Return the dot product of two triples, summed from left to right."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def any_above(pairs: Sequence[tuple[Lanes, Lanes]]) -> Mask:
-    """Return whether a > b in some pair (a, b)."""
+    """Return the mask of lanes in which a > b for some pair (a, b)."""
     is_any = pairs[0][0] > pairs[0][1]
     for above, below in pairs[1:]:
         is_any |= above > below
@@ -235,7 +233,7 @@ def any_above(pairs: Sequence[tuple[Lanes, Lanes]]) -> Mask:
 
 
 def bytes_of(masks: Sequence[Mask]) -> tuple[int, int]:
-    """Return eight masks as two numbers, each of four bytes, the first mask lowest."""
+    """Return eight masks as two 32-bit integers: byte k of the first is masks[k], of the second masks[k + 4]."""
     halves = []
     for first in (0, LANES // 2):
         bits = bits_of(masks[first])
@@ -246,7 +244,7 @@ def bytes_of(masks: Sequence[Mask]) -> tuple[int, int]:
 
 
 def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
-    """Return the C-contiguous array of this shape and type at `address`."""
+    """Return the C-contiguous array of this shape and type at a memory address, in Python."""
     n_bytes = int(np.prod(shape)) * np.dtype(dtype).itemsize
     if n_bytes == 0:
         return np.empty(shape, dtype)
@@ -254,7 +252,8 @@ def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
 
 
 def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) -> Any:
-    """Return what `plain_array_at` does, without reference counting."""
+    """Return signature and code generator of `array_at`, the compiled form of `plain_array_at`, without reference
+    counting."""
     made = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -43,7 +43,7 @@ Triple: TypeAlias = tuple[Number, Number, Number]
 
 
 class Emitted:
-    """A value of the code that is being generated."""
+    """A value (LLVM) of the code that is being generated."""
 
     __array_ufunc__ = None  # numpy leaves the operators to the stand-in
 
@@ -52,17 +52,17 @@ class Emitted:
 
     @classmethod
     def of(cls, builder: Any, number: Any) -> Any:
-        """Return an emitted value as it is, and a number as an emitted constant."""
+        """Return `number` unchanged if it is emitted already, else as a constant."""
         return number if isinstance(number, cls) else cls(builder, cls.constant(number))
 
     @staticmethod
     def constant(number: Any) -> Any:
-        """Return a number as an emitted constant of this kind."""
+        """Return a Python number as a constant of this type."""
         raise TypeError(f"an array or a mask was expected, not {number!r}")
 
 
 def _writes(name: str) -> Any:
-    """Return an operator on two values that emits the instruction `name`."""
+    """Return a binary operator that emits the LLVM instruction `name`."""
 
     def write(a: Any, b: Any) -> Any:
         return type(a)(a.builder, getattr(a.builder, name)(a.value, a.of(a.builder, b).value))
@@ -71,7 +71,7 @@ def _writes(name: str) -> Any:
 
 
 def _compares(word: str) -> Any:
-    """Return an operator that compares two values lane by lane, false for NaN."""
+    """Return a comparison operator, lane by lane, false for NaN; word: <, <=, > or >=."""
 
     def write(a: Any, b: Any) -> EmittedMask:
         return EmittedMask(a.builder, a.builder.fcmp_ordered(word, a.value, a.of(a.builder, b).value))
@@ -80,15 +80,15 @@ def _compares(word: str) -> Any:
 
 
 class EmittedArray(Emitted):
-    """A C-contiguous array, by its base address."""
+    """A C-contiguous array, represented by its base address."""
 
     def address(self, place: Any) -> Any:
-        """Return the address of number `place`, counted through all axes."""
+        """Return the address of element `place`, counted through all axes."""
         return self.builder.gep(self.value, [EmittedWord.of(self.builder, place).value])
 
 
 class EmittedWord(Emitted):
-    """An int64."""
+    """An int64 in generated code."""
 
     __add__, __mul__, __lshift__ = _writes("add"), _writes("mul"), _writes("shl")
     __and__, __or__ = _writes("and_"), _writes("or_")
@@ -96,12 +96,12 @@ class EmittedWord(Emitted):
 
     @staticmethod
     def constant(number: Any) -> Any:
-        """Return a whole number as a value."""
+        """Return a whole number as an int64 constant."""
         return ir.Constant(WORD, number)
 
 
 class EmittedMask(Emitted):
-    """Eight truth values."""
+    """Eight truth values in generated code."""
 
     __and__, __or__ = _writes("and_"), _writes("or_")
 
@@ -110,7 +110,7 @@ class EmittedMask(Emitted):
 
 
 class EmittedLanes(Emitted):
-    """Eight float32."""
+    """Eight float32 in generated code."""
 
     __add__, __sub__ = _writes("fadd"), _writes("fsub")
     __mul__, __truediv__ = _writes("fmul"), _writes("fdiv")
@@ -118,7 +118,7 @@ class EmittedLanes(Emitted):
 
     @staticmethod
     def constant(number: Any) -> Any:
-        """Return a number in all lanes."""
+        """Return a constant of eight copies of a number."""
         return ir.Constant(VECTOR, [ir.Constant(FLOAT, float(number))] * LANES)
 
     def __rsub__(self, other: Any) -> Any:
@@ -156,18 +156,18 @@ _TYPES: Final = {
     "None": types.none,
     "tuple[int, int]": types.UniTuple(types.int64, 2),
 }
-"""Types of annotations; arrays have their own type."""
+"""Numba types of annotations; an array keeps its own type."""
 _ROUNDED: Final[dict[str, Callable[[Any], Any]]] = {
     "Number": np.float32,
     "Triple": lambda numbers: tuple(map(np.float32, numbers)),
 }
-"""Conversions of Python arguments that compiled callers do by type."""
+"""Conversions of arguments in a call from Python, which compiled callers do by type."""
 register_model(_LanesType)(lambda manager, kind: models.PrimitiveModel(manager, kind, VECTOR))
 register_model(_MaskType)(lambda manager, kind: models.PrimitiveModel(manager, kind, TRUTHS))
 
 
 def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """Return the emitted value of an argument of a type in `_TYPES`, or of an array."""
+    """Return the emitted form of an argument: of a type in `_TYPES`, or an array."""
     if isinstance(kind, types.Array):
         return EmittedArray(builder, context.make_array(kind)(context, builder, value).data)
     if kind == _NUMBERS:
@@ -181,7 +181,7 @@ def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 class _Traced(_Intrinsic):  # type: ignore[misc]
-    """A function that emits itself into its compiled callers; `emit` if emitted values need another form of it."""
+    """A function that generates its own code in compiled callers; emit: what generates it, if not the function."""
 
     def __init__(self, function: Callable[..., Any], emit: Callable[..., Any] | None = None) -> None:
         signature = inspect.signature(function)
@@ -199,7 +199,7 @@ class _Traced(_Intrinsic):  # type: ignore[misc]
         self._register()
 
     def __call__(self, *arguments: Any) -> Any:
-        """Write the function where it is handed stand-ins, else run it."""
+        """Generate code if an argument is `Emitted`, else run the function on numpy arrays."""
         if any(isinstance(argument, Emitted) for argument in arguments):
             return self._emit(*arguments)
         with np.errstate(all="ignore"):
@@ -208,7 +208,7 @@ class _Traced(_Intrinsic):  # type: ignore[misc]
             )
 
     def _typed(self, arguments: tuple[Any, ...]) -> Any:
-        """Return the signature for arguments of some types and what writes the function, None if they do not fit."""
+        """Return the Numba signature for these argument types and the code generator, None if the types do not fit."""
         kinds = [_TYPES.get(kind, given) for kind, given in zip(self._kinds, arguments, strict=True)]
         for kind, given in zip(self._kinds, kinds):
             if kind in ("Array", "Rows") and not (isinstance(given, types.Array) and given.layout == "C"):
@@ -228,17 +228,17 @@ class _Traced(_Intrinsic):  # type: ignore[misc]
 
 
 def traced(function: Callable[..., Any]) -> Any:
-    """Have a function on lanes run in Python, and be written into compiled code that calls it."""
+    """Return a function on `Lanes` that runs in Python and generates its code in compiled callers."""
     return _Traced(function)
 
 
 def instruction(emit: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
-    """Have a function run in Python, and `emit`, on stand-ins, write what it does into compiled code."""
+    """Return a decorator: the function runs in Python, and `emit` generates the code in compiled callers."""
     return lambda function: _Traced(function, emit)
 
 
 def _define(operation: Any, operands: list[Any], result: Any) -> None:
-    """Give an operator its meaning on lanes or masks in compiled functions."""
+    """Define an operator on lanes or masks for compiled functions: types of operands and result."""
 
     def typed(context: Any) -> Callable[..., Any]:
         if len(operands) == 1:

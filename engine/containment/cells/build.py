@@ -37,43 +37,44 @@ from engine.solids.mesh import Polyhedron
 from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Array, Int32Array, IntArray, read_only
 
 MIXED_CELL: Final = -1
-"""Code of a cell that is left to the tree: its side is unknown, or its list costs more than the tree."""
+"""Code of a cell whose points go to the tree: its reference point is undecided, or its list costs more than the tree.
+"""
 _UNKNOWN: Final = 0
 _GROUP: Final = 8.0
-"""Nanoseconds that a point takes for one group of a list."""
+"""Nanoseconds that a point takes for one group of eight triangles."""
 _FEWEST_GROUPS: Final = 32
 MOST_FACES: Final = 1 << 14
-"""Largest solid for which scenes build sides of cells."""
+"""Number of faces up to which scenes build `Sides`."""
 _PAYS_FROM, _PAYS_PER_FACE = 1 << 10, 2
 _BLOCK: Final = 4096
 
 
 class Cells(NamedTuple):
-    """Grid, statuses and lists of a polyhedron, the argument of `locate_by_cells`."""
+    """Grid, cell statuses and triangle lists of a polyhedron: the argument of `locate_by_cells`."""
 
     lattice: Lattice
     statuses: Int8Array
-    """(n + 1,): location of all points of a cell, UNDECIDED if a triangle may reach into it; last the location beyond
-    the grid."""
+    """(n + 1,): location of all points of each cell, UNDECIDED if a triangle may reach into it; the last entry is for
+    points outside the grid."""
     codes: Int32Array
-    """(n,): of an UNDECIDED cell 2 * first group + (1 if its reference point is inside), or MIXED_CELL."""
+    """(n,): of an UNDECIDED cell 2 * index of its first group + (1 if its reference point is inside), or MIXED_CELL."""
     groups: Float32Array
-    """(n_groups, 14, 8): the triangles of cells in the layout of lanes/cells.py."""
+    """(n_groups, 14, 8): the triangles listed in the cells, in the layout of lanes/cells.py."""
 
 
 class Sides(NamedTuple):
-    """Grid and statuses of a polyhedron, the argument of `side_in_cell`."""
+    """Grid and cell statuses of a polyhedron without lists: the argument of `side_in_cell`."""
 
     frame: FloatArray
-    """``(6,)``: low corner of the grid, and cells per unit."""
+    """``(6,)``: low corner of the grid, and cells per unit of length on each axis."""
     place: tuple[int, int, int, int]
     """Address of `statuses`, and number of cells along each axis."""
     statuses: Int8Array
-    """As `Cells` has them."""
+    """As in `Cells`."""
 
 
 def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
-    """Return the cells of a solid for which `can_have_cells` holds, built once."""
+    """Return the `Cells` of a polyhedron, built at first use; `can_have_cells` must hold."""
     return solid.prepared("cells", lambda: build_cells(solid, budget), budget.check)
 
 
@@ -100,10 +101,8 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
 
 
 def sides_if_profitable(solid: Polyhedron, n_points: int, budget: Budget) -> Sides | None:
-    """Return the sides of the cells of `solid`, built if the points that scenes located so far pay for it; else None.
-
-    Building takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us.
-    """
+    """Return the `Sides` of a polyhedron, built at first use; None until scenes have located enough points to pay for
+    them. Construction takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us."""
     seen = solid.prepared("scene_points_seen", lambda: [0], budget.check)
     seen[0] += n_points
     n_faces = len(solid.triangles)
@@ -115,7 +114,7 @@ def sides_if_profitable(solid: Polyhedron, n_points: int, budget: Budget) -> Sid
 
 
 def build_sides(solid: Polyhedron, budget: Budget) -> Sides:
-    """Build the sides of the cells of `solid`. Raises what `Budget.check` raises."""
+    """Build the `Sides` of a polyhedron. Raises what `Budget.check` raises."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget)
     statuses = _statuses(_sides_by_rays(tree, lattice, counts, True, budget), counts)
@@ -128,9 +127,8 @@ def _statuses(sides: Int8Array, counts: IntArray) -> Int8Array:
 
 @kernel
 def label_empty_cells(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
-    """Fill labels (nz * ny * nx,) int64 with the cell from which each empty cell copies its side (flood fill).
-
-    A cell that is located itself, and every cell with a list, has its own number.
+    """Fill labels (nz * ny * nx,) int64 with the cell whose side each empty cell has too (flood fill). counts:
+    triangles listed in each cell. A cell with triangles, and the first of a connected group, has its own index.
     """
     for cell in range(len(counts)):
         labels[cell] = cell
@@ -147,10 +145,9 @@ def label_empty_cells(counts: IntArray, nx: int, ny: int, labels: IntArray) -> N
 def _sides_by_rays(
     tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget
 ) -> Int8Array:
-    """Return the side of each empty cell, and of the reference point of each other cell, by vertical rays.
-
-    _UNKNOWN: the reference point rounds out of its cell, is on the boundary, or is UNDECIDED. counts: lengths of the
-    lists of cells. only_empty: skip cells with a list.
+    """Return by cell the side (1 inside, -1 outside) of an empty cell, or of another cell's reference point, by
+    vertical rays. _UNKNOWN: the reference point rounds out of its cell, is on the boundary, or UNDECIDED. counts:
+    triangles listed in each cell. only_empty: skip cells with triangles.
     """
     (nx, ny, _), labels = lattice.n, np.empty(len(counts), np.int64)
     label_empty_cells(counts, nx, ny, labels)
@@ -173,7 +170,8 @@ def fill_groups(
     mesh: Mesh, leaves: IntArray, starts: IntArray, firsts: IntArray, ends: IntArray, lists: Int32Array,
     groups: Float32Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill groups (n, 14, 8) with the triangles of `leaves`, each cell from its group in `starts` on."""
+    """Fill groups (n, 14, 8) with the triangles listed in the cells `leaves`, those of a cell from group starts[item]
+    on."""
     nx, ny, _ = mesh.lattice.n
     for item in range(len(leaves)):
         if flag[0]:
@@ -187,7 +185,7 @@ def fill_groups(
 def _fill_list(
     mesh: Mesh, triangles: Int32Array, reference: tuple[float, ...], groups: Float32Array, first_group: int
 ) -> None:
-    """Write the groups of a cell's triangles relative to its reference point, in units of cells."""
+    """Write the triangles of one cell to its groups, relative to the cell's reference point, in units of cells."""
     scale, n_groups = mesh.lattice.scale, (len(triangles) + LANES - 1) // LANES
     for place in range(n_groups * LANES):
         row = groups[first_group + place // LANES, :, place % LANES]

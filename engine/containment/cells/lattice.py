@@ -45,22 +45,23 @@ _FLAT: Final = 2.0**-300
 
 
 class Walls(NamedTuple):
-    """Linear functions, two slopes and a constant each, that are >= 0 wherever a cell may meet the triangle."""
+    """Linear functions of the centre w of a cell, each >= 0 where the cell may meet a triangle: (slope, slope,
+    constant)."""
 
     seen_along_z: Any
     """Three functions of (x, y): the edges projected along z."""
     seen_along_x: Any
-    """Three functions of (y, z)."""
+    """Three functions of (y, z): the edges projected along x."""
     seen_along_y: Any
-    """Three functions of (z, x)."""
+    """Three functions of (z, x): the edges projected along y."""
     normal: Any
-    """The plane of the triangle: |normal . w| <= `reach` wherever they may meet."""
+    """Normal of the triangle: |normal . w| <= `reach` where the cell may meet its plane."""
     reach: float
 
 
 @inline
 def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
-    """Return the separating functions of the triangle 0, u, v."""
+    """Return the `Walls` of the triangle 0, u, v."""
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     su, sv = abs(u[0]) + abs(u[1]) + abs(u[2]), abs(v[0]) + abs(v[1]) + abs(v[2])
     reach = _MARGIN * (abs(nx) + abs(ny) + abs(nz)) + _ROUNDING * su * sv * (su + sv + 6.0)
@@ -72,7 +73,8 @@ def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
 
 @inline
 def _edges(ux: float, uy: float, vx: float, vy: float) -> Any:
-    """Return the functions of the three edges of a planar triangle (0, u, v); zeros if it may have no area."""
+    """Return three (slope, slope, constant), one for each edge of a planar triangle (0, u, v); (0, 0, 1) if its area
+    may be 0."""
     area = ux * vy - uy * vx
     if not abs(area) > _ROUNDING * (abs(ux * vy) + abs(uy * vx)):
         return (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
@@ -106,7 +108,8 @@ def _narrowed(low: float, high: float, slope: float, value: float) -> tuple[floa
 
 @inline
 def rows_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
-    """Return the first and last row of a layer that the triangle may reach; z: of the cell centres, y: of row 0."""
+    """Return first and last row (y index) of a layer of cells that the triangle may reach into, within first .. last.
+    z: of the layer's cell centres; y: of the cell centres of row 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_x:
         low, high = _narrowed(low, high, wall[0], wall[0] * y + wall[1] * z + wall[2])
@@ -115,7 +118,8 @@ def rows_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tup
 
 @inline
 def cells_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
-    """Return the first and last cell of a row that the triangle may reach; x: of the centre of cell 0."""
+    """Return first and last cell (x index) of a row that the triangle may reach into, within first .. last. z, y: of
+    the row's cell centres; x: of the centre of cell 0."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_z:
         low, high = _narrowed(low, high, wall[0], wall[0] * x + wall[1] * y + wall[2])
@@ -128,22 +132,24 @@ def cells_reached(walls: Walls, z: float, y: float, x: float, first: int, last: 
 
 
 PLACE: Final = (0.5 + 287.0 / 4096.0, 0.5 - 413.0 / 4096.0, 0.5 + 101.0 / 4096.0)
-"""Position of the reference point in its cell: on no plane of symmetry that faces of a lattice might share."""
+"""Position of the reference point in its cell, from 0 to 1: on no plane of symmetry that faces of a lattice might
+share."""
 _WANTED: Final = 4.0
-"""Cells along an axis for each triangle along an edge of a cube of as many triangles."""
+"""Cells along an axis for each triangle along an edge of a cube with as many triangles."""
 _MOST_CELLS: Final = 160.0
 """Largest number of cells along an axis."""
 _FEWEST_CELLS: Final = 12
 _MOST_ENTRIES: Final = 12.0
 _FEW_ENTRIES: Final = 1 << 16
-"""Mean numbers of cells that list a triangle, in all and at most, from which the grid is made coarser."""
+"""Number of cells that list a triangle, in the mean and over all, from which the grid is made coarser."""
 _SAMPLE: Final = 1024
 _RANGE: Final = 2.0**400
-"""Largest extent, and 1 / smallest, of a solid with cells: products of three extents stay within the exponents."""
+"""Largest extent, and inverse of the smallest, of a solid with cells: products of three extents stay finite and normal.
+"""
 
 
 class Lattice(NamedTuple):
-    """A uniform grid of cells whose sizes are powers of two."""
+    """A uniform grid: low corner, cells per unit, cell size (powers of two) and number of cells, each (x, y, z)."""
 
     low: tuple[float, float, float]
     scale: tuple[float, float, float]
@@ -162,26 +168,26 @@ class Mesh(NamedTuple):
 
 @inline
 def index_of(value: float, low: float, scale: float) -> int:
-    """Return the index of the cell that contains a value >= `low`."""
+    """Return the index along an axis of the cell that contains `value` >= `low`."""
     return int((value - low) * scale)
 
 
 @inline
 def reference_point(lattice: Lattice, x: int, y: int, z: int) -> Any:
-    """Return the reference point of cell (x, y, z)."""
+    """Return the coordinates of the reference point of cell (x, y, z)."""
     low, size = lattice.low, lattice.size
     return low[0] + (x + PLACE[0]) * size[0], low[1] + (y + PLACE[1]) * size[1], low[2] + (z + PLACE[2]) * size[2]
 
 
 @inline
 def scaled_difference(a: Any, b: Any, scale: tuple[float, ...]) -> Any:
-    """Return a - b in units of cells: one rounding each."""
+    """Return (a - b) * scale, a difference of points in units of cells; each component is rounded once."""
     return (a[0] - b[0]) * scale[0], (a[1] - b[1]) * scale[1], (a[2] - b[2]) * scale[2]
 
 
 @inline
 def _span(a: float, b: float, c: float, low: float, scale: float, n: int) -> tuple[int, int]:
-    """Return the first and the last index over the coordinates of a triangle's corners."""
+    """Return first and last cell index, along one axis, of the box of a triangle with corner coordinates a, b, c."""
     return max(index_of(min(a, b, c), low, scale), 0), min(index_of(max(a, b, c), low, scale), n - 1)
 
 
@@ -213,7 +219,7 @@ def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool,
 
 
 def can_have_cells(solid: Polyhedron) -> bool:
-    """Return whether all coordinates are within `_RANGE`."""
+    """Return whether extent and coordinates of a polyhedron are within `_RANGE`."""
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     with np.errstate(over="ignore"):
         extent = (high - low).max()
@@ -221,7 +227,7 @@ def can_have_cells(solid: Polyhedron) -> bool:
 
 
 def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
-    """Return the grid of a solid, built once; coarse enough that few cells list the same triangle."""
+    """Return the grid of a polyhedron, chosen once; so coarse that few cells list the same triangle."""
 
     def find() -> Lattice:
         tree, most = tree_of(solid, budget.check), _MOST_CELLS
@@ -237,7 +243,7 @@ def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
 
 
 def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
-    """Return for each cell how many triangles may reach into it."""
+    """Return (n_cells,) int64: how many triangles may reach into each cell."""
     nx, ny, nz = mesh.lattice.n
     counts = np.zeros(nx * ny * nz, np.int64)
     list_triangles(mesh, counts, np.empty(0, np.int32), False, budget.flag)
@@ -246,7 +252,7 @@ def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
 
 
 def _make_lattice(tree: TriangleTree, most: float) -> Lattice:
-    """Return a grid of at most `most` cells along the longest axis; a flat axis has one cell."""
+    """Return a grid of at most `most` cells along the longest axis, of one cell along an axis without extent."""
     extent = np.subtract(tree.high, tree.low)
     largest = float(extent.max())
     size = _power_of_two(largest / min(most, max(8.0, _WANTED * len(tree.triangles) ** (1.0 / 3.0))))

@@ -27,22 +27,21 @@ from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray
 
 _BLOCK: Final = 256
-"""Points that go through the first stage together."""
+"""Number of points whose statuses are looked up together."""
 _FEWEST: Final = 128
-"""Least number of UNDECIDED points for the later stages; the scratch of `_FEWEST + _BLOCK` points fits the L1 cache."""
+"""Number of UNDECIDED points from which the later stages run; scratch for `_FEWEST + _BLOCK` points fits the L1 cache.
+"""
 _AHEAD: Final = 6
-"""Points between the prefetch of a list and its use: some 100 ns."""
+"""Number of points between the prefetch of a list and its use: some 100 ns."""
 
 
 @inline
 def _look_up_statuses(
     points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_undecided: Any
 ) -> Any:
-    """Write the statuses of the cells of points start .. end, and append the UNDECIDED ones to item_of.
-
-    Returns their new number, and how many points are beyond the grid. Branchless: a point beyond the grid, or not
-    finite, gets the last status.
-    """
+    """Write the cell statuses of points start .. end - 1 to locations, and append the indices of UNDECIDED points to
+    item_of. Returns the new length of item_of, and how many points are outside the grid; these, and points with NaN,
+    get the last status. Without branches."""
     low, scale, n, statuses = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.statuses
     nx, ny, beyond = np.int32(n[0]), np.int32(n[1]), np.uint32(n[0] * n[1] * n[2])
     x_end, y_end, z_end = float(n[0]), float(n[1]), float(n[2])
@@ -64,7 +63,8 @@ def _look_up_statuses(
 
 @merged
 def _look_up_codes(points: Any, cells: Any, undecided: Any, n_undecided: int) -> Any:
-    """Look up the codes of the UNDECIDED points; return how many cells have a list."""
+    """Look up the cell codes of the UNDECIDED points; return how many of their cells have a list of triangles.
+    undecided: scratch (item_of, code_of, places, waiting), see `locate_by_cells`."""
     low, scale, n, codes = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.codes
     item_of, code_of, places, waiting = undecided
     n_waiting = np.uint64(0)
@@ -82,7 +82,7 @@ def _look_up_codes(points: Any, cells: Any, undecided: Any, n_undecided: int) ->
 
 @merged
 def _query_lists(points: Any, cells: Any, undecided: Any, n_waiting: Any, locations: Any) -> None:
-    """Locate the points whose cells have a list, by the parity over that list."""
+    """Locate the UNDECIDED points whose cells have lists, by the parity of crossings from the reference point."""
     lattice, groups = cells.lattice, cells.groups
     item_of, code_of, places, waiting = undecided
     for turn in range(min(n_waiting, np.uint64(_AHEAD))):
@@ -100,11 +100,9 @@ def _query_lists(points: Any, cells: Any, undecided: Any, n_waiting: Any, locati
 
 @allocating_kernel
 def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3) from a `Cells`; return how many stay UNDECIDED, or NOT_FINITE.
-
-    Points go through the stages in blocks, so that memory loads of a stage overlap: status (where most points end),
-    code, parity over the list. Only points beyond the grid are tested for NaN and infinity.
-    """
+    """Fill locations (n,) int8 of points (n, 3) by `Cells`; return how many stay UNDECIDED, or NOT_FINITE. Points go
+    through the stages in blocks, so that memory loads of a stage overlap: status (enough for most points), code, parity
+    over the list. Only points outside the grid are tested for NaN and infinity."""
     room = _FEWEST + _BLOCK + 1
     item_of, waiting = np.empty(room, np.uint64), np.empty(room, np.uint64)
     undecided = item_of, np.empty(room, np.int32), np.empty((room, 3), np.int32), waiting
@@ -128,10 +126,8 @@ def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: 
 
 @inline
 def side_in_cell(frames: FloatArray, places: IntArray, row: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of a blurred point (x, y, z) if one cell contains its blur, else UNDECIDED.
-
-    frames (n, 6), places (n, 4): frame and place of the `Sides` of each polyhedron; `row` selects one.
-    """
+    """Return the location of a blurred point p = (x, y, z) where one cell contains its whole blur, else UNDECIDED.
+    frames (n, 6), places (n, 4): `frame` and `place` of the `Sides` of each polyhedron; row: the polyhedron."""
     x, y, z = p
     x_low, y_low, z_low = frames[row, 0], frames[row, 1], frames[row, 2]
     x_scale, y_scale, z_scale = frames[row, 3], frames[row, 4], frames[row, 5]

@@ -58,7 +58,7 @@ class Frames(NamedTuple):
 
 
 def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
-    """Return the poses that are not the identity, with their inverses."""
+    """Return `Frames` of the poses that are not the identity; `rows` tells the row of each body's pose."""
     given = [(body, pose) for body, pose in enumerate(poses) if pose is not None]
     rotations, translations = np.zeros((len(given), 3, 3)), np.zeros((len(given), 3))
     rotations[:, 2, 2] = 1.0
@@ -76,7 +76,7 @@ def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
 
 
 def _inverses(rotations: FloatArray) -> FloatArray:
-    """Return adj(R) / det(R) of (n, 3, 3) matrices; exact for quarter turns."""
+    """Return R^-1 = adj(R) / det(R) for matrices (n, 3, 3); exact where R permutes the axes."""
     after = (1, 2, 0)
     adjugates = np.empty_like(rotations)
     for i in range(3):
@@ -88,16 +88,13 @@ def _inverses(rotations: FloatArray) -> FloatArray:
 
 
 _BLUR: Final = 16.0 * 2.0**-53
-"""Factor of eight times the differences: these overflow before a coordinate does."""
+"""Factor of the sum of 8 |difference|: that sum overflows before a coordinate does, and the blur is then infinite."""
 
 
 @inline
 def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
-    """Return a point (x, y, z) in the frame of a pose, and its blur: 0.0 if it is exact.
-
-    frames: inverses (n, 3, 3) of R^-1 rounded, translations (n, 3), is_turn (n,): whether all entries are exactly -1, 0
-    or 1. frame: row of the pose, -1 for none.
-    """
+    """Return a point (x, y, z) in the frame of a pose, and its blur (0.0: exact). frames: inverses (n, 3, 3),
+    translations (n, 3), is_turn (n,): whether R only permutes axes, up to sign. frame: row of the pose, -1 for none."""
     if frame < 0:
         return p, 0.0
     inverses, translations = frames.inverses, frames.translations
@@ -114,7 +111,7 @@ def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
 
 @kernel
 def move_to_body_frame(points: FloatArray, frames: Frames, moved: FloatArray, blurs: FloatArray) -> None:
-    """Fill moved (n, dim) and blurs (n,) with points in the frame of the only pose in `frames`."""
+    """Fill moved (n, dim) and blurs (n,) with the preimages of points under the only pose in `frames`."""
     for item in range(len(points)):
         p, blurs[item] = to_frame(frames, 0, in_space(points, item))
         moved[item, 0], moved[item, 1] = p[0], p[1]
@@ -125,12 +122,12 @@ def move_to_body_frame(points: FloatArray, frames: Frames, moved: FloatArray, bl
 _SLACK: Final = 8.0 * 2.0**-53
 _TINY: Final = 1e-320
 NOT_FINITE: Final = -1
-"""Returned by kernels instead of a count."""
+"""Return value of a kernel, instead of a count, where a point has NaN or an infinity."""
 
 
 @inline
 def has_not_finite(points: FloatArray) -> bool:
-    """Return whether points (n, dim) contain NaN or an infinity; branchless, at memory speed."""
+    """Return whether points (n, dim) contain NaN or an infinity; without branches."""
     is_any, flat = False, points.reshape(points.size)
     for place in range(len(flat)):
         is_any |= flat[place] - flat[place] != 0.0
@@ -139,7 +136,8 @@ def has_not_finite(points: FloatArray) -> bool:
 
 @inline
 def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
-    """Return the sign of orient2d(a, b, .) that all of the blurred q share, or UNDECIDED."""
+    """Return the sign of orient2d(a, b, x) where it is the same, 1 or -1, for all points x of the blurred q, else
+    UNDECIDED."""
     left = (a.x - q.x) * (b.y - q.y)
     right = (a.y - q.y) * (b.x - q.x)
     turn = left - right
@@ -151,7 +149,9 @@ def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
 def side_of_box(
     low: tuple[float, ...], high: tuple[float, ...], is_flat: bool, p: tuple[float, ...], blur: float
 ) -> int:
-    """Return the location of a blurred point (x, y, z) in a box; in the plane all z are 0."""
+    """Return the location of a blurred point (x, y, z) in a box: 1 inside, 0 boundary, -1 outside, UNDECIDED. is_flat:
+    a planar box; all z are 0.
+    """
     is_out = (p[0] + blur < low[0]) | (p[0] - blur > high[0])
     is_out |= (p[1] + blur < low[1]) | (p[1] - blur > high[1])
     is_out |= (p[2] + blur < low[2]) | (p[2] - blur > high[2])
@@ -167,7 +167,7 @@ def side_of_box(
 
 @inline
 def side_of_rows(rows: FloatArray, first: int, last: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of a blurred point (x, y, z) by the rows first ... last of plane rows (n, 4)."""
+    """Return the location of a blurred point (x, y, z) by plane rows first .. last - 1 (n, 4): 1, -1 or UNDECIDED."""
     location = 1
     for row in range(first, last):
         ax, by, cz, d = rows[row, 0] * p[0], rows[row, 1] * p[1], rows[row, 2] * p[2], rows[row, 3]
@@ -184,7 +184,7 @@ def side_of_rows(rows: FloatArray, first: int, last: int, p: tuple[float, ...], 
 
 @inline
 def in_space(points: FloatArray, item: int) -> Any:
-    """Return a row of points (n, 2 or 3) as (x, y, z), with z = 0 in 2D."""
+    """Return row `item` of points (n, 2 or 3) as (x, y, z), with z = 0 in the plane."""
     return float(points[item, 0]), float(points[item, 1]), 0.0 if points.shape[1] == 2 else float(points[item, 2])
 
 
@@ -192,10 +192,8 @@ def in_space(points: FloatArray, item: int) -> Any:
 def locate_in_rows_blurred(
     points: FloatArray, blurs: FloatArray, rows: FloatArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for plane rows (m, 4), exact or correctly rounded; return how many stay UNDECIDED.
-
-    Planar rows have 0 in the third place.
-    """
+    """Fill locations (n,) int8 of blurred points by plane rows (m, 4); return how many are UNDECIDED. rows: exact or
+    correctly rounded; in the plane the third coefficient is 0."""
     n_open = 0
     for item in range(len(points)):
         if flag[0]:
@@ -209,12 +207,9 @@ def locate_in_rows_blurred(
 def locate_in_box(
     points: FloatArray, blurs: FloatArray, low: FloatArray, high: FloatArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) and box corners (dim,); return how many stay UNDECIDED, or
-    NOT_FINITE.
-
-    Six exact comparisons. blurs: (n,), or (0,) for exact points, which are all decided. Where low = high on an axis
-    every point of the box is BOUNDARY, by the comparisons themselves.
-    """
+    """Fill locations (n,) int8 of points (n, dim) in a box by six comparisons; return how many are UNDECIDED, or
+    NOT_FINITE. low, high: corners (dim,). blurs: (n,), or (0,) for exact points, which are all decided. Where low =
+    high on an axis, every point of the box is BOUNDARY, as the comparisons say."""
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     n_open, is_flat = 0, len(low) == 2
@@ -234,11 +229,9 @@ def locate_by_polynomial(
     points: FloatArray, blurs: FloatArray, powers: IntArray, coefficients: FloatArray, degree: int,
     locations: Int8Array, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill `locations` (n,) int8 for points (n, dim) with the sign of the polynomial, or UNDECIDED.
-
-    blurs: as for `locate_in_box`. powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns
-    the number of points beyond the filter, or NOT_FINITE.
-    """
+    """Fill locations (n,) int8 of points (n, dim) with the sign of a polynomial, or UNDECIDED. blurs: (n,), or (0,) for
+    exact points. powers: (t, dim) int64; coefficients: (t,); degree: the largest total power. Returns the number of
+    points that the filter left open, or NOT_FINITE."""
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     n_beyond = 0
@@ -264,7 +257,8 @@ _BALL_BLOCK: Final = 64
 
 @merged
 def location_in_ball(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
-    """Return the location of a point at that difference from the centre, UNDECIDED if the filter cannot prove it."""
+    """Return 1.0 (inside), -1.0 (outside) or 2.0 (UNDECIDED) for a point that differs from a ball's centre by (dx, dy,
+    dz). square: r^2. reach: r + 2 blur. blur: bound on the error of a coordinate of the centre."""
     ax, ay, az = abs(dx), abs(dy), abs(dz)
     total = dx * dx + dy * dy + dz * dz
     excess, bound = square - total, _BALL_SLACK * (square + total) + _TINY
@@ -280,7 +274,8 @@ def _has_exact_square(value: float) -> bool:
 
 @called
 def _settle(points: FloatArray, item: int, center: FloatArray, radius: float, expansion: Any) -> int:
-    """Return the location by exact sums; UNDECIDED if differences or squares are no exact pairs."""
+    """Return the location of a point in a ball by exact sums: 1, 0, -1; UNDECIDED if a difference or a square is no
+    exact pair."""
     if not _has_exact_square(radius):
         return UNDECIDED
     n = grow_product(expansion, 0, radius, radius)
@@ -296,9 +291,8 @@ def _settle(points: FloatArray, item: int, center: FloatArray, radius: float, ex
 def locate_in_ball(
     points: FloatArray, center: FloatArray, blur: float, radius: float, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim); return how many were beyond the filter, or NOT_FINITE.
-
-    blur: bound on the error of each coordinate of `center`; if it is not 0.0, what the filter leaves stays UNDECIDED.
+    """Fill locations (n,) int8 of points (n, dim) in a ball; return how many the filter left open, or NOT_FINITE. blur:
+    bound on the error of each coordinate of `center`; where it is not 0.0, what the filter leaves open stays UNDECIDED.
     """
     if has_not_finite(points):
         return NOT_FINITE

@@ -44,14 +44,14 @@ _LARGE: Final = 1e300
 
 @merged
 def _row(planes: FloatArray, row: int, is_flat: bool) -> HalfSpace3:
-    """Return row `row` of planes (m, 3 or 4) as four numbers; planar rows have 0 in the third place."""
+    """Return row `row` of planes (m, 3 or 4) as four coefficients; in the plane the third is 0."""
     a, b, d = float(planes[row, 0]), float(planes[row, 1]), float(planes[row, 2 if is_flat else 3])
     return HalfSpace3(a, b, 0.0 if is_flat else float(planes[row, 2]), d)
 
 
 @inline
 def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: BoolArray) -> tuple[int, bool]:
-    """Return the location of a point (n, 2 or 3), and whether it was beyond the filter."""
+    """Return the location of point `item` of (n, 2 or 3), and whether the filter left a plane open."""
     x, y, z = in_space(points, item)
     p, location, is_unsure = Point3(x, y, z), 1, False
     for row in range(len(planes)):
@@ -73,7 +73,7 @@ def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: Boo
 
 @inline
 def _largest(values: FloatArray, folded: FloatArray) -> float:
-    """Return max |values| of (_BLOCK,) by pairwise reduction, which the compiler vectorises."""
+    """Return max |values| of a block (_BLOCK,), folded by halves so that the compiler vectorises it."""
     half = _BLOCK // 2
     for k in range(half):
         folded[k] = max(abs(values[k]), abs(values[k + half]))
@@ -93,11 +93,9 @@ def _value(h: HalfSpace3, x: float, y: float, z: float, is_flat: bool) -> Any:
 def locate_in_half_spaces(
     points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, dim) and planes (m, dim + 1); UNDECIDED beyond the exponents' range.
-
-    is_exact: (m,) bool, False for a row that is correctly rounded from a rational one, without underflow. Returns how
-    many points were beyond the filter, or NOT_FINITE. Stops early once flag[0] is set.
-    """
+    """Fill locations (n,) int8 of points (n, dim) in an intersection of half-spaces; UNDECIDED beyond the exponents'
+    range. planes: (m, dim + 1). is_exact: (m,) bool, False for a row that is rounded from a rational one. Returns how
+    many points the filter left open, or NOT_FINITE. Stops early once flag[0] is set."""
     is_flat = planes.shape[1] == 3
     if has_not_finite(points):
         return NOT_FINITE

@@ -33,13 +33,13 @@ from engine.predicates.vectors import as_point2
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray, Point2
 
 MISSED, CROSSED, ON_EDGE = 0, 1, 3
-"""Whether a ray crosses an edge."""
+"""How the ray from q meets an edge; ON_EDGE: q lies on the edge."""
 MIXED: Final = 2
-"""Status of a cell that an edge may reach into; another cell has the location of its points."""
+"""Status of a grid cell that an edge may reach into; the status of any other cell is the location of all its points."""
 
 
 class Rings(NamedTuple):
-    """Edges of a polygon by horizontal slabs, for rays to the right."""
+    """Edges of a polygon, listed by horizontal slab, for rays to the right; the grid of cells is optional."""
 
     xs: FloatArray
     """x of the vertices of all rings, each ring closed by its first vertex."""
@@ -48,18 +48,19 @@ class Rings(NamedTuple):
     offsets: IntArray
     """``(n_slabs + 1,)``: first run of each slab."""
     runs: Int32Array
-    """``(n, 2)``: first and last vertex of each run."""
+    """``(n, 2)``: indices of the first and last vertex of each run, in xs and ys."""
     box: tuple[float, float, float, float]
     """xmin, xmax, ymin, ymax."""
     u: Axis
     v: Axis
     statuses: Int8Array
-    """Of the cells, row by row; empty without a grid."""
+    """Locations of the grid's cells, row by row, or MIXED; empty without a grid."""
 
 
 @merged
 def _crosses_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
-    """Return whether the ray from q crosses the edge, and whether the filter cannot prove it."""
+    """Return whether the ray to the right from q = (x, y) crosses edge ab, and whether the filter cannot prove the
+    answer."""
     above = ay - y
     left = (ax - x) * (by - y)
     right = above * (bx - x)
@@ -75,7 +76,7 @@ def _crosses_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float
 def _count_crossings(
     xs: FloatArray, ys: FloatArray, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, int]:
-    """Return how many edges between the vertices first ... last are crossed, and how many are uncertain."""
+    """Return how many edges between vertices first .. last the ray crosses, and how many the filter cannot decide."""
     n_crossed = n_unsure = 0
     for edge in range(np.uint64(first), np.uint64(last)):  # unsigned: no index that counts from the end
         follow = edge + np.uint64(1)
@@ -87,7 +88,7 @@ def _count_crossings(
 
 @inline
 def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
-    """Return CROSSED, MISSED, ON_EDGE or UNDECIDED for the ray to the right from q and an edge."""
+    """Return CROSSED, MISSED, ON_EDGE or UNDECIDED for the ray to the right from q and edge ab; exact."""
     if (a.y < q.y and b.y < q.y) or (a.y > q.y and b.y > q.y) or (a.x < q.x and b.x < q.x):
         return MISSED
     is_passed = (a.y <= q.y) != (b.y <= q.y)
@@ -106,7 +107,8 @@ def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
 
 @called
 def _locate_edge_by_edge(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
-    """Return the location of q by some runs, edge by edge; UNDECIDED if a sign is out of the compiled range."""
+    """Return the location of q by exact signs at the edges of runs first .. last - 1: 1, 0, -1, or UNDECIDED (exponent
+    range)."""
     is_odd, is_open = False, False
     for run in range(first, last):
         for edge in range(runs[run, 0], runs[run, 1]):
@@ -125,11 +127,8 @@ def _locate_edge_by_edge(xs: FloatArray, ys: FloatArray, runs: Int32Array, first
 def locate_in_runs(
     xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, bool]:
-    """Return the location of (x, y) by the runs first ... last, and whether it was beyond the filter.
-
-    xs, ys: of closed rings. Caller guarantees that every edge at the height of the point is in one of these runs; so a
-    vertex at that height never ends a run unless it closes a ring.
-    """
+    """Return the location of (x, y) by the runs first .. last - 1, and whether the filter left an edge open. Caller
+    guarantees that these runs have every edge at the height of the point."""
     n_crossed = n_unsure = 0
     for run in range(first, last):
         crossed, unsure = _count_crossings(xs, ys, runs[run, 0], runs[run, 1], x, y, blur)
@@ -144,7 +143,7 @@ def locate_in_runs(
 
 @merged
 def _write_cell_statuses(points: FloatArray, rings: Rings, locations: Int8Array) -> None:
-    """Write the status of each point's cell to locations; branchless."""
+    """Fill locations with the status of each point's grid cell, -1 outside the polygon's box; without branches."""
     u, v, (x_min, x_max, y_min, y_max), statuses = rings.u, rings.v, rings.box, rings.statuses
     for item in range(len(points)):
         x, y = points[item, 0], points[item, 1]
@@ -157,11 +156,8 @@ def _write_cell_statuses(points: FloatArray, rings: Rings, locations: Int8Array)
 
 @kernel
 def locate_in_rings(points: FloatArray, blurs: FloatArray, rings: Rings, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill `locations` (n,) int8 for points (n, 2) from a `Rings`; return how many were beyond the filter, or
-    NOT_FINITE.
-
-    blurs: (n,), or (0,) for exact points; only these are tested for NaN and infinity.
-    """
+    """Fill locations (n,) int8 of points (n, 2) in a polygon; return how many the filter left open, or NOT_FINITE.
+    blurs: (n,), or (0,) for exact points; only these are tested for NaN and infinity."""
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     x_min, x_max, y_min, y_max = rings.box

@@ -21,16 +21,13 @@ from engine.predicates.vectors import as_point3, corners_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, Int32Array, IntArray
 
 _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
-"""Bits of the state of a point."""
+"""Bits of a point's state: odd number of crossings, on a face, a sign undecided, the filter left a sign open."""
 
 
 @inline
 def _sort_into_cells(points: FloatArray, u: Axis, v: Axis, firsts: IntArray, order: Int32Array) -> None:
-    """Fill order (n,) int32 with the points (n, 3) sorted by cell, and firsts (u_cells * v_cells + 1,) with the
-    offsets.
-
-    u, v: each an `Axis` over x and y of all points. firsts: int64, zero.
-    """
+    """Sort points (n, 3) by grid cell into order (n,) int32, and fill firsts (n_cells + 1,) with the offsets of the
+    cells. u, v: the grid's axes along x and y. firsts: int64, zero on entry."""
     for item in range(len(points)):
         firsts[_cell_at(points, item, u, v) + 1] += 1
     for cell in range(1, len(firsts)):
@@ -52,7 +49,7 @@ def _cell_at(points: FloatArray, item: int, u: Axis, v: Axis) -> int:
 
 @inline
 def _record(states: FlagArray, item: int, met: int) -> None:
-    """Record in a point's state how its ray meets a triangle."""
+    """Update a point's state by `met`, a result of `meet_upwards`."""
     if met & BEYOND:
         states[item] |= _BEYOND
     met &= 3
@@ -66,7 +63,7 @@ def _record(states: FlagArray, item: int, met: int) -> None:
 
 @inline
 def _write_locations(states: FlagArray, locations: Int8Array) -> int:
-    """Fill the locations from the states; return how many points were beyond the filter."""
+    """Fill the locations from the points' states; return how many the filter left open."""
     n_beyond = 0
     for item in range(len(states)):
         state = states[item]
@@ -85,10 +82,8 @@ def _cast_rays(
     points: FloatArray, cells: Any, vertices: FloatArray, triangles: IntArray, z_min: float, states: FlagArray,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Record in states (n,) uint8 how the vertical rays from points (n, 3) meet the triangles (m, 3).
-
-    cells: u, v, firsts, order as `_sort_into_cells` leaves them. z_min: least z of the points.
-    """
+    """Record in states (n,) uint8 how the upward rays from points (n, 3) meet the triangles (m, 3). cells: (u, v,
+    firsts, order), see `_sort_into_cells`. z_min: least z of the points."""
     u, v, firsts, order = cells
     for triangle in range(len(triangles)):
         if flag[0]:
@@ -115,7 +110,8 @@ def _cast_rays(
 
 @inline
 def _axis_over(points: FloatArray, axis: int, n_cells: int) -> Axis:
-    """Return the cells over the points along an axis, one if they have no extent: `make_axis`, compiled."""
+    """Return an `Axis` of `n_cells` cells over the range of the points' coordinates, of one cell if that range is
+    empty."""
     low = high = float(points[0, axis])
     for item in range(1, len(points)):
         low, high = min(low, float(points[item, axis])), max(high, float(points[item, axis]))
@@ -127,10 +123,8 @@ def _axis_over(points: FloatArray, axis: int, n_cells: int) -> Axis:
 def locate_by_pass(
     points: FloatArray, vertices: FloatArray, triangles: IntArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3), n > 0; return how many were beyond the filter, or NOT_FINITE.
-
-    triangles: (m, 3) int64. Caller guarantees a surface that is even at each edge.
-    """
+    """Fill locations (n,) int8 of points (n, 3), n > 0, in a polyhedron; return how many the filter left open, or
+    NOT_FINITE. triangles: (m, 3) int64. Caller guarantees that an even number of triangles meets at each edge."""
     if has_not_finite(points):
         return NOT_FINITE
     side = max(1, int(len(points) ** 0.5))

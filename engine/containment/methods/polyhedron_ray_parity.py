@@ -50,17 +50,19 @@ from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int8Arr
 MISSED: Final = 0
 CROSSED: Final = 1
 ON_FACE: Final = 3
-"""How a ray meets a triangle; UNDECIDED if a sign is out of the compiled range."""
+"""How the upward ray meets a triangle (CROSSED, MISSED), or ON_FACE: its start is on it. Else UNDECIDED: a sign is out
+of the compiled range."""
 BEYOND: Final = 4
-"""Added to one of these if the filter did not suffice."""
+"""Bit added to such a code where the filter left a sign open."""
 _SLACK: Final = 2.0**-22
-"""Relative widening of a coordinate in the tree, for its rounding to float32 and that of the boxes near it."""
+"""Widening of a coordinate, relative to its size in the tree: more than its rounding to float32 and that of boxes near
+it."""
 _ABOVE_ALL: Final = np.float32(8.0)
 
 
 @inline
 def orient2d_with_stage(a: Point2, b: Point2, c: Point2) -> Any:
-    """Return (orient2d, 0), or (orient2d, BEYOND) if the filter did not suffice."""
+    """Return the exact sign of orient2d, and 0 if the filter proved it, else BEYOND."""
     turn = orient2d_filter(a, b, c)
     if turn != UNDECIDED:
         return turn, 0
@@ -69,7 +71,7 @@ def orient2d_with_stage(a: Point2, b: Point2, c: Point2) -> Any:
 
 @inline
 def perturbed_sign(turn: int, a: Point2, b: Point2) -> int:
-    """Return `turn` = orient2d(a, b, q), a zero decided as for q + (eps, eps^2)."""
+    """Return `turn` = orient2d(a, b, q); where that is 0, its sign for q + (eps, eps^2)."""
     return turn if turn != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
 
@@ -83,7 +85,8 @@ def has_both_signs(first: int, second: int, third: int) -> bool:
 
 @inline
 def touch_in_plane(a: Point2, b: Point2, c: Point2, q: Point2) -> int:
-    """Return ON_FACE, MISSED or UNDECIDED for a 2D point and triangle: ON_FACE unless the edge signs differ."""
+    """Return whether q is in the planar triangle abc: MISSED if left of one edge and right of another, else ON_FACE or
+    UNDECIDED."""
     first, second, third = orient2d(a, b, q), orient2d(b, c, q), orient2d(c, a, q)
     if has_both_signs(first, second, third):
         return MISSED
@@ -94,10 +97,8 @@ def touch_in_plane(a: Point2, b: Point2, c: Point2, q: Point2) -> int:
 
 @inline
 def touch_triangle(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
-    """Return ON_FACE if q lies on the closed, maybe degenerate triangle a, b, c; else MISSED, or UNDECIDED.
-
-    Caller guarantees that q lies in the triangle's box.
-    """
+    """Return ON_FACE if q lies on the closed triangle abc, which may be degenerate, else MISSED or UNDECIDED. Caller
+    guarantees that q lies in the triangle's box."""
     side = orient3d_filter(a, b, c, q)
     if side != UNDECIDED:
         return MISSED
@@ -120,10 +121,8 @@ def touch_triangle(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
 
 @inline
 def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
-    """Return CROSSED if the ray up from the moved q crosses the triangle, ON_FACE if q is on it, MISSED or UNDECIDED.
-
-    BEYOND is added if the filter did not suffice.
-    """
+    """Return how the upward ray from q + (eps, eps^2, 0) meets triangle abc: CROSSED, MISSED, ON_FACE (q is on it) or
+    UNDECIDED. BEYOND is added where the filter left a sign open."""
     if q.z > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
@@ -159,7 +158,7 @@ def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
 
 @inline
 def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> int:
-    """Return CROSSED or MISSED if all rays up from the blurred q agree, else UNDECIDED."""
+    """Return CROSSED or MISSED if that holds for the upward rays from all points of the blurred q, else UNDECIDED."""
     if q.z - blur > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)
@@ -177,8 +176,8 @@ def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> in
 
 @merged
 def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, bool]:
-    """Return q in tree coordinates, its z widened upwards, the range of z of its blurred rays, its blur there, and
-    whether q is near enough for that."""
+    """Return q in tree coordinates with its z rounded up, the float32 box (low, high) of its upward rays, the blur
+    there, and whether q is near enough to the tree for that."""
     origin, scale = tree.origin, tree.scale
     x, y, z, wide = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale, blur / scale
     u, v, w = _SLACK * abs(x) + wide + LEAST, _SLACK * abs(y) + wide + LEAST, _SLACK * abs(z) + wide + LEAST
@@ -190,11 +189,9 @@ def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, b
 
 @allocating_kernel
 def list_uncertain(tree: Any, x: float, y: float, z: float, blur: float, uncertain: IntArray) -> tuple[int, bool]:
-    """List the triangles for which the rays up from a blurred point (x, y, z) may disagree.
-
-    Fills uncertain (n,) int64 with their rows in `tree.triangles`; returns their number and whether the rays cross an
-    odd number of the others. The number is -1 if there is no room, or the point is too far from the tree.
-    """
+    """List the triangles that the upward rays from a blurred point (x, y, z) may meet differently. Fills uncertain (n,)
+    int64 with rows of `tree.triangles`; returns their number, and whether the rays cross an odd number of the other
+    triangles. The number is -1 if there is no room, or the point is too far from the tree."""
     q, stack, n_uncertain, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
     _, least, most, _, is_near = _in_tree(tree, q, blur)
     if not is_near:
@@ -224,10 +221,9 @@ def list_uncertain(tree: Any, x: float, y: float, z: float, blur: float, uncerta
 
 @inline
 def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: FlagArray) -> tuple[int, bool]:
-    """Return the location of a blurred q by a `TriangleTree`, and whether it was beyond the filter.
-
-    stack: (STACK,) int32. Tree coordinates are at most 2; a q beyond them is outside.
-    """
+    """Return the location of a blurred q by a `TriangleTree` (1, 0, -1 or UNDECIDED), and whether the filter left it
+    open. stack: (STACK,) int32, scratch. A point far outside the tree's coordinates is outside, or UNDECIDED for its
+    blur."""
     low, high = tree.low, tree.high
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
     if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
@@ -265,11 +261,9 @@ def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: F
 
 @allocating_kernel
 def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill `locations` (n,) int8 for points (n, 3); return how many were beyond the filter, or NOT_FINITE.
-
-    blurs: (n,), or (0,) for exact points; only these are tested for NaN and infinity. tree: a `TriangleTree`. Caller
-    guarantees a surface that is even at each edge.
-    """
+    """Fill locations (n,) int8 of points (n, 3) in a polyhedron; return how many the filter left open, or NOT_FINITE.
+    blurs: (n,), or (0,) for exact points; only these are tested for NaN and infinity. Caller guarantees that an even
+    number of triangles meets at each edge."""
     if len(blurs) == 0 and has_not_finite(points):
         return NOT_FINITE
     return int(_locate_each(points, blurs, tree, locations, np.empty(STACK, np.int32), flag))
@@ -279,7 +273,8 @@ def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: 
 def _locate_each(
     points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, stack: Int32Array, flag: FlagArray
 ) -> int:
-    """Do the work of `locate_by_tree`, without reference counts for the tree's arrays at each point."""
+    """Do the work of `locate_by_tree`, as a call of its own, so that the tree's arrays are not reference-counted at
+    each point."""
     n_beyond = 0
     for item in range(len(points)):
         if flag[0]:
@@ -292,7 +287,7 @@ def _locate_each(
 
 @kernel
 def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatArray) -> None:
-    """Fill boxes (m, 6) with the least and the largest coordinates of triangles (m, 3)."""
+    """Fill boxes (m, 6) with xmin ymin zmin xmax ymax zmax of triangles (m, 3)."""
     for triangle in range(len(triangles)):
         a, b, c = corners_of(vertices, triangles, triangle)
         boxes[triangle, 0], boxes[triangle, 3] = min(a.x, b.x, c.x), max(a.x, b.x, c.x)
@@ -304,10 +299,8 @@ def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatA
 def reorder_by_tree(
     vertices: FloatArray, triangles: IntArray, tree: Bvh, child: Int32Array, ordered: Int32Array, blocks: Float32Array
 ) -> None:
-    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and renumber child accordingly.
-
-    blocks: (n_nodes, 8, 8) float32, zero; filled as `overhead` reads them.
-    """
+    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and renumber the items in child
+    accordingly. blocks: (n_nodes, 8, 8) float32, zero on entry; filled with what `overhead` takes."""
     place, origin, scale = 0, tree.origin, tree.scale
     for node in range(len(child)):
         centre_x, centre_y = float(tree.boxes[node, 0, 0]), float(tree.boxes[node, 1, 0])

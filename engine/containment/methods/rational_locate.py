@@ -52,25 +52,23 @@ _MOST_UNSURE = 1 << 10
 
 
 def no_check() -> None:
-    """Do nothing: stands for `Budget.check` if there is no budget."""
+    """Do nothing: the check of a call without a `Budget`."""
 
 
 def _orient2d(a: Sequence[int], b: Sequence[int], c: Sequence[int]) -> int:
-    """Return 1 for a left turn a, b, c in the plane, -1 for a right turn, 0 on one line."""
+    """Return 1 for a left turn a, b, c in the plane, -1 for a right turn, 0 if collinear."""
     return sign_of((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def _orient3d(a: Sequence[int], b: Sequence[int], c: Sequence[int], d: Sequence[int]) -> int:
-    """Return 1 if d is on the side that the normal of (a, b, c) points to, -1 on the other, 0 in the plane."""
+    """Return 1 if d is on the side that the normal of triangle abc points to, -1 on the other side, 0 in its plane."""
     return sign_of(dot(cross(minus(b, a), minus(c, a)), minus(d, a)))
 
 
 def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -> bool:
-    """Return whether q lies on the closed triangle a, b, c of space, which may be a segment or a point.
-
-    In the plane of a proper triangle q is inside if no projection has it on both sides of the three edges. Off the line
-    of a degenerate one some projection does, because the three signed areas add up to zero.
-    """
+    """Return whether q lies on the closed triangle abc in space, which may be degenerate. For q in the plane of the
+    triangle: it is inside exactly if in no projection it is on both sides of the three edges. Off the line of a
+    degenerate triangle some projection has both sides, since the three signed areas add up to zero."""
     if any(not min(a[k], b[k], c[k]) <= q[k] <= max(a[k], b[k], c[k]) for k in range(3)):
         return False
     if _orient3d(a, b, c, q) != 0:
@@ -85,7 +83,8 @@ def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -
 
 
 def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
-    """Return ON_FACE, or whether the ray straight up from q + (eps, eps^2, 0) crosses the triangle."""
+    """Return ON_FACE if q lies on triangle abc, CROSSED if the upward ray from q + (eps, eps^2, 0) crosses it, else
+    MISSED."""
     area = _orient2d(a, b, c)
     if area != 0:
         turns = [_orient2d(p, r, q) for p, r in ((a, b), (b, c), (c, a))]
@@ -102,7 +101,7 @@ def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
 
 
 def _enclosing_floats(value: Number) -> tuple[float, float]:
-    """Return floats (low, high) with low <= value <= high, both equal to value if it is a float."""
+    """Return doubles (low, high) with low <= value <= high, equal where value is a double."""
     try:
         near = float(value)
     except OverflowError:
@@ -113,7 +112,7 @@ def _enclosing_floats(value: Number) -> tuple[float, float]:
 
 
 def triangle_boxes(solid: Polyhedron) -> FloatArray:
-    """Return the six rows xmin, xmax, ymin, ymax, zmin, zmax over the triangles of `solid`, built once."""
+    """Return (6, n_triangles): rows xmin, xmax, ymin, ymax, zmin, zmax, made once."""
 
     def build() -> FloatArray:
         boxes = np.empty((len(solid.triangles), 6))
@@ -124,11 +123,8 @@ def triangle_boxes(solid: Polyhedron) -> FloatArray:
 
 
 def _uncertain_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntArray, bool]:
-    """Return the triangles (n, 3) that the ray up from a point may meet, and whether it crosses an odd number of
-    others.
-
-    By the tree if there is one, else by all boxes.
-    """
+    """Return the triangles (n, 3) that the upward ray from a point may meet, and whether it crosses an odd number of
+    others. Found by the tree if it is built, else by comparison with all boxes."""
     near = [_enclosing_floats(value) for value in point]
     tree, uncertain = solid.cached("tree"), np.empty(_MOST_UNSURE, np.int64)
     if tree is not None:
@@ -143,7 +139,7 @@ def _uncertain_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[In
 
 
 def in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> int:
-    """Return the location of a point in a polyhedron."""
+    """Return the location of a rational point in a polyhedron: INSIDE 1, BOUNDARY 0, OUTSIDE -1."""
     triangles, odd = _uncertain_triangles(point, solid)
     for turn, triangle in enumerate(triangles):
         if turn % _CHECK_EVERY == 0:
@@ -158,12 +154,12 @@ def in_polyhedron(point: Sequence[Number], solid: Polyhedron, check: Check) -> i
 
 
 def next_in_ring(solid: Polygon | Triangle) -> IntArray:
-    """Return for each vertex the index of the next vertex of its ring, built once."""
+    """Return (n,) int64: the index of the vertex that follows each vertex in its ring, made once."""
     return solid.prepared("next_in_ring", lambda: next_in_rings(solid.ring_offsets))
 
 
 def in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check) -> int:
-    """Return the location of a point in a polygon or a planar triangle."""
+    """Return the location of a rational point in a polygon or planar triangle: INSIDE 1, BOUNDARY 0, OUTSIDE -1."""
     starts, ends = solid.vertices, solid.vertices[next_in_ring(solid)]
     (x_low, _), (y_low, y_high) = _enclosing_floats(point[0]), _enclosing_floats(point[1])
     is_near = (np.minimum(starts[:, 1], ends[:, 1]) <= y_high) & (np.maximum(starts[:, 1], ends[:, 1]) >= y_low)
@@ -183,12 +179,9 @@ def in_polygon(point: Sequence[Number], solid: Polygon | Triangle, check: Check)
 
 
 def prism_walls(solid: Triangle) -> list[list[int]]:
-    """Return the three plane rows of the prism over a triangle of space, as integers; zeros for a triangle without
-    area.
-
+    """Return three integer plane rows (a, b, c, d), >= 0 in the prism over a triangle in space; zeros for zero area.
     Wall of the edge from p to r: dot(n x (r - p), x - p) >= 0 with n = (b - a) x (c - a), which is the textbook's
-    comparison of cross products by their dot product.
-    """
+    comparison of cross products by their dot product."""
 
     def build() -> list[list[int]]:
         flat = scaled_integers((*solid.vertices.ravel().tolist(), 1))
@@ -205,20 +198,21 @@ def prism_walls(solid: Triangle) -> list[list[int]]:
 
 
 def in_triangle(point: Sequence[Number], solid: Triangle, check: Check) -> int:
-    """Return the location of a point in a planar triangle, or in the prism over a triangle of space."""
+    """Return the location (1, 0, -1) of a rational point in a planar triangle, or in the prism over a triangle in
+    space."""
     if solid.dimension == 2:
         return in_polygon(point, solid, check)
     return min(side_rational(wall, point) for wall in prism_walls(solid))
 
 
 def in_rows(point: Sequence[Number], solid: HalfSpace | Aabb | Convex, _: Check) -> int:
-    """Return the location of a point in a solid bounded by planes."""
+    """Return the location (1, 0, -1) of a rational point in a solid bounded by planes."""
     return min(side_rational(row, point) for row in rows_of(solid).tolist())
 
 
 def in_sphere(point: Sequence[Number], solid: Sphere, pose: Pose | None, _: Check) -> int:
-    """Return the location of a point in a ball; a posed ball has the same radius about the exact image of its
-    centre."""
+    """Return the location (1, 0, -1) of a rational point in a ball; a pose moves the centre exactly and keeps the
+    radius."""
     center: Sequence[Number] = solid.center.tolist()
     center = center if pose is None else to_world_frame(center, pose)
     *flat, r = scaled_integers((*center, *point, solid.radius))
@@ -227,12 +221,12 @@ def in_sphere(point: Sequence[Number], solid: Sphere, pose: Pose | None, _: Chec
 
 
 def in_csg(point: Sequence[Number], solid: Csg, pose: Pose | None, check: Check) -> int:
-    """Return the location of a point in a CSG tree."""
+    """Return the location (1, 0, -1) of a rational point in a CSG tree."""
     return int(fold_csg_tree(solid, lambda leaf: rational_location(point, leaf, pose, check), combine))
 
 
 def in_implicit(point: Sequence[Number], solid: Implicit, _: Check) -> int:
-    """Return the location of a point in an implicit solid."""
+    """Return the location (1, 0, -1) of a rational point in an implicit solid."""
     if solid.function is not None:
         value = np.asarray(solid.function(np.array([[float(x) for x in point]])), dtype=np.float64).ravel()[0]
         return sign_of(float(value))
@@ -262,7 +256,7 @@ def to_body_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
 
 @functools.lru_cache(maxsize=64)
 def exact_inverse(pose: Pose) -> tuple[list[list[int]], int]:
-    """Return R^-1 as integers over one denominator."""
+    """Return R^-1 of a pose as integer rows and their common denominator."""
     entries, common = common_integers(pose.rotation.ravel().tolist())
     dimension = len(pose.rotation)
     rows, determinant = adjugate([entries[k : k + dimension] for k in range(0, len(entries), dimension)])
@@ -282,14 +276,14 @@ def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
 def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None = None, check: Check = no_check) -> int:
     """Locate one point exactly: 1 inside, 0 on the boundary, -1 outside.
 
-    point: numbers of any exact kind, one per dimension of `solid`.
-    pose: the solid's; vertices, half-spaces and boxes are mapped exactly; a sphere keeps its radius.
-    check: called now and then in long work; whatever it raises ends the call.
+    point: numbers of any exact kind, one per dimension of `solid`. pose: of the solid; vertices, half-spaces and boxes
+    are mapped exactly; a sphere keeps its radius. check: called now and then in long work; whatever it raises ends the
+    call.
 
-    >>> from fractions import Fraction
-    >>> from engine.solids.primitives import Aabb
-    >>> rational_location([Fraction(1, 3), 0, 0], Aabb([0, 0, 0], [1, 1, 1]))
-    0
+        >>> from fractions import Fraction
+        >>> from engine.solids.primitives import Aabb
+        >>> rational_location([Fraction(1, 3), 0, 0], Aabb([0, 0, 0], [1, 1, 1]))
+        0
     """
     check()
     row = row_of(solid)
@@ -301,10 +295,8 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
 
 
 def combine(operation: str, located: Sequence[Any]) -> Any:
-    """Return the three-valued union (max), intersection (min) or difference min(A, -B) of locations.
-
-    located: numbers, or int8 arrays of one shape.
-    """
+    """Return the location in a union (max), intersection (min) or difference (min(A, -B)) from those in the operands.
+    located: numbers 1, 0, -1, or int8 arrays of one shape."""
     if operation == "difference":
         first, second = located
         return np.minimum(first, -second)
@@ -312,7 +304,8 @@ def combine(operation: str, located: Sequence[Any]) -> Any:
 
 
 def fold_csg_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, list[Any]], Any]) -> Any:
-    """Fold a CSG tree: evaluate each distinct leaf once, then join operands bottom-up; the depth is bounded."""
+    """Evaluate each distinct leaf of a CSG tree once by `of_leaf`, and join the results of operands bottom-up by
+    `join`."""
     known: dict[int, Any] = {}
 
     def visit(node: Solid) -> Any:
@@ -327,7 +320,7 @@ def fold_csg_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[s
 
 
 def unsupported(solid: object) -> UnsupportedSolidError:
-    """Return the error for a solid without an interior, or for something that is no solid."""
+    """Return the error for an object in which no point can be located, as it has no interior."""
     return UnsupportedSolidError(
         f"nothing is inside a {kind_of(solid)}; a point can be located in a {names(is_located)}. A closed triangle "
         "mesh is a polyhedron; a planar 3D polygon can be asked as triangles",
@@ -336,5 +329,5 @@ def unsupported(solid: object) -> UnsupportedSolidError:
 
 
 def is_located(row: Row) -> bool:
-    """Return whether points can be located in solids of this type."""
+    """Return whether points can be located in solids of a registry row's type."""
     return row.exact is not None or row.exact_posed is not None
