@@ -47,7 +47,7 @@ Options = argparse.Namespace
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Run one command of the command line and return its exit code."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         if words[:1] == ["audit"]:
@@ -72,7 +72,7 @@ def _refused(message: str) -> int:
 
 
 def _note(options: Options) -> Callable[[str], None] | None:
-    """Return a function that prints what was skipped of a file."""
+    """Return a function that prints what was skipped in a file; None with --quiet."""
     return None if options.quiet else partial(print, file=sys.stderr)
 
 
@@ -85,13 +85,13 @@ def _contains(options: Options) -> None:
 
 
 def _write_labels(options: Options, name: str, labels: list[str], codes: Any) -> None:
-    """Write codes; into .csv as labels."""
+    """Write integer codes to the output, as labels[code] where it is .csv."""
     is_text = options.output is None or options.output.endswith(".csv")
     write_table(options.output, {name: np.array(labels)[codes] if is_text else codes})
 
 
 def _posed_pair(options: Options) -> tuple[Any, ...]:
-    """Return both solids, and rotations and translations of the second; the identity without --poses."""
+    """Return (first solid, second solid, rotations, translations of the second); the identity without --poses."""
     first, second = read_solid(options.first, _note(options)), read_solid(options.second, _note(options))
     size = first.dimension
     rows = np.eye(size, size + 1)[np.newaxis] if options.poses is None else read_rows(options.poses, (size, size + 1))
@@ -137,7 +137,7 @@ def _clip_polygons(region: Any, options: Options) -> None:
 
 
 def _clipped(rings: Any, item: int) -> dict[str, Any]:
-    """Return a clipped polygon as a feature: all its rings, which may have bridges."""
+    """Return a clipped polygon as a GeoJSON feature with all its rings, which may have bridges."""
     closed = [[*ring.tolist(), ring[0].tolist()] for ring in rings]
     geometry = {"type": "MultiPolygon", "coordinates": [closed]}
     return {"type": "Feature", "properties": {"item": item}, "geometry": geometry}
@@ -171,7 +171,7 @@ def _bounds(options: Options) -> None:
 
 
 def _audit(words: Sequence[str]) -> int:
-    """Run the audit against the packages of the benchmarks."""
+    """Run `benchmarks.audit` and return its exit code."""
     try:
         audit = import_module("benchmarks.audit")
     except ModuleNotFoundError as error:
@@ -192,7 +192,7 @@ def _warm(options: Options) -> None:
 
 
 def _warm_elsewhere(options: Options) -> None:
-    """Run the command in a new process, where the compiler uses another CPU and folder: it reads them only once."""
+    """Run `warm` in a new process, since the compiler reads its CPU and cache folder only once."""
     package = (__package__ or "engine").partition(".")[0]
     command = [sys.executable, "-P", "-m", package, "warm", "--processes", str(options.processes)]
     surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -213,7 +213,7 @@ def _warm_elsewhere(options: Options) -> None:
 
 
 class _Lines:
-    """Prints progress in lines, if there is no bar."""
+    """Progress as printed lines, where there is no bar."""
 
     def __init__(self) -> None:
         self._done = 0
@@ -225,7 +225,8 @@ class _Lines:
 
 @contextmanager
 def _bar(n_items: int, unit: str, options: Options) -> Iterator[Progress | None]:
-    """Show a progress bar if the standard error is a terminal and tqdm is installed."""
+    """Show a progress bar if the standard error is a terminal and tqdm is installed; yields the function that advances
+    it."""
     if options.quiet or not sys.stderr.isatty() or find_spec("tqdm") is None:
         yield None
         return
@@ -256,7 +257,7 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
              {"points": ".geojson file of points" + ATTRIBUTES, "polygons": LAYER}),
     "bounds": (_bounds, "smallest box and smallest sphere of a solid", SOLID),
 }  # fmt: skip
-"""Function, help text and arguments of each command."""
+"""By command: function, help text and arguments."""
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -27,9 +27,9 @@ from engine.types import Accuracy, BoolArray, FloatArray, IntArray, Relation
 
 Compared = Literal["contains", "collide", "clip_segments", "clip_polygons"]
 STEPS: Final = 1 << 19
-"""Steps of a brute-force method between two polls of the deadline: some milliseconds."""
+"""Steps of the textbook's method between two polls of the deadline: some milliseconds."""
 MOST_STEPS: Final = 1 << 24
-"""Largest number of steps for an item, since nothing interrupts it: a second or so."""
+"""Largest number of steps for one item, which nothing interrupts: a second or so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,7 @@ def _as_items(items: Any, dimension: int, n_axes: int) -> FloatArray:
 
 
 def _in_parts(ask: Callable[..., Any], n_steps: int, budget: Budget, items: FloatArray) -> Any:
-    """Run a method on parts of the items, small enough to poll the deadline in between."""
+    """Return the concatenated answers of a method for parts of the items; the deadline is polled in between."""
     size, answers = max(1, STEPS // max(n_steps, 1)), []
     for start in range(0, max(len(items), 1), size):
         budget.check()
@@ -190,7 +190,7 @@ def _in_parts(ask: Callable[..., Any], n_steps: int, budget: Budget, items: Floa
 
 
 def _differences(exact: Any, plain: Any) -> tuple[IntArray, IntArray]:
-    """Return the items whose decisions differ, and those where only coordinates do."""
+    """Return the indices of items whose decisions differ, and of those where only coordinates differ."""
     if exact.ndim == 1:
         return np.flatnonzero(exact != plain), np.empty(0, np.int64)
     is_left, as_plain = ~np.isnan(exact).any(axis=1), ~np.isnan(plain).any(axis=1)
@@ -225,4 +225,4 @@ OPERATIONS: Final[dict[str, tuple[Callable[..., tuple[Any, Accuracy]], str]]] = 
     "clip_segments": (_clip_segments, "of_segments"),
     "clip_polygons": (_clip_polygons, "of_polygons"),
 }
-"""The exact operation, and the function of `engine.textbook.methods`."""
+"""By operation: the exact function, and the name of the function of `engine.textbook.methods`."""

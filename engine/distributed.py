@@ -38,7 +38,8 @@ from engine.solids.checks import as_point_groups, as_points, shown
 from engine.types import BoolArray, FloatArray, Int8Array
 
 PARTS_PER_THREAD = 3
-"""Parts in flight a thread: enough to hide the network, few enough for batches larger than a worker's memory."""
+"""Parts sent out at a time for each thread: enough to hide the network, few enough for batches larger than a worker's
+memory."""
 
 Function = Callable[..., Any]
 
@@ -122,7 +123,7 @@ def _about_solids(ask: Function, solids: tuple[Any, ...], *rows: Any, **options:
 
 
 def _filled(kind: Any, answers: Iterator[tuple[int, Any]], n: int) -> Any:
-    """Return n answers, arrays of a kind that arrive in any order, as one array."""
+    """Return n answers as one array of dtype `kind`; answers: (start, array), in any order."""
     result = np.empty(n, kind)
     for start, answer in answers:
         result[start : start + len(answer)] = answer
@@ -134,7 +135,8 @@ def _in_order(answers: Iterator[tuple[int, Any]]) -> list[tuple[int, Any]]:
 
 
 def _joined(parts: list[tuple[int, Any]]) -> Any:
-    """Return parts of pieces as one; each part counts sources from its own first segment."""
+    """Return the pieces of all parts as one object; parts: (start, pieces), `source` counting from the part's first
+    segment."""
     kind = type(parts[0][1])
     source = np.concatenate([start + pieces.source for start, pieces in parts])
     names = [field.name for field in fields(kind)][1:]
@@ -145,7 +147,7 @@ def _answers(
     client: Client, function: Function, solids: tuple[Any, ...], arrays: tuple[Any, ...], part: int,
     progress: Progress | None,
 ) -> Iterator[tuple[int, Any]]:  # fmt: skip
-    """Yield the start of each part and its answer as they arrive; on an error cancel the parts in flight."""
+    """Yield (start, answer) of each part as it arrives; on an error the parts still running are cancelled."""
     check_options(None, progress)
     if isinstance(part, bool) or not isinstance(part, int) or part < 1:
         raise InvalidInputError(f"part must be a whole number from 1, got {shown(part)}", ("part",))

@@ -42,7 +42,7 @@ class EngineError(Exception):
     code: ClassVar[str] = "engine_error"
 
     def __init_subclass__(cls) -> None:
-        """Name the code after the class: `NotClosedError` has ``not_closed``, `InvalidInputError` ``invalid_input``."""
+        """Set `code` to the class's name in snake case, without "Error": `NotClosedError` has ``not_closed``."""
         cls.code = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__.removesuffix("Error")).lower()
 
     def __init__(self, message: str, where: tuple[str | int, ...] = ()) -> None:

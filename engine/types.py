@@ -19,14 +19,15 @@ Float32Array = npt.NDArray[np.float32]
 IntArray = npt.NDArray[np.int64]
 Int32Array = npt.NDArray[np.int32]
 Int8Array = npt.NDArray[np.int8]
-"""Mostly of locations, relations and statuses."""
+"""Mostly codes: locations, relations, statuses."""
 FlagArray = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def read_only(array: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
-    """Return an array of the one kind for which kernels are compiled: itself, a read-only view, or a copy."""
+    """Return an array as C-contiguous and read-only, the one type for which kernels are compiled: itself, a view, or a
+    copy."""
     flags = array.flags
     if flags.c_contiguous and not flags.writeable:
         return array
@@ -60,7 +61,7 @@ class HalfSpace3(NamedTuple):
 
 
 UNDECIDED: Final = 2
-"""Returned by a predicate instead of -1, 0, 1 if an exponent leaves the range in which expansions are exact."""
+"""Result of a predicate instead of -1, 0, 1 where a filter cannot prove the sign, or an exponent is out of range."""
 OPEN: Final = 2
 """Status of an item that a kernel leaves to the exact fallback."""
 

@@ -93,7 +93,7 @@ def _cube(at: float = 0.0) -> Polyhedron:
 
 
 def _regions(dimension: int) -> list[Solid]:
-    """Return one solid of every type of a dimension, except types that only some operations take."""
+    """Return one solid of each type of a dimension, without types that only some operations take."""
     first = np.eye(dimension)[0]
     simple: list[Solid] = [
         HalfSpace(first, 0.5),
@@ -127,7 +127,7 @@ def _locate(dimension: int) -> None:
 
 
 def _warm_cells() -> None:
-    """Locate enough points in a cube and in a ring of 300 edges that cells amortise."""
+    """Locate so many points in a cube and in a ring of 300 edges that grids of cells are built."""
     many, cube = np.random.default_rng(0).uniform(-1.2, 1.2, (_MANY, 3)), _cube()
     locate(many, cube)
     locate_scene(many, [cube])
@@ -181,7 +181,7 @@ def _bodies() -> list[Solid]:
 
 
 def _warm_clipping() -> None:
-    """Clip in 2D and in 3D: a third of the kernels are common."""
+    """Clip in 2D, then in 3D: a third of the kernels are common."""
     _clip(2)
     corners = [[[-1.0, -1.0], [2.0, 2.0]], [[0.0, 0.0], [1.0, 1.0]]]  # through corners, and from one to another
     clip_segments(corners, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))
@@ -236,6 +236,6 @@ STEPS = (
     _warm_overlay_rest,
     _warm_cells,
 )
-"""Parts of the work, long ones first; what several need is compiled by the first, or in several processes."""
+"""Parts of the work, long ones first; a kernel that several need is compiled by the first, or in several processes."""
 SHARES = (24, 20, 19, 14, 8, 7, 4, 4)
-"""Duration of each of `STEPS`, in hundredths of all."""
+"""Duration of each of `STEPS`, in per cent."""

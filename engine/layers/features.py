@@ -35,11 +35,11 @@ from engine.solids.ragged import summed
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
 _BATCH: Final = 1000
-"""Features made in one step."""
+"""Number of features made at a time."""
 _ROW: Final = 55
-"""Lower bound of the bytes of JSON of a row, without copied members and positions."""
+"""Lower bound on the bytes of a row in JSON, without copied members and positions."""
 _POSITION: Final = 10
-"""Lower bound of the bytes of JSON of a position."""
+"""Lower bound on the bytes of a position in JSON."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ class FeatureRows:
 
     @property
     def crs(self) -> Any:
-        """Return the member `crs` of the question."""
+        """The member `crs` of the input."""
         return None if self.crs_text is None else json.loads(self.crs_text)
 
     def make(self, start: int, stop: int) -> list[dict[str, Any]]:
@@ -343,7 +343,7 @@ def locate_features(
 
 
 def _with_areas(rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None) -> FeatureRows:
-    """Return features of rows; n_bytes: by row a lower bound of its members besides the geometry."""
+    """Return the features of rows with polygons; n_bytes: lower bound on a row's bytes of JSON but for the geometry."""
     positions, (rings, pieces, ends) = rows.ragged
     offsets = rings[pieces[ends]]
     n_bytes = summed(_ROW + n_bytes) + _POSITION * offsets

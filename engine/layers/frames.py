@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from geopandas import GeoDataFrame
 
 _POLYGONS = (3, 6)
-"""Type ids of Polygon and MultiPolygon in shapely."""
+"""Shapely's type numbers of Polygon and MultiPolygon."""
 _ABOUT_ATTRIBUTES = (
     *("as_index", "level", "sort", "observed", "dropna"), *("numeric_only", "min_count", "engine", "engine_kwargs"),
 )  # fmt: skip
-"""Options of dissolve that geopandas handles: how rows are grouped, and arguments of the functions on columns."""
+"""Options of dissolve that are passed on to geopandas: how rows are grouped, and arguments of aggregation functions."""
 _POINT = 0
 _LINE = 1
 
@@ -273,7 +273,7 @@ def sjoin(
 
 
 def _geopandas() -> tuple[Any, Any]:
-    """Return geopandas and shapely."""
+    """Import geopandas and shapely and return them; raise if they are not installed."""
     try:
         import geopandas
         import shapely
@@ -283,7 +283,8 @@ def _geopandas() -> tuple[Any, Any]:
 
 
 def _check_frames(function: str, others: Any, taken: tuple[str, ...] = (), **frames: object) -> None:
-    """Raise on an option that is not supported, though geopandas may have it, and on what is no GeoDataFrame."""
+    """Raise for an option that this function does not have (though geopandas may), and for an argument that is no
+    GeoDataFrame."""
     geopandas, _ = _geopandas()
     if others.keys() - set(taken):
         name = sorted(others.keys() - set(taken))[0]
@@ -308,7 +309,7 @@ def _refused(error: type[EngineError], frame: GeoDataFrame, where: tuple[str, in
 
 
 def _layer(frame: GeoDataFrame, name: str, limits: Limits) -> Layer:
-    """Return the polygons of a frame's geometry, None where there is none."""
+    """Return the polygons of a frame's geometry as a `Layer`; raise for other geometries, a z or NaN."""
     _, shapely = _geopandas()
     array = np.asarray(frame.geometry.array)
     if len(wrong := np.flatnonzero(~np.isin(shapely.get_type_id(array), (-1, *_POLYGONS)))):
@@ -333,7 +334,7 @@ def _layer(frame: GeoDataFrame, name: str, limits: Limits) -> Layer:
 
 
 def _geometries(rows: LayerRows, empty: Any = None) -> Any:
-    """Return the rows' geometries: Polygons, MultiPolygons of several pieces, `empty` for none."""
+    """Return an array of the rows' geometries: Polygon, MultiPolygon of several pieces, `empty` for no piece."""
     _, shapely = _geopandas()
     positions, (rings, pieces, ends) = rows.ragged
     single = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
@@ -349,7 +350,8 @@ def _geometries(rows: LayerRows, empty: Any = None) -> Any:
 
 
 def _add_touching(geometries: Any, touching: Touching) -> None:
-    """Add lines and points to the geometries of rows; mixed types become a GeometryCollection."""
+    """Add the common lines and points of touching pairs to the geometries of rows; mixed types give a
+    GeometryCollection."""
     _, shapely = _geopandas()
     lines = shapely.from_ragged_array(shapely.GeometryType.LINESTRING, touching.vertices, (touching.offsets,))
     rows, owners = np.unique(np.append(touching.points, touching.lines), return_inverse=True)
@@ -372,7 +374,8 @@ def _add_touching(geometries: Any, touching: Touching) -> None:
 
 
 def _frame(left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str) -> GeoDataFrame:
-    """Return the rows with the attributes of both sides; names that both have end in _1 and _2."""
+    """Return the rows as a GeoDataFrame with the attributes of both layers; names that both have get the suffixes _1
+    and _2."""
     geopandas, _ = _geopandas()
     import pandas
 

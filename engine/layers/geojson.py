@@ -34,21 +34,21 @@ from engine.solids.ragged import summed
 from engine.types import BoolArray, FloatArray, IntArray
 
 _NAME_BYTES: Final = 200
-"""Bytes of a name and its entries in sets."""
+"""Bytes that a property name takes, with its entries in sets."""
 _NOUNS: Final = {"properties": "a property", "id": "an id", "geometry": "a geometry"}
 _BUDGET_STEP: Final = 2**20
-"""Bytes of texts after which they are charged to the budget."""
+"""Number of bytes of text after which they are charged to the budget."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CopiedMembers:
-    """JSON that rows copy from the features of a layer.
+    """JSON texts that result rows copy from the features of a layer.
 
     | field | by | meaning |
     | --- | --- | --- |
-    | properties | feature | the inside of its properties |
-    | ids | feature | the inside of an object with its id, if any |
-    | n_bytes, id_bytes | feature | (n + 1,) length of both, of the second; the last is 0, for feature -1 |
+    | properties | feature | its properties, without the braces |
+    | ids | feature | a comma and the member "id", or nothing |
+    | n_bytes, id_bytes | feature | (n + 1,) length of both together, of the second; the last is 0, for feature -1 |
     """
 
     properties: list[bytes]
@@ -58,7 +58,7 @@ class _CopiedMembers:
 
 
 def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
-    """Return the `crs` of the layers as JSON; raise if they differ."""
+    """Return the common `crs` of the layers as JSON, None if there is none; raise if they differ."""
     there = [side for side in sides if side.crs is not None]
     texts = []
     with limits.budget() as budget:
@@ -78,7 +78,7 @@ def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
 
 
 def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limits) -> list[bytes]:
-    """Return a value of each feature as JSON; member: the member of the feature that it is, for errors."""
+    """Return a value of each feature as JSON; member: where that value is in the feature, for messages."""
     texts: list[bytes] = []
     taken = 0
     with limits.budget() as budget:
@@ -105,9 +105,9 @@ def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limit
 def members_of(
     sides: list[Collection], names: tuple[str, str], limits: Limits
 ) -> tuple[Callable[[int, int], bytes], Callable[[IntArray, IntArray], IntArray]]:
-    """Return two functions of the features of a row (-1: none): its members besides type and geometry, as JSON; and,
-    for many rows, a lower bound of their bytes.
-    """
+    """Return two functions of the pair of features (first, second) of a result row, -1 for none. The first returns the
+    row's members besides type and geometry, as JSON; the second, for arrays of pairs, lower bounds on the lengths of
+    these texts."""
     columns: list[set[str]] = [set(), set()]
     with limits.budget() as budget:
         for side, column in zip(sides, columns):
@@ -148,7 +148,7 @@ def members_of(
 
 
 def _copied_members(side: Collection, shared: set[str], end: str, limits: Limits) -> _CopiedMembers:
-    """Return the JSON that rows copy of a layer; names that both layers have get an ending."""
+    """Return the `_CopiedMembers` of a layer; property names in `shared` get the suffix `end`."""
 
     def renamed() -> Iterator[dict[str, Any]]:
         for each in side.properties:
@@ -163,11 +163,8 @@ def _copied_members(side: Collection, shared: set[str], end: str, limits: Limits
 
 
 def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntArray, list[dict[int, bytes]]]:
-    """Return the group of each feature by the properties `names`, and the values of each group as JSON, by place in
-    `names`.
-
-    Groups are numbered by their first features.
-    """
+    """Return the group of each feature by its values of the properties `names`, and the values of each group. Values
+    are JSON texts by index in `names`, null ones left out. Groups are numbered in the order of their first features."""
     places = {name: place for place, name in enumerate(names)}
     order: dict[Any, int] = {} if names else {(): 0}
     values: list[dict[int, bytes]] = [] if names else [{}]
@@ -192,7 +189,7 @@ AREAS: Final = ("Polygon", "MultiPolygon")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collection:
-    """A FeatureCollection whose features are of one kind: the features, their properties (empty for null)."""
+    """A FeatureCollection whose geometries are of one kind: its features and their properties (empty for null)."""
 
     features: list[dict[str, Any]]
     properties: list[dict[str, Any]]
@@ -201,7 +198,7 @@ class Collection:
 
 
 def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ...] = AREAS) -> Collection:
-    """Return a FeatureCollection whose geometries are of these kinds, or null; coordinates are not checked."""
+    """Return a checked FeatureCollection whose geometries are null or of these types; coordinates are not checked."""
     features = value.get("features") if _type_of(value) == "FeatureCollection" else None
     if not isinstance(features, list):
         raise InvalidInputError(f"{where[0]} must be a GeoJSON FeatureCollection, got {shown(value)}", where)
@@ -224,7 +221,7 @@ def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ..
 
 
 def _type_of(value: Any) -> str:
-    """Return the member `type` of a GeoJSON object; empty if it has none."""
+    """Return the member `type` of a GeoJSON object, "" if there is none."""
     kind = value.get("type") if isinstance(value, dict) else None
     return kind if isinstance(kind, str) else ""
 
@@ -232,19 +229,20 @@ def _type_of(value: Any) -> str:
 def refused(
     kind: Callable[[str, Where], EngineError], side: Collection, number: int, what: str, path: Path = ()
 ) -> EngineError:
-    """Return an error that names a feature by its number and id."""
+    """Return an error for a feature, with its number and id in the message and in `where`."""
     feature, where = side.features[number], side.where
     named = f" (id {shown(feature['id'])})" if "id" in feature else ""
     return kind(f"{where[0]}.features[{number}]{named} {what}", (*where, "features", number, *path))
 
 
 def polygons_of(side: Collection, limits: Limits) -> Layer:
-    """Return the polygons of a collection, overlapping parts of a feature united."""
+    """Return the polygons of a collection as a `Layer`; overlapping parts of a feature are united."""
     return layer_of(*_parts_of(side, limits), limits)
 
 
 def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray, BoolArray]:
-    """Return the parts of all features as polygons, the offsets of each feature's, and which have no geometry."""
+    """Return the parts of all features as polygons, the offsets of each feature's parts, and whether a feature has no
+    geometry."""
     rings: list[Any] = []
     part_sizes: list[int] = []
     there = [k for k, feature in enumerate(side.features) if feature.get("geometry") is not None]
@@ -273,14 +271,14 @@ def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray
 
 
 def _positions(rings: list[Any]) -> FloatArray:
-    """Return the positions of rings, lists or arrays, concatenated."""
+    """Return the positions of all rings in one array."""
     if not any(isinstance(ring, np.ndarray) for ring in rings):
         return as_points(list(chain.from_iterable(polled(rings))), 2)
     return np.concatenate([as_points(ring, 2) for ring in polled(rings)])
 
 
 def _check_rings(geometry: dict[str, Any]) -> None:
-    """Raise for the first fault of the coordinates of a Polygon or MultiPolygon."""
+    """Raise for the first error in the coordinates of a Polygon or MultiPolygon."""
     coordinates = geometry["coordinates"]
     for part in [coordinates] if geometry["type"] == "Polygon" else polled(coordinates):
         for ring in polled(part):
@@ -289,7 +287,7 @@ def _check_rings(geometry: dict[str, Any]) -> None:
 
 
 def check_each(there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any]) -> Any:
-    """Check geometries one by one; raise for the first at fault, naming its feature; else return all results."""
+    """Return [check(geometry)] of the features at the indices `there`; an error names its feature."""
     made = []
     for number in polled(there):
         try:

@@ -16,15 +16,15 @@ import numpy as np
 from engine.running.budget import poll
 
 _FEW: Final = 256
-"""Values written in one call: some 30 us."""
+"""Number of values written in one call: some 30 us."""
 _LETTERS: Final = 1000
-"""Letters of text that take as long as a value."""
+"""Number of characters of text that take as long as one value."""
 _SCALARS: Final = frozenset({str, int, float, bool, type(None)})
 Path = tuple[str | int, ...]
 
 
 class NotJsonError(ValueError):
-    """A value has no JSON; path: where in it. is_number: it is infinite or NaN."""
+    """A value cannot be written as JSON. path: where in the value. is_number: whether the cause is infinity or NaN."""
 
     def __init__(self, error: Exception, path: Path, is_number: bool) -> None:
         super().__init__(str(error))
@@ -33,10 +33,7 @@ class NotJsonError(ValueError):
 
 
 def text_of(value: Any) -> bytes:
-    """Return a value as JSON, numbers exactly as they are; arrays are written as lists.
-
-    Raises: NotJsonError; what `poll` raises.
-    """
+    """Return a value as JSON, numbers exactly; arrays become lists. Raises: NotJsonError; what `poll` raises."""
     try:
         if isinstance(value, str) or _count(value, _FEW) <= _FEW:
             return _encoded(value)
@@ -48,12 +45,9 @@ def text_of(value: Any) -> bytes:
 
 
 def key_of(value: Any) -> bytes:
-    """Return a key that is equal for equal JSON values: numbers by exact value (1 is 1.0 but not true), objects
-    regardless of the order of names.
-
-    For a list or an object it is a SHA-256, so that keys are short. Raises: TypeError where JSON has no such value;
-    what `poll` raises.
-    """
+    """Return a key that is equal for equal JSON values: numbers by value (1 equals 1.0, not true), objects in any order
+    of names. For a list or an object it is a SHA-256, so that keys are short. Raises: TypeError where JSON has no such
+    value; what `poll` raises."""
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and not value.ndim):
         value = value.tolist()
     if value is None or isinstance(value, bool):
@@ -85,7 +79,7 @@ def key_of(value: Any) -> bytes:
 
 
 class _Writer:
-    """Writes one value of many parts."""
+    """Writes a large value as JSON in `text`, polling the deadline."""
 
     def __init__(self) -> None:
         self.text = bytearray()
@@ -122,7 +116,7 @@ class _Writer:
         self.text += b"]" if names is None else b"}"
 
     def _write_few(self, names: list[Any] | None, items: Any, start: int, stop: int) -> None:
-        """Write the items ``start`` .. ``stop - 1``, and a comma."""
+        """Append items[start:stop] (with their names, of an object) and a comma to the text."""
         poll()
         if start == stop:
             return
@@ -136,7 +130,7 @@ class _Writer:
 
 
 def _encoded(value: Any) -> bytes:
-    """Return the JSON of a value of few parts."""
+    """Return the JSON of a small value; raise NotJsonError."""
     try:
         try:
             return _encode(value).encode()
@@ -148,7 +142,7 @@ def _encoded(value: Any) -> bytes:
 
 
 def _as_list(value: Any) -> Any:
-    """Return an array of numbers as a list."""
+    """Return a numpy array or number as a list or Python number, for the encoder."""
     if not isinstance(value, (np.ndarray, np.generic)):
         raise TypeError(f"it is of type {type(value).__name__}")
     return value.tolist()
@@ -159,11 +153,8 @@ _encode_ascii = json.JSONEncoder(allow_nan=False, separators=(",", ":"), default
 
 
 def _count(value: Any, most: int) -> int:
-    """Return the number of values in a value, itself included, long texts counted by length; if above `most`, any such
-    number.
-
-    depth: at most `most`.
-    """
+    """Return the number of values in `value`, itself included, long texts counted by length; any number above `most` if
+    there are more. depth: at most `most`."""
     if isinstance(value, str):
         return 1 + len(value) // _LETTERS
     if type(value) in _SCALARS or not isinstance(value, (dict, list, tuple, np.ndarray)):
@@ -186,7 +177,7 @@ def _count(value: Any, most: int) -> int:
 
 
 def _find_invalid(value: Any) -> tuple[Path, bool]:
-    """Return the path to the first part of a small value that has no JSON, and whether that is a float."""
+    """Return the path to the first part of a small value that cannot become JSON, and whether that is a float."""
     items: Iterable[tuple[Any, Any]] = ()
     if isinstance(value, dict):
         items = value.items()

@@ -43,20 +43,21 @@ HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
     "difference": (False, True, False),
     "symmetric_difference": (False, True, True),
 }
-"""Whether there are rows of pairs, of remainders of the left layer, and of the right."""
+"""By operation, whether the result has rows for pairs, for remainders of the left layer, for remainders of the right.
+"""
 NONE: Final = -1
 _PAIR_BYTES: Final = 16
 _ROW_BYTES: Final = 300
 _HIT_BYTES: Final = 40
-"""Bytes of a pair of boxes; of the overlay of a pair, at least; of a point and a feature that contains it."""
+"""Bytes of memory of a pair of boxes; at least, of the overlay of a pair; of a pair (point, feature that contains it).
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """The polygons of a layer's features, which may be empty, and which features have no geometry.
-
-    parts, owners: the original parts of features whose parts overlap, and their features; arrays: with their union.
-    """
+    """The polygons of a layer, one for each feature, which may be empty. arrays: the polygons. is_missing: whether a
+    feature has no geometry. parts, owners: the parts of those features whose parts overlap (united in `arrays`), and
+    the feature of each part."""
 
     arrays: PolygonArrays
     is_missing: BoolArray
@@ -101,7 +102,7 @@ class LayerRows:
 
 
 class Limits:
-    """The remaining time of one call, for the calls that it makes, and the accuracy of these together."""
+    """Remaining time of one public call for the calls it is made of, and their accuracy added up."""
 
     def __init__(self, deadline: float | None, cancel: Cancel | None, workers: int | None = None) -> None:
         seconds = Budget(deadline, cancel).deadline  # checks both
@@ -110,7 +111,7 @@ class Limits:
         self._ulps, self._counts = 0.5, [0, 0, 0]
 
     def options(self) -> dict[str, Any]:
-        """Return the options of the next call."""
+        """Return the keyword arguments deadline, cancel, workers and report for the next call."""
         left = None if self._end is None else self._end - time.monotonic()
         return {"deadline": left, "cancel": self._cancel, "workers": self.workers, "report": True}
 
@@ -119,7 +120,7 @@ class Limits:
         return Budget(self.options()["deadline"], self._cancel)
 
     def record(self, answer: tuple[Any, Accuracy]) -> Any:
-        """Record the accuracy of a call; return its result."""
+        """Add the accuracy of an answer (result, accuracy) to the sum; return the result."""
         result, accuracy = answer
         self._ulps = max(self._ulps, accuracy.coordinates_ulp or 0.0)
         report = accuracy.n_items, accuracy.n_beyond_filter, accuracy.n_rational
@@ -128,13 +129,13 @@ class Limits:
 
     @property
     def accuracy(self) -> Accuracy:
-        """The report of all calls together: its items are edges."""
+        """Accuracy of all calls together; items are edges."""
         n_items, n_beyond, n_rational = self._counts
         return Accuracy("exact", self._ulps, n_items, n_beyond, n_rational, "arrangement")
 
 
 def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touching: bool = False) -> LayerRows:
-    """Overlay two layers, every feature with every one that it meets.
+    """Overlay two layers: every feature of one with every feature of the other that it meets.
 
     Boundary: features that meet without common area make no row, unless with_touching. Degenerate input: polygons
     without area likewise; a feature without geometry is a row without pieces where remainders of its layer are
@@ -168,9 +169,8 @@ def check_how(how: object) -> None:
 def candidate_pairs(
     left: Layer, right: Layer, limits: Limits, with_rivals: bool = False
 ) -> tuple[IntArray, tuple[IntArray, IntArray]]:
-    """Return the pairs (n, 2) of features whose boxes intersect, by left, then right; with_rivals: also within each
-    layer.
-    """
+    """Return the pairs (n, 2) of a left and a right feature whose boxes intersect, sorted, and pairs within each layer.
+    with_rivals: whether to look for pairs within a layer; else these arrays are empty."""
     filled = [np.flatnonzero(layer.arrays.sizes()) for layer in (left, right)]
     corners = [layer.arrays.boxes(numbers) for layer, numbers in zip((left, right), filled)]
     low, high = (np.concatenate(each) for each in zip(*corners))
@@ -195,10 +195,8 @@ def candidate_pairs(
 
 
 def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray, limits: Limits) -> LayerRows:
-    """Return the remainder of each feature of `layer` without the features of `others` that it is paired with.
-
-    pairs: by the first, then the second; rivals: pairs of `others` whose boxes intersect.
-    """
+    """Return the rows of remainders: each feature of `layer` minus the features of `others` that it is paired with.
+    pairs: (feature of layer, feature of others), sorted. rivals: pairs of `others` whose boxes intersect."""
     seconds, groups = pairs[:, 1], summed(np.bincount(pairs[:, 0], minlength=len(layer)))
     overlap = _groups_overlap(others, rivals, groups, seconds, limits)
     clips, is_there = others.arrays.take(seconds).merged(groups), layer.arrays.sizes() > 0
@@ -225,7 +223,8 @@ def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntAr
 
 
 def _groups_overlap(others: Layer, rivals: IntArray, groups: IntArray, seconds: IntArray, limits: Limits) -> BoolArray:
-    """Return for each group of others, seconds[groups[k]:groups[k + 1]], whether two of them have common area."""
+    """Return for each group k whether two of its features, seconds[groups[k]:groups[k + 1]] of `others`, have common
+    area. rivals: pairs of `others` whose boxes intersect."""
     has_overlap = np.zeros(len(groups) - 1, np.bool_)
     clashes = rivals[_pairs_overlap(others.arrays, rivals, limits)]
     rivals_of: dict[int, set[int]] = {}
@@ -238,19 +237,19 @@ def _groups_overlap(others: Layer, rivals: IntArray, groups: IntArray, seconds: 
 
 
 def _pairs_overlap(arrays: PolygonArrays, pairs: IntArray, limits: Limits) -> BoolArray:
-    """Return for pairs of polygons whether they have common area, however little."""
+    """Return for each pair of polygons whether they have common area."""
     sides = PolygonSelection(arrays, pairs[:, 0]), PolygonSelection(arrays, pairs[:, 1])
     return _overlay_batch(*sides, "intersection", limits).n_pieces_exact > 0
 
 
 def unite(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
-    """Return the union of polygons as one valid polygon."""
+    """Return the union of polygons as one valid polygon, in arrays."""
     union = limits.record(union_all(list(polygons), **limits.options()))
     return PolygonArrays(union.vertices, union.ring_offsets, np.array([0, len(union.ring_offsets) - 1]))
 
 
 def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits) -> Layer:
-    """Return a layer of features, feature k of the parts from offsets[k] on; overlapping parts are united."""
+    """Return the `Layer` whose feature k has parts offsets[k] .. offsets[k + 1] - 1; overlapping ones are united."""
     owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     arrays = parts.merged(offsets)
     filled = np.flatnonzero(parts.sizes())
@@ -284,7 +283,7 @@ def _overlay_batch(
 
 
 def _touching(firsts: PolygonSelection, seconds: PolygonSelection, batch: OverlayBatch, limits: Limits) -> Touching:
-    """Return where pairs meet without common area, or what remains of common area that rounding collapses."""
+    """Return the lines and points in which pairs meet without common area, or to which common area collapses."""
     shells = []
     for pair in np.flatnonzero(_is_lost(batch)).tolist():
         result = limits.record(overlay(firsts[pair], seconds[pair], "intersection", **limits.options()))
@@ -294,12 +293,12 @@ def _touching(firsts: PolygonSelection, seconds: PolygonSelection, batch: Overla
 
 
 def _is_lost(batch: OverlayBatch) -> BoolArray:
-    """Return by pair whether it has common area that rounding collapses."""
+    """Return for each pair of a batch whether it has common area that rounding collapses."""
     return (np.diff(batch.pair_offsets) == 0) & (batch.n_pieces_exact > 0)
 
 
 def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching | None = None) -> LayerRows:
-    """Return the pairs of a batch that have pieces, or touch, as rows."""
+    """Return the pairs of a batch that have pieces, or touch (`more`), as rows; left, right: feature numbers."""
     if batch.status.any():
         row = int(np.flatnonzero(batch.status)[0])
         raise NotRepresentableError(
@@ -320,7 +319,7 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching |
 
 
 def _concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
-    """Return the rows of all parts; pairs that touch are those of the first."""
+    """Return the rows of all parts, in order; `touching` is that of the first part."""
     return LayerRows(
         np.concatenate([part.left for part in parts]), np.concatenate([part.right for part in parts]),
         np.concatenate([part.vertices for part in parts]), concatenate_offsets([part.ring_offsets for part in parts]),
@@ -331,7 +330,7 @@ def _concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
 
 
 def dissolve_rows(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
-    """Return the union of the features of each group, a row each; groups: by feature, -1 for none."""
+    """Return one row for each group, the union of its features; groups: group of each feature, -1 for none."""
     order = np.argsort(groups, kind="stable")
     ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
     members = (list(PolygonSelection(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
@@ -340,7 +339,7 @@ def dissolve_rows(layer: Layer, groups: IntArray, n_groups: int, limits: Limits)
 
 
 def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
-    """Return overlays as rows, also those without pieces."""
+    """Return one row for each overlay, even without pieces; left: the feature of each."""
     return LayerRows(
         left, np.full(len(left), NONE), np.concatenate([np.zeros((0, 2)), *(each.vertices for each in overlays)]),
         concatenate_offsets([each.ring_offsets for each in overlays]),
@@ -351,11 +350,9 @@ def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
 
 
 def locate_points_in_layer(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return points and the features that contain them, by point, then feature; and whether on their boundary.
-
-    A feature with overlapping parts contains what one of its parts contains; a point on the boundary of some parts, in
-    the interior of none, is on the feature's unless it is inside their union.
-    """
+    """Return (point, feature, on boundary) arrays for all pairs where the feature contains the point, sorted by point,
+    feature. A feature with overlapping parts contains what one of its parts contains; a point on the boundary of some
+    parts, in the interior of none, is on the feature's unless it is inside their union."""
     there = np.flatnonzero(layer.arrays.sizes())
     solids = [*PolygonSelection(layer.arrays, there), *PolygonSelection(layer.parts, np.arange(len(layer.owners)))]
     hits = limits.record(locate_scene(points, solids, **limits.options()))
@@ -377,7 +374,7 @@ def locate_points_in_layer(points: object, layer: Layer, limits: Limits) -> tupl
 def with_unmatched_points(
     n: int, first: IntArray, second: IntArray, on_boundary: BoolArray
 ) -> tuple[IntArray, IntArray, BoolArray]:
-    """Add a row, with the feature `NONE`, for each of n points that no feature contains."""
+    """Return the rows of `locate_points_in_layer` with a row (point, `NONE`, False) for each of n points without."""
     alone = np.setdiff1d(np.arange(n), first)
     rows = (first, alone), (second, np.full(len(alone), NONE)), (on_boundary, np.zeros(len(alone), np.bool_))
     order = np.argsort(np.concatenate(rows[0]), kind="stable")

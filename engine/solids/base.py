@@ -18,12 +18,12 @@ from engine.solids.columns import are_equal, key_of
 T = TypeVar("T")
 
 _WAIT: Final = 0.005
-"""Seconds between two checks of a caller that waits for another thread's build."""
+"""Seconds between two checks of a caller that waits while another thread builds a structure."""
 _RUNTIME = ("__weakref__", "_lock", "_prepared")  # slots that are no part of a solid's value
 
 
 class Immutable:
-    """Base of classes whose fields are set once, by the constructor; `type` is the name in messages."""
+    """Base of classes whose fields are set once, by the constructor; `type` is the class's name in messages."""
 
     __slots__ = ()
 
@@ -37,7 +37,8 @@ class Immutable:
 
 
 class Preparing:
-    """A cache of structures built on first use; subclasses set `_lock`, an RLock, and `_prepared`, {}."""
+    """Base of classes with a cache of structures that are built at first use; subclasses set `_lock`, an RLock, and
+    `_prepared`, {}."""
 
     __slots__ = ()
 
@@ -45,7 +46,7 @@ class Preparing:
     _prepared: dict[str, Any]
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
-        """Return the structure cached under `key`; the first caller builds it, others wait for that build.
+        """Return the structure cached under `key`, built at first use; other threads wait for a build in progress.
 
         build: called without arguments, at most once unless it raises (then nothing is cached and the next caller tries
         again). It may use other keys. Its result must not be changed afterwards. check: called every few milliseconds
@@ -69,11 +70,11 @@ class Preparing:
             self._lock.release()
 
     def cached(self, key: str) -> Any:
-        """Return the structure cached under `key`, None if it is not built."""
+        """Return the structure cached under `key`, or None."""
         return self._prepared.get(key)
 
     def drop(self, *keys: str) -> None:
-        """Drop the structures cached under these keys, if any."""
+        """Remove the structures under these keys from the cache."""
         with self._lock:
             for key in keys:
                 self._prepared.pop(key, None)
@@ -94,10 +95,10 @@ class Solid(Preparing, Immutable):
 
     dimension: int
     _pickled: ClassVar[tuple[str, ...]] = ()
-    """The fields that are pickled: the constructor's arguments, unless `restored` takes others."""
+    """Names of the fields in a pickle: the constructor's arguments, unless `restored` takes others."""
 
     def _set(self, **values: object) -> None:
-        """Set the fields, once; called at the end of each constructor, when every check has passed."""
+        """Set the fields, once; called at the end of a constructor, after all checks."""
         if hasattr(self, "_prepared"):
             raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
         for name, value in values.items():
@@ -114,7 +115,7 @@ class Solid(Preparing, Immutable):
 
     @classmethod
     def _fields(cls) -> list[str]:
-        """Return the names of the fields that make up the value of this class."""
+        """Return the names of the fields on which the value of a solid of this class depends."""
         names = [name for owner in cls.__mro__ for name in getattr(owner, "__slots__", ())]
         return [name for name in names if name not in _RUNTIME]
 
@@ -123,7 +124,8 @@ class Solid(Preparing, Immutable):
 
     @classmethod
     def restored(cls, *values: Any) -> Solid:
-        """Return the solid of a pickle, checked as any other: kernels trust offsets and indices."""
+        """Return the solid from the values in a pickle, checked as by the constructor, since kernels trust offsets and
+        indices."""
         return cls(*values)
 
     def __eq__(self, other: object) -> bool:
@@ -145,7 +147,7 @@ class Solid(Preparing, Immutable):
 
 
 def _collect_arrays(start: object, sizes: dict[int, int], seen: set[int]) -> None:
-    """Add the bytes of every array reachable from `start` to `sizes`, by the identity of its memory. No recursion."""
+    """Fill sizes, a dict from id to bytes, with every array reachable from `start`; views count as their base."""
     waiting = [start]
     while waiting:  # bound: each object enters once, by its id
         value = waiting.pop()

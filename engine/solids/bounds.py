@@ -131,17 +131,17 @@ def _bounds_of(solid: Solid, budget: Budget) -> Reported:
 
 
 def bounds_of_sphere(solid: Sphere, _: Budget) -> Reported:
-    """Return the bounds of a ball."""
+    """Return box and sphere of a ball, for `Row.bounds`."""
     return Bounds(_box_of_sphere(solid), solid), _accuracy("sphere", 1)
 
 
 def bounds_of_box(solid: Aabb, budget: Budget) -> Reported:
-    """Return the bounds of a box."""
+    """Return box and minimal sphere of an axis-aligned box, for `Row.bounds`."""
     return _around(corners_of_box(solid.min, solid.max), budget, solid)
 
 
 def bounds_of_vertices(solid: Mesh | Polygon | Triangle, budget: Budget) -> Reported:
-    """Return the bounds of vertices."""
+    """Return box and minimal sphere of a solid that is bounded by its vertices, for `Row.bounds`."""
     return _around(vertices_in_use(solid), budget)
 
 
@@ -152,7 +152,7 @@ def _around(points: FloatArray, budget: Budget, box: Aabb | None = None) -> Repo
 
 
 def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
-    """Return the distinct vertices, of a mesh those that a face names."""
+    """Return the vertices (n, dimension) of a solid, of a mesh those that a face uses."""
     if not isinstance(mesh, Mesh):
         return mesh.vertices
     is_used = np.zeros(len(mesh.vertices), np.bool_)
@@ -161,7 +161,7 @@ def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
 
 
 def bounds_of_convex(solid: Convex, budget: Budget) -> Reported:
-    """Return the bounds of a solid bounded by planes, from its exact corners."""
+    """Return box and minimal sphere of an intersection of half-spaces, from its exact corners, for `Row.bounds`."""
     corners = corners_of_half_spaces(solid.planes.tolist(), budget)
     if corners.is_empty:
         raise EmptyGeometryError("no point satisfies all rows of this convex, so it has no bounds", ("solid", "planes"))
@@ -192,20 +192,18 @@ def _accuracy(method: str, n_items: int, ball: MinimalSphere | None = None) -> A
 
 
 def vertices_box(solid: Mesh | Polygon | Triangle, check: Check) -> Box:
-    """Return the box of a solid with vertices, for `Row.box`."""
+    """Return box and reach of a solid with vertices, for `Row.box`; computed once."""
     return solid.prepared("own_box", lambda: _box_of_vertices(solid), check)
 
 
 def triangle_box(solid: Triangle, check: Check) -> Box:
-    """Return the box of a planar triangle; the prism over a triangle of space is unbounded."""
+    """Return box and reach of a planar triangle, for `Row.box`; in space the prism over the triangle is unbounded."""
     return vertices_box(solid, check) if solid.dimension == 2 else unbounded(solid)
 
 
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:
-    """Return the box of vertices and a bound on their distance from its centre.
-
-    The square underflows for distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings.
-    """
+    """Return low, high and a bound on the distance of a vertex from the box's centre. The square underflows for
+    distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings."""
     points = vertices_in_use(body)
     low, high = box_of_points(points)
     with np.errstate(all="ignore"):

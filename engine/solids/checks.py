@@ -27,9 +27,9 @@ DIMENSIONS: Final = (2, 3)
 _FLOAT_INTEGERS: Final = 2**53  # every integer up to this size is a float64
 DOUBLE: Final = np.dtype(np.float64)
 _LISTED: Final = 1 << 10
-"""Items of a list that are checked per step: half a millisecond, in which no other thread runs."""
+"""Number of list items checked at a time: half a millisecond, in which no other thread runs."""
 _BLOCK: Final = 1 << 15
-"""Numbers checked per step: the flags of a block stay in the L1 cache."""
+"""Number of array elements checked at a time: the flags of a block stay in the L1 cache."""
 
 
 _FEW: Final = 24
@@ -37,7 +37,7 @@ _FEW: Final = 24
 
 
 def spell(where: Where) -> str:
-    """Return a path in Python's notation: ``points[3][1]``, ``operands[0].faces``."""
+    """Return a path as Python writes it: ``points[3][1]``, ``operands[0].faces``."""
     text = ""
     for part in where:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -61,7 +61,7 @@ _SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 80
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """Return a short text of a caller's value, whatever it is: also a list of millions or one nested too deep."""
+    """Return a short text of a caller's value for a message; works for any object, of any length or depth."""
     try:
         text = _SHORT.repr(value)
     except Exception:  # an integer beyond Python's own limit of digits, a broken __repr__
@@ -94,9 +94,9 @@ def as_number(value: object, where: Where) -> float:
 def as_floats(values: object, depth: int, where: Where, must_be_finite: bool = True) -> FloatArray:
     """Return `values` as a finite float64 array of `depth` axes, C-contiguous and read-only.
 
-    must_be_finite: False where the caller looks for NaN and infinity later, with `check_finite`.
-    Borrowed (a view) where nothing had to change. Always of one kind for the compiler, whatever the caller's array is
-    (writable or not, aligned or not, a subclass), so that no kernel is compiled a second time.
+    must_be_finite: False where the caller looks for NaN and infinity later, with `check_finite`. The result is a view
+    where nothing had to change, and of one type for the compiler, whatever the caller's array is (writable or not,
+    aligned or not, a subclass), so that no kernel is compiled a second time.
     """
     result = _as_floats(values, depth, where, must_be_finite).view()
     result.setflags(write=False)
@@ -104,7 +104,8 @@ def as_floats(values: object, depth: int, where: Where, must_be_finite: bool = T
 
 
 def is_ready(values: object, *shape: int) -> bool:
-    """Return whether values are already an array of doubles for kernels, (n, *shape), not yet tested for NaN."""
+    """Return whether `values` is an aligned C-contiguous float64 array (n, *shape); NaN and infinity are not looked
+    for."""
     return (
         type(values) is np.ndarray
         and values.dtype is DOUBLE
@@ -144,7 +145,7 @@ def _as_floats(values: object, depth: int, where: Where, must_be_finite: bool) -
 
 
 def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) -> None:
-    """Raise unless every item of `result` equals the integer or wider float in `array` from which it was converted."""
+    """Raise unless every element of `result` equals the integer or wider float in `array` it was converted from."""
     if array.dtype.kind == "f":
         suspects = np.flatnonzero((result != array) & ~np.isnan(array))
     else:
@@ -155,7 +156,9 @@ def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) 
 
 
 def plain_floats(values: Any, depth: int) -> FloatArray | None:
-    """Return a list (depth 1) or lists (2) of finite floats and small integers as an array; None for anything else."""
+    """Return a list of numbers (depth 1), or of lists of numbers (depth 2), as a float64 array, else None. Numbers:
+    finite floats and integers up to 2^53.
+    """
     try:
         items = values if depth == 1 else list(chain.from_iterable(values))
         is_plain = depth == 1 or (depth == 2 and set(map(type, values)) <= {list, tuple})
@@ -170,7 +173,7 @@ def plain_floats(values: Any, depth: int) -> FloatArray | None:
 
 
 def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray | None:
-    """Do the work of `plain_floats` part by part."""
+    """Return what `plain_floats` does, converting `_LISTED` items at a time and polling the deadline."""
     if len(values) <= _LISTED:
         return plain_floats(values, depth)
     parts: list[FloatArray] = []
@@ -184,7 +187,8 @@ def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray 
 
 
 def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -> FloatArray:
-    """Flatten nested lists level by level, each level checked for equal lengths, then the leaves for their type."""
+    """Return nested lists of depth `depth` as an array; raise for unequal lengths at a level, or a wrong type of a
+    leaf."""
     if (plain := _plain_parts(values, depth)) is not None:
         return plain
     shape, items = [len(values)], list(values)
@@ -217,7 +221,7 @@ def _path(index: int, shape: list[int], where: Where) -> Where:
 
 
 def check_finite(array: FloatArray, where: Where) -> None:
-    """Raise for the first NaN or infinity."""
+    """Raise for the first NaN or infinity of an array."""
     flat = array.reshape(-1)
     if len(flat) <= _FEW and math.isfinite(sum(flat.tolist())):
         return
@@ -230,7 +234,7 @@ def check_finite(array: FloatArray, where: Where) -> None:
 
 
 def check_dimension(n_columns: int, dimension: int | None, where: Where, what: str = "positions of") -> None:
-    """Raise unless positions of `n_columns` numbers have the given `dimension` (None: 2 or 3)."""
+    """Raise unless `n_columns`, the coordinates of a position, is `dimension` (None: 2 or 3)."""
     allowed = DIMENSIONS if dimension is None else (dimension,)
     if n_columns not in allowed:
         wanted = " or ".join(map(str, allowed))
@@ -238,13 +242,13 @@ def check_dimension(n_columns: int, dimension: int | None, where: Where, what: s
 
 
 def check_given_dimension(dimension: object) -> None:
-    """Raise unless the caller's `dimension` is the whole number 2 or 3."""
+    """Raise unless `dimension`, an argument, is the whole number 2 or 3."""
     if isinstance(dimension, bool) or not isinstance(dimension, (int, np.integer)) or dimension not in DIMENSIONS:
         raise WrongDimensionError(f"dimension must be 2 or 3, got {shown(dimension)}", ("dimension",))
 
 
 def check_not_empty(count: int, what: str, where: Where) -> None:
-    """Raise if the count is 0."""
+    """Raise if `count` is 0."""
     if count == 0:
         raise EmptyGeometryError(f"{spell(where)} is empty; at least one {what} is needed", where)
 
@@ -254,8 +258,8 @@ def as_points(
 ) -> FloatArray:
     """Return `points` as a finite C-contiguous float64 array ``(n, dimension)``; may be empty.
 
-    points: array of floats or integers, or nested lists; borrowed if it is float64 and contiguous already. dimension: 2
-    or 3, or None for either (no points: 2). must_be_finite: as in `as_floats`. Raises: InvalidArrayError,
+    points: array of floats or integers, nested lists or GeoJSON points; a view if float64 and contiguous already.
+    dimension: 2 or 3, or None for either (no points: 2). must_be_finite: as in `as_floats`. Raises: InvalidArrayError,
     WrongDimensionError, NotFiniteError.
     """
     if not isinstance(points, np.ndarray):
@@ -275,9 +279,7 @@ def as_point_groups(
     groups: object, size: int | None, dimension: int | None, where: Where, must_be_finite: bool = True
 ) -> FloatArray:
     """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; may be empty.
-
-    must_be_finite: as in `as_floats`.
-    """
+    must_be_finite: as in `as_floats`."""
     array = as_floats(groups, 3, where, must_be_finite)
     if array.shape[0] == 0 and array.size == 0 and (array.shape[2] == 0 or dimension in (None, array.shape[2])):
         return np.zeros((0, size or 0, dimension or array.shape[2] or 2), np.float64)
@@ -288,7 +290,7 @@ def as_point_groups(
 
 
 def as_vector(vector: object, dimension: int | None, where: Where) -> FloatArray:
-    """Return one position or direction as a read-only float64 array ``(dimension,)``, -0.0 made 0.0."""
+    """Return one position or direction as a read-only float64 array ``(dimension,)``; -0.0 becomes 0.0."""
     array = as_floats(vector, 1, where)
     check_dimension(array.shape[0], dimension, where)
     return frozen(array)
@@ -308,7 +310,7 @@ def frozen(array: FloatArray) -> FloatArray:
 
 
 def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
-    """Return `offsets` as int64: whole numbers in ascending order, within 0 .. `n_items`."""
+    """Return `offsets` as int64; raise unless they are whole numbers, ascending, within 0 .. `n_items`."""
     try:
         array = np.asarray(offsets)
     except ValueError:  # ragged
@@ -331,8 +333,9 @@ def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
 
 
 def as_nested_offsets(n_items: int, **levels: object) -> list[IntArray]:
-    """Return read-only offsets of nested levels: the first level divides all of `n_items`, each other the parts of the
-    level before it."""
+    """Return read-only offsets of nested levels, in the order of the arguments. The first offsets divide `n_items`
+    items into parts, the next ones divide these parts, and so on; each must go from 0 to the number of what it divides.
+    """
     checked = []
     for name, offsets in levels.items():
         checked.append(read_only(as_offsets(offsets, n_items, (name,))))

@@ -30,21 +30,17 @@ _TRIES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Convexity:
-    """Certificate of a convex polyhedron.
-
-    center: a point strictly inside. is_outward: whether its faces are counter-clockwise seen from outside.
-    """
+    """Certificate that a polyhedron is convex. center: a point strictly inside. is_outward: whether the faces are
+    counter-clockwise seen from outside."""
 
     center: FloatArray
     is_outward: bool
 
 
 def convexity(solid: Polyhedron) -> Convexity | None:
-    """Return the certificate of a polyhedron; None if it is not convex or cannot be certified.
-
-    It cannot be certified with a face without area, a centre that rounds out of the solid, or exponents beyond those of
-    the predicates. Cost: the faces up to the first that fails; if none does, all of them and a table of their edges.
-    """
+    """Return the certificate that a polyhedron is convex; None if it is not, or if that cannot be certified. It cannot
+    be certified where a face has no area, the centre rounds out of the solid, or exponents are beyond those of the
+    predicates. Cost: the faces up to the first that fails; else all faces and a table of their edges."""
     return solid.prepared("convexity", lambda: _certified(solid))
 
 
@@ -69,7 +65,7 @@ def _certified(solid: Polyhedron) -> Convexity | None:
 
 @kernel
 def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> int:
-    """Return the side, 1 or -1, of all faces on which the centre is; 0 if it differs."""
+    """Return 1 or -1 if orient3d(a, b, c, center) has that sign for all triangles, else 0."""
     o, side = Point3(center[0], center[1], center[2]), 0
     for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)
@@ -82,9 +78,9 @@ def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) 
 
 @kernel
 def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, center: FloatArray, side: int) -> bool:
-    """Return whether the mesh is locally convex at every edge and some half-line from the centre crosses one triangle.
-
-    others: of the edge that starts at corner k of triangle i, 3 i + k, the opposite edge.
+    """Return whether the mesh is locally convex at every edge, and some half-line from the centre crosses one triangle.
+    others: the edge that starts at corner k of triangle i has index 3 i + k; others[that] is the opposite edge. side:
+    see `_common_side`.
     """
     for corner in range(others.shape[0]):
         other = others[corner]
@@ -97,11 +93,9 @@ def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, cent
 
 @inline
 def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side: int) -> bool:
-    """Return whether some half-line from o through no edge crosses exactly one triangle.
-
-    It goes through q: it crosses the triangle a, b, c if the planes o a b, o b c and o c a have q on the inner side,
-    which is the opposite of `side`.
-    """
+    """Return whether a half-line from o that meets no edge crosses exactly one triangle; up to `_TRIES` half-lines. A
+    half-line through q crosses triangle abc if q is on the inner side (the opposite of `side`) of the planes oab, obc,
+    oca."""
     for attempt in range(min(_TRIES, triangles.shape[0])):
         a, b, c = corners_of(vertices, triangles, attempt)
         q = Point3(
@@ -117,7 +111,7 @@ def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side:
 
 @inline
 def _crossings(vertices: FloatArray, triangles: IntArray, o: Point3, q: Point3, side: int) -> int:
-    """Return how many triangles the half-line from o through q crosses, -1 if it may meet an edge."""
+    """Return how many triangles the half-line from o through q crosses; -1 if it may meet an edge."""
     n_crossed = 0
     for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)

@@ -17,9 +17,9 @@ from engine.solids.checks import check_not_empty, shown
 
 OPERATIONS: Final = ("union", "intersection", "difference")
 MAX_DEPTH: Final = 100
-"""Largest number of `Csg` levels on a path from the root to a leaf."""
+"""Largest number of nested `Csg` solids."""
 MAX_LEAVES: Final = 1_000_000
-"""Largest number of leaves along all paths: shared operands could otherwise double them at every level."""
+"""Largest number of leaves, a shared one counted once for each path to it: sharing could double them at every level."""
 
 
 class Csg(Solid):
@@ -60,9 +60,9 @@ class Csg(Solid):
     operation: str
     operands: tuple[Solid, ...]
     depth: int
-    """Csg levels from here down, this one counted."""
+    """Number of nested `Csg` solids, this one included."""
     n_leaves: int
-    """Leaves counted along all paths."""
+    """Number of leaves, a shared one counted once for each path to it."""
 
     def __init__(self, operation: str, operands: object) -> None:
         if not isinstance(operation, str) or operation not in OPERATIONS:
@@ -101,7 +101,7 @@ class Csg(Solid):
 
 
 def _check_operand(i_operand: int, operand: object, first: Solid) -> None:
-    """Raise unless `operand` is a solid with an interior, of the dimension of the first one."""
+    """Raise unless `operand` is a solid with an interior, of the dimension of `first`."""
     where = ("operands", i_operand)
     if not isinstance(operand, Solid):
         raise InvalidArrayError(f"operands[{i_operand}] must be a solid, got {type(operand).__name__}", where)

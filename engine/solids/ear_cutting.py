@@ -47,7 +47,9 @@ _POLL: Final = 0x3FF
 
 
 class Ring(NamedTuple):
-    """Corners x, y (n,); turns settled so far, rows of three corners and a sign (k, 4); the wanted turn (4,)."""
+    """A ring of corners and the signs of turns that the compiled predicate cannot decide. x, y (n,): the corners.
+    settled (k, 4): three corners and the exact sign of their turn. wanted (4,): (1, i, j, k) for a turn whose sign the
+    caller must compute, else 0."""
 
     x: Any
     y: Any
@@ -56,11 +58,9 @@ class Ring(NamedTuple):
 
 
 class Corners(NamedTuple):
-    """Scratch of `cut_ears`, rows (n,).
-
-    The remaining corners before and after each, whether it is blunt, the blunt corner that blocks it (-1: none), and
-    how many of `blunt`, the corners blunt at first, it was compared with.
-    """
+    """Scratch of `cut_ears`, one number for each corner. before, after: the neighbours among the corners not cut yet.
+    is_blunt: whether the corner is blunt. blocker: the blunt corner that blocks it, or -1. blunt: the corners that were
+    blunt at first. n_passed: how many of `blunt` a corner has been compared with."""
 
     before: Any
     after: Any
@@ -73,9 +73,8 @@ class Corners(NamedTuple):
 def cut_faces(
     vertices: FloatArray, offsets: IntArray, indices: IntArray, merged: IntArray, budget: Budget
 ) -> tuple[IntArray, IntArray]:
-    """Return the triangles of all faces (their indices from `merged`, flat) and the face of each.
-
-    offsets, indices: the faces as given; merged: the same corners with equal positions made one index. Raises:
+    """Return the triangles of all faces as a flat array of vertex indices, taken from `merged`, and the face of each
+    triangle. offsets, indices: the faces as given; merged: the same corners with one index for equal positions. Raises:
     FaceNotSimpleError, DeadlineExceededError, CancelledError.
     """
     counts = np.diff(offsets)
@@ -92,11 +91,9 @@ def cut_faces(
 
 
 def cut_ring(points: FloatArray, projection: int, face: int, names: IntArray, budget: Budget) -> IntArray:
-    """Return the ears (k - 2, 3) of one face as positions in its ring ``(k, 3)``, in the order they are cut; exact.
-
-    projection: of `cut_convex_faces`. face, names: the number of the face and the caller's indices of its corners, for
-    the message. budget: polled.
-    """
+    """Return the ears (k - 2, 3) of one face with k corners, as indices into its ring, in the order of cutting; exact.
+    projection: from `cut_convex_faces`. face, names: number of the face and the caller's indices of its corners, for
+    messages."""
     if projection == UNSURE:
         projection = _projection_of_largest_area(points)
     axis = abs(projection) - 1
@@ -138,8 +135,8 @@ def _not_simple(points: FloatArray, face: int, names: IntArray, problem: str) ->
 
 
 def _projection_of_largest_area(points: FloatArray) -> int:
-    """Return the axis (from 1) of the largest projected area, the first of equal ones, with the area's sign; 0 if all
-    are 0."""
+    """Return 1, 2 or 3 for the axis along which the projected area is largest (the first of equals), negative if the
+    area is; 0 if all are 0."""
     whole = np.array(scaled_integers(points.ravel().tolist()), object).reshape(-1, 3)
     spokes, area = whole[1:] - whole[0], []
     for axis in range(3):
@@ -159,7 +156,7 @@ def _at(vertices: FloatArray, merged: IntArray, corner: int, axis: int, scale: f
 def _area(
     vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float
 ) -> tuple[float, float]:
-    """Return twice the projected area of a face along an axis, and its error bound; corners: first and last."""
+    """Return twice the area of a face projected along an axis, and an error bound; corners: its range in `merged`."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
     u0, v0 = _at(vertices, merged, first, a, scale), _at(vertices, merged, first, b, scale)
@@ -177,7 +174,7 @@ def _area(
 def _turns_once(
     vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float, is_left: bool
 ) -> bool:
-    """Return whether a face certainly turns strictly one way at every corner, and around once."""
+    """Return whether a projected face certainly turns strictly to one side at every corner, and around once."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
     u, v = _at(vertices, merged, last - 1, a, scale), _at(vertices, merged, last - 1, b, scale)
@@ -202,8 +199,8 @@ def _turns_once(
 
 @inline
 def _projection(vertices: FloatArray, merged: IntArray, corners: tuple[int, int]) -> int:
-    """Return CONVEX, or the axis (from 1) of the largest projected area with its sign; UNSURE if rounding leaves it
-    open."""
+    """Return CONVEX if certain, else 1, 2 or 3 with the sign of the area, see `_projection_of_largest_area`; UNSURE if
+    rounding leaves the axis open."""
     largest, least, projection, is_convex = 0.0, -1.0, 0, True
     for corner in range(corners[0], corners[1]):
         for axis in range(3):
@@ -225,11 +222,9 @@ def cut_convex_faces(
     vertices: FloatArray, offsets: IntArray, merged: IntArray, starts: IntArray, corners: IntArray,
     projections: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill corners (starts[-1], 3) with the fans of certainly convex faces; others stay unset.
-
-    Positions in `merged`; the triangles of face i begin at starts[i], about its last corner. projections (m,) int8: see
-    `_projection`.
-    """
+    """Fill corners (starts[-1], 3) with the triangles of faces that are certainly convex, a fan about the last corner
+    each. Corners are indices into `merged`; the triangles of face i begin at starts[i]. Rows of other faces stay unset.
+    projections (m,) int8: result of `_projection` for each face."""
     for face in range(offsets.shape[0] - 1):
         if face & _POLL == 0 and flag[0] != 0:
             return
@@ -246,7 +241,8 @@ def cut_convex_faces(
 
 @inline
 def turn(ring: Ring, i: int, j: int, k: int) -> int:
-    """Return the sign of the turn at corner j on the path i, j, k; 0, and the turn in `wanted`, if it is UNDECIDED."""
+    """Return the sign of the turn i, j, k at corner j; 0, with the turn written to `wanted`, if it is neither decided
+    nor settled."""
     x, y = ring.x, ring.y
     side = orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k]))
     if side != UNDECIDED:
@@ -260,7 +256,7 @@ def turn(ring: Ring, i: int, j: int, k: int) -> int:
 
 @inline
 def _is_before(ring: Ring, i: int, j: int) -> bool:
-    """Return whether corner i is before corner j by x, then y, then number."""
+    """Return whether corner i precedes corner j lexicographically, by x, y, index."""
     x, y = ring.x, ring.y
     return x[i] < x[j] or (x[i] == x[j] and (y[i] < y[j] or (y[i] == y[j] and i < j)))
 
@@ -305,10 +301,8 @@ def find_self_contact(ring: Ring, where: IntArray, flag: FlagArray) -> int:
 
 @kernel
 def cut_ears(ring: Ring, corners: Corners, ears: IntArray, flag: FlagArray) -> int:
-    """Fill ears (n - 2, 3) with corner before, tip, corner after; return how many were cut.
-
-    Fewer than n - 2 if the flag is set or a turn is wanted. ring: simple, counter-clockwise.
-    """
+    """Fill ears (n - 2, 3) with (corner before, tip, corner after) in the order of cutting; return how many were cut.
+    Fewer than n - 2 if the flag is set or a turn is wanted. ring: simple, counter-clockwise."""
     before, after, is_blunt, n, n_blunt = corners.before, corners.after, corners.is_blunt, ring.x.shape[0], 0
     for i in range(n):
         before[i], after[i] = (i - 1) % n, (i + 1) % n
@@ -336,10 +330,8 @@ def cut_ears(ring: Ring, corners: Corners, ears: IntArray, flag: FlagArray) -> i
 
 @inline
 def _is_blocked(ring: Ring, corners: Corners, tip: int, n_blunt: int) -> bool:
-    """Return whether a blunt corner lies in the closed triangle of a left turn; resumes the last search.
-
-    No blunt corner is ever cut, so all of them remain.
-    """
+    """Return whether a blunt corner lies in the closed triangle at a convex corner `tip`; continues the last search
+    there. Blunt corners are never cut."""
     left, right, x, y = corners.before[tip], corners.after[tip], ring.x, ring.y
     if corners.blocker[tip] >= 0 and corners.is_blunt[corners.blocker[tip]] != 0:
         return True

@@ -51,9 +51,9 @@ class Implicit(Solid):
     type: ClassVar[str] = "implicit"
     _pickled: ClassVar[tuple[str, ...]] = ("powers", "coefficients", "function")
     powers: IntArray
-    """``(n, dimension)``; no rows if `function` decides."""
+    """``(n, dimension)``: the exponents of each term; no rows if there is a `function`."""
     coefficients: FloatArray
-    """``(n,)``."""
+    """``(n,)``: of each term."""
     function: PointFunction | None
     """The caller's function, None for a polynomial."""
 
@@ -121,7 +121,7 @@ class Implicit(Solid):
 
 
 def _from_terms(terms: object) -> tuple[npt.NDArray[Any], FloatArray]:
-    """Return powers and coefficients of a list of mappings."""
+    """Return powers (n, dimension) and coefficients (n,) from a list of mappings with these two names."""
     if not isinstance(terms, (list, tuple)):
         raise InvalidArrayError(f"terms must be a list of terms, got {type(terms).__name__}", ("terms",))
     check_not_empty(len(terms), "term", ("terms",))
@@ -145,7 +145,7 @@ def _from_terms(terms: object) -> tuple[npt.NDArray[Any], FloatArray]:
 
 
 def _as_powers(powers: object, where: tuple[str | int, ...], *, one: bool = False) -> npt.NDArray[Any]:
-    """Return whole-number powers as an integer array ``(n, dimension)``."""
+    """Return powers as an integer array ``(n, dimension)``; raise for other types or dimensions."""
     try:
         array = np.asarray(powers)
     except ValueError:  # ragged
@@ -170,7 +170,7 @@ def _holds_bool(powers: object) -> bool:
 
 
 def _check_powers(powers: npt.NDArray[Any]) -> None:
-    """Raise on a power below 0, a total degree above `MAX_DEGREE` or more than `MAX_TERMS` terms."""
+    """Raise for a power below 0, a total degree above `MAX_DEGREE`, or more than `MAX_TERMS` terms."""
     if len(powers) > MAX_TERMS:
         raise InvalidPolynomialError(f"there are {len(powers)} terms; at most {MAX_TERMS} are taken", ("terms",))
     for i_term, row in enumerate(powers.tolist()):

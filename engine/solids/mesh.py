@@ -31,7 +31,7 @@ from engine.solids.mesh_checks import check_topology
 from engine.types import FloatArray, IntArray, read_only
 
 _BLOCK: Final = 1 << 15
-"""Faces of a list checked between two polls."""
+"""Number of faces in a list that are checked between two polls of the deadline."""
 _N_NAMED: Final = 3  # edges that a message names
 
 
@@ -129,10 +129,9 @@ class Mesh(Solid):
 
 
 def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]:
-    """Return the offsets of the faces (None: all triangles) and their vertex indices, one face after another.
-
-    faces: an integer array ``(m, k)`` or a list of lists of whole numbers, three or more each.
-    Raises: InvalidArrayError, EmptyGeometryError, RingTooShortError, IndexOutOfRangeError.
+    """Return the offsets of the faces (None: all are triangles) and their vertex indices, one face after another.
+    faces: an integer array ``(m, k)``, or a list of lists of whole numbers, three or more each. Raises:
+    InvalidArrayError, EmptyGeometryError, RingTooShortError, IndexOutOfRangeError.
     """
     counts: IntArray | None
     if isinstance(faces, (list, tuple)):
@@ -171,7 +170,8 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
 
 
 def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
-    """Return the number of corners of each face and all indices, each checked to be a whole number."""
+    """Return the number of corners of each face in a list, and the vertex indices of all faces; raise for one that is
+    no whole number."""
     parts = []
     for first in range(0, len(faces) or 1, _BLOCK):
         poll()
@@ -182,7 +182,7 @@ def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
 
 
 def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArray[Any]]:
-    """Do the work of `_flatten` for the faces from number `first` on."""
+    """Return what `_flatten` does for a part of the list, whose first face has number `first`."""
     rows = faces
     if not set(map(type, faces)) <= {list, tuple}:
         rows = [face.tolist() if isinstance(face, np.ndarray) else face for face in faces]
@@ -209,7 +209,7 @@ def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArr
 
 
 def _place(offsets: IntArray | None, position: int) -> tuple[int, int]:
-    """Return the face and the corner in it at `position` in the flat list of indices."""
+    """Return (face, corner in that face) of an index into the flat list of vertex indices."""
     if offsets is None:
         return position // 3, position % 3
     i_face = int(np.searchsorted(offsets, position, side="right")) - 1
@@ -217,7 +217,7 @@ def _place(offsets: IntArray | None, position: int) -> tuple[int, int]:
 
 
 def first_equal(points: FloatArray) -> IntArray | None:
-    """Return for each point the first index with equal coordinates, None if no two are equal; points as `frozen`."""
+    """Return for each point the first index with equal coordinates; None if all differ. points: as from `frozen`."""
     n = len(points)
     every, first = np.arange(n), np.empty(n, np.int64)
     one_face, no_flag = np.array([0, n]), np.zeros(1, np.uint8)
@@ -227,7 +227,7 @@ def first_equal(points: FloatArray) -> IntArray | None:
 
 
 def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
-    """Return the error for a face that names a vertex twice."""
+    """Return the error for a face that has a vertex twice."""
     values, counts = np.unique(face, return_counts=True)
     return RepeatedIndexError(
         f"faces[{i_face}] = {shown(face.tolist(), 200)} names vertex {int(values[counts > 1][0])} more than once; "
@@ -239,7 +239,7 @@ def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
 def _unbalanced_edges(
     vertices: FloatArray, indices: IntArray, named: IntArray, n_odd: int, n_turned: int
 ) -> NotClosedError | InconsistentOrientationError:
-    """Return the error that names some edges that are not used equally often in both directions."""
+    """Return the error for edges that are not used equally often in both directions, with some of these edges."""
     kind: type[NotClosedError | InconsistentOrientationError]
     if n_odd > 0:
         kind, n, claim = NotClosedError, n_odd, "are open"

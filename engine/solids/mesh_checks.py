@@ -14,7 +14,7 @@ from engine.compiling.jit import allocating, allocating_kernel, called, inline
 from engine.types import FlagArray, Int8Array, IntArray
 
 _POLL: Final = 0x3FFF
-"""Items between two polls of the flag, one less than a power of two: a fraction of a millisecond."""
+"""Mask of the counter: the flag is polled where (counter & _POLL) is 0, every fraction of a millisecond."""
 _FREE: Final = -1
 _ODD: Final = np.uint64(0x9E3779B97F4A7C15)
 _ODD_TOO: Final = np.uint64(0xBF58476D1CE4E5B9)
@@ -26,7 +26,7 @@ _TURNED: Final = 2
 
 @inline
 def _mixed(bits: Any, row: int) -> Any:
-    """Return a hash of the three numbers of a row."""
+    """Return a hash of the three uint64 in a row of bits (n, 3)."""
     mixed = bits[row, 0] * _ODD
     for column in range(1, 3):
         mixed = (mixed ^ (mixed >> _HALF)) + bits[row, column]
@@ -36,11 +36,8 @@ def _mixed(bits: Any, row: int) -> Any:
 
 @allocating
 def _find_equal_rows(bits: Any, first: IntArray, flag: FlagArray) -> int:
-    """Set `first` (n,) to the first row of `bits` (n, 3) uint64 that equals each row; return the number of distinct
-    rows.
-
-    Open addressing in a table of at least twice as many slots.
-    """
+    """Set first[i] to the first row of bits (n, 3) uint64 that equals row i; return the number of distinct rows. Hash
+    table with open addressing, of at least 2 n slots."""
     n, n_different, n_bits = bits.shape[0], 0, 1
     while (1 << n_bits) < 2 * n:  # bound: the bits of a number
         n_bits += 1
@@ -72,7 +69,7 @@ def _find_equal_rows(bits: Any, first: IntArray, flag: FlagArray) -> int:
 
 @allocating
 def _find_repeat(offsets: IntArray, indices: IntArray, n_vertices: int, flag: FlagArray) -> int:
-    """Return the first face that names a vertex twice, -1 if none does."""
+    """Return the first face that has a vertex twice, or -1."""
     last_face = np.full(n_vertices, -1, np.int64)
     for face in range(offsets.shape[0] - 1):
         if face & _POLL == 0 and flag[0] != 0:
@@ -86,17 +83,15 @@ def _find_repeat(offsets: IntArray, indices: IntArray, n_vertices: int, flag: Fl
 
 @inline
 def _following(offsets: IntArray, face: int, corner: int) -> int:
-    """Return the next corner of a face."""
+    """Return the index of the corner that follows `corner` in a face, in the flat list of corners."""
     return corner + 1 if corner + 1 < offsets[face + 1] else offsets[face]
 
 
 @called
 def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: IntArray, flag: FlagArray) -> None:
-    """Group the edges of all faces by their lower vertex v: ends[starts[v] : starts[v + 1]].
-
-    ends: the higher vertex h of an edge directed to it, ~h of one directed from it. starts: zeros, (n_vertices + 2,).
-    An edge between a vertex and itself is skipped. Two passes, the first to count.
-    """
+    """Group the edges of all faces by their lower vertex v: ends[starts[v] : starts[v + 1]]. ends: h, the higher
+    vertex, for an edge directed from v to h; ~h for one directed from h to v. starts: zeros, (n_vertices + 2,). An edge
+    from a vertex to itself is skipped."""
     for is_second in range(2):
         for face in range(offsets.shape[0] - 1):
             if face & _POLL == 0 and flag[0] != 0:
@@ -117,10 +112,9 @@ def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: I
 
 @allocating
 def _count_unbalanced(starts: IntArray, ends: IntArray, marks: Int8Array, flag: FlagArray) -> tuple[int, int]:
-    """Return how many edges are used an odd number of times, and how many others more often in one direction.
-
-    starts, ends: from `_group_edges`. marks: int8, out: _ODD_USES or _TURNED at every use of such edges, else 0.
-    """
+    """Return how many edges are used an odd number of times, and how many others are used more often in one direction.
+    starts, ends: from `_group_edges`. marks: int8, filled with _ODD_USES or _TURNED at every use of such an edge, else
+    0."""
     uses, n_odd, n_turned = np.zeros(starts.shape[0], np.int64), 0, 0
     for low in range(starts.shape[0] - 2):
         if low & _POLL == 0 and flag[0] != 0:
@@ -149,8 +143,8 @@ def _name_unbalanced(
     offsets: IntArray, corners: IntArray, starts: IntArray, ends: IntArray, marks: Int8Array, wanted: int,
     named: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Set `named` (k, 5) to the first marked edges: face and corner of the first use, next corner, uses in this
-    direction and in the other."""
+    """Fill named (k, 5) with the first edges marked `wanted`: face, corner where it starts, corner where it ends,
+    number of uses in this direction, number in the other."""
     places = np.empty_like(starts)
     for vertex in range(len(starts)):
         places[vertex] = starts[vertex]
@@ -184,11 +178,11 @@ def check_topology(
     bits: Any, offsets: IntArray, indices: IntArray, must_close: bool, merged: IntArray, named: IntArray,
     flag: FlagArray,
 ) -> tuple[int, int, int, int]:  # fmt: skip
-    """Return the first face that names a vertex twice (-1: none), the number of distinct vertices, and
-    `_count_unbalanced`.
+    """Return the first face that has a vertex twice (-1: none), the number of distinct vertices, and the two counts of
+    `_count_unbalanced` (0, 0 unless must_close).
 
-    The last are 0, 0 unless must_close. bits: the vertices (n, 3) uint64. merged: out, the first of all equal vertices
-    at each corner, if two are equal. named: out, by `_name_unbalanced`, of the first kind that occurs.
+    bits: the vertices (n, 3), viewed as uint64. merged: filled with the first of all equal vertices at each corner, if
+    two are equal. named: filled by `_name_unbalanced` with edges of the first kind that occurs.
     """
     n = bits.shape[0]
     repeated = _find_repeat(offsets, indices, n, flag)

@@ -15,7 +15,7 @@ from engine.types import FloatArray, IntArray
 
 _NO_VERTICES = np.zeros((0, 2))
 _LEAST: Final = 3
-"""Least number of stored vertices of a ring, for kernels."""
+"""Least number of vertices of a ring in `Polygon.vertices`, for kernels."""
 
 
 class Polygon(Solid):
@@ -51,12 +51,13 @@ class Polygon(Solid):
     type: ClassVar[str] = "polygon"
     _pickled: ClassVar[tuple[str, ...]] = ("vertices", "ring_offsets")
     vertices: FloatArray
-    """``(n, 2)``: the vertices of all rings, one ring after another; of two positions the last is there twice."""
+    """``(n, 2)``: the vertices of all rings, one ring after another; in a ring of two positions the last is repeated.
+    """
     ring_offsets: IntArray
     """``(n_rings + 1,)``: ring i holds the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``."""
 
     geojson: ClassVar[tuple[Callable[[Any], Polygon], Callable[[Polygon], dict[str, Any]]]]
-    """How a geometry is read and written: `engine.layers` says it, by overlays."""
+    """Functions that convert a geometry to a polygon and back; set by `engine.layers`, since they need overlays."""
 
     def __init__(self, rings: object) -> None:
         if hasattr(rings, "__geo_interface__"):
@@ -79,7 +80,7 @@ class Polygon(Solid):
 
     @classmethod
     def of_arrays(cls, vertices: FloatArray, ring_offsets: IntArray) -> Polygon:
-        """Return a polygon that shares these arrays: read-only, checked, without -0.0 or repeated ends."""
+        """Return a polygon of these arrays without a copy or checks: read-only, no -0.0, no repeated last vertex."""
         polygon = object.__new__(cls)
         polygon._set(dimension=2, vertices=vertices, ring_offsets=ring_offsets)
         return polygon
@@ -99,17 +100,17 @@ class Polygon(Solid):
         return len(self.ring_offsets) - 1
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
-        """As of any solid; an empty polygon has no structures: only overlays accept it."""
+        """Return as `Preparing.prepared`; raise for an empty polygon, which only overlays accept."""
         self.check_not_empty()
         return super().prepared(key, build, check)
 
     def check_not_empty(self) -> None:
-        """Raise if there are no rings."""
+        """Raise if the polygon has no rings."""
         check_not_empty(len(self.vertices), "ring", ("rings",))
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
-        """The polygon as GeoJSON: its pieces with their holes, valid (crossing rings are rebuilt)."""
+        """The polygon as GeoJSON: valid shells with their holes; crossing rings are resolved."""
         return Polygon.geojson[1](self)
 
     def __repr__(self) -> str:
@@ -117,7 +118,7 @@ class Polygon(Solid):
 
 
 def _as_ring(ring: object, where: tuple[str | int, ...]) -> FloatArray:
-    """Return the vertices of one ring without a repeated last one."""
+    """Return the vertices of one ring, without a repeated last vertex."""
     if is_ready(ring, 2):
         points = cast("FloatArray", ring)
         check_finite(points, where)

@@ -28,7 +28,7 @@ TOLERANCE: Final = Fraction(1, 10**12)
 """Largest |entry| of ``R^T R - I`` of a rotation; part of the contract, compared exactly."""
 
 _TOLERANCE: Final = float(TOLERANCE)
-"""The same as a float, for the filter and as a default: a Fraction would be slow."""
+"""`TOLERANCE` as a float, for the filter and as a default, since a Fraction would be slow."""
 MOST_TOLERANCE: Final = 0.1
 
 _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
@@ -70,7 +70,7 @@ class Pose(Immutable):
     rotation: FloatArray
     translation: FloatArray
     numbers: bytes
-    """The bytes of both, the rotation's first, for joining and comparing many poses."""
+    """The bytes of rotation and translation, in this order, for joining and comparing many poses."""
 
     def __init__(self, rotation: object, translation: object, *, tolerance: float = 1e-12) -> None:
         matrix = as_floats(rotation, 2, ("rotation",))
@@ -188,7 +188,7 @@ class Pose(Immutable):
 
     @classmethod
     def of_checked(cls, rotation: FloatArray, translation: FloatArray) -> Pose:
-        """Return the pose of arrays that passed `check_rotations` and the like, copied."""
+        """Return the pose of copies of these arrays, which must have passed `check_rotations` and a test for NaN."""
         pose = object.__new__(cls)
         pose._set(read_only(rotation + 0.0), read_only(translation + 0.0))  # of -0.0: 0.0
         return pose
@@ -200,7 +200,7 @@ class Pose(Immutable):
 
     @property
     def is_identity(self) -> bool:
-        """Whether the motion leaves everything where it is."""
+        """Whether the pose maps every point to itself."""
         return self.numbers in _IDENTITIES
 
     def __eq__(self, other: object) -> bool:
@@ -220,16 +220,17 @@ _STILL: Final = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 
 
 
 Motion = tuple[FloatArray, FloatArray]
-"""Rotation (d, d) and translation (d,), read-only."""
+"""(rotation (d, d), translation (d,)), read-only."""
 
 
 def motion_of(pose: Pose | None, dimension: int) -> Motion:
-    """Return rotation and translation of a pose, the identity for None."""
+    """Return (rotation, translation) of a pose, of the identity for None."""
     return _STILL[dimension] if pose is None else (pose.rotation, pose.translation)
 
 
 def motions_of(poses: Sequence[Pose | None], dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Return rotations (n, d, d) and translations (n, d), as `motion_of` has them; ValueError for other dimensions."""
+    """Return rotations (n, d, d) and translations (n, d) of poses, the identity for None; ValueError if a dimension
+    differs."""
     joined = b"".join([_IDENTITIES[dimension - 2] if pose is None else pose.numbers for pose in poses])
     rows = np.frombuffer(joined).reshape(len(poses), dimension**2 + dimension)
     return rows[:, : dimension**2].copy().reshape(-1, dimension, dimension), rows[:, dimension**2 :].copy()
@@ -249,9 +250,8 @@ def check_rotations(
 
     Decided exactly: entries of ``R^T R - I`` are computed in float64 for all matrices, and in rationals for those
     within rounding of the limit. A matrix within the usual limit has |det| within 1e-11 of 1, so that its float64 sign
-    is right; within the widest, |det| > 0.5.
-
-    one: `rotations` has a single matrix and `where` is its own path. limit: at most 0.1.
+    is right; within the widest, |det| > 0.5. one: `rotations` has a single matrix and `where` is its own path. limit:
+    at most 0.1.
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
@@ -278,8 +278,8 @@ def check_rotations(
 
 
 def is_certified_rotation(matrix: FloatArray) -> bool:
-    """Return whether the filter proves a read-only ``(1, d, d)`` float64 to be a rotation; `check_rotations` decides
-    others."""
+    """Return whether floats prove that a read-only ``(1, d, d)`` float64 is a rotation; if not, `check_rotations`
+    decides."""
     return not entry_of(find_suspects)(matrix, _TOLERANCE - _UNSURE, _UNREAD)
 
 
@@ -288,12 +288,9 @@ _UNREAD: Final = np.empty(1, np.bool_)
 
 @kernel
 def find_suspects(matrices: FloatArray, limit: float, is_suspect: BoolArray) -> int:
-    """Fill is_suspect (n,) for matrices (n, d, d): max|R^T R - I| > limit as computed, or det <= 0; return their
-    number.
-
-    An entry of the product is a sum of d products, det a sum of d! of d; numbers that overflow, far from orthogonal,
-    are suspect.
-    """
+    """Fill is_suspect (n,) for matrices (n, d, d): computed max|R^T R - I| > limit, or det <= 0; return the number of
+    True. An entry of the product is a sum of d products, det a sum of d! of d; matrices whose numbers overflow are
+    suspect."""
     dimension, n_suspects = matrices.shape[1], 0
     for item in range(matrices.shape[0]):
         suspect = False
@@ -326,7 +323,7 @@ def _exact_defect(matrix: FloatArray) -> Fraction:
 
 
 def _nearest_rotation(matrix: FloatArray) -> FloatArray:
-    """Return the orthogonal factor of the polar form of a matrix with det > 0, each entry the nearest double.
+    """Return the orthogonal factor of the polar decomposition of a matrix with det > 0, entries rounded to nearest.
 
     It is computed to some units of 2^-300. If that leaves a double open, above all a zero, it is computed to some of
     2^-1200; no entry of a rotation lies in the middle of two doubles, for a power of 4 is the sum of three squares only
@@ -341,10 +338,8 @@ def _nearest_rotation(matrix: FloatArray) -> FloatArray:
 
 
 def _orthogonal_factor(matrix: FloatArray, bits: int) -> list[list[int]]:
-    """Return the factor in units of 2^-bits by Newton's iteration X <- (X + X^-T) / 2: each turn squares the error.
-
-    Source: N. Higham, Computing the polar decomposition, with applications, 1986.
-    """
+    """Return the orthogonal factor in units of 2^-bits by Newton's iteration X <- (X + X^-T) / 2, which squares the
+    error. Source: N. Higham, Computing the polar decomposition, with applications, 1986."""
     rows = [[int(Fraction(value) * (1 << bits)) for value in row] for row in matrix.tolist()]
     while True:  # bound: the error is below 1 and squared
         if len(rows) == 2:
@@ -361,5 +356,5 @@ def _orthogonal_factor(matrix: FloatArray, bits: int) -> list[list[int]]:
 
 
 def _decimal(value: Fraction) -> str:
-    """Return a few digits of a fraction that may be beyond float64."""
+    """Return some digits of a fraction, which may exceed float64."""
     return repr(float(value)) if value < 10**300 else "above 1e300"

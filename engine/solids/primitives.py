@@ -154,7 +154,7 @@ class Aabb(Solid):
 
 
 def rows_between(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the planes of a box, see `Aabb.rows`."""
+    """Return the plane rows (2 d, d + 1) of the box from low to high, in the order xmin, xmax, ymin, ymax, ..."""
     unit = np.eye(len(low))
     rows = np.empty((2 * len(low), len(low) + 1))
     rows[0::2, :-1], rows[1::2, :-1], rows[0::2, -1], rows[1::2, -1] = unit, -unit, -low, high
@@ -208,12 +208,12 @@ class Convex(Solid):
 
 
 def rows_of(solid: HalfSpace | Aabb | Convex) -> FloatArray:
-    """Return the plane rows ``(m, dimension + 1)`` of a solid; of a box xmin, xmax, ymin, ymax, ..."""
+    """Return the plane rows ``(m, dimension + 1)`` of a solid; of a box in the order xmin, xmax, ymin, ymax, ..."""
     return solid.row[None] if isinstance(solid, HalfSpace) else solid.rows if isinstance(solid, Aabb) else solid.planes
 
 
 def rows_in_space(rows: FloatArray) -> FloatArray:
-    """Return rows as ``(m, 4)``, planar ones with 0 in the third place."""
+    """Return plane rows as ``(m, 4)``; in the plane a third coefficient 0 is inserted."""
     return rows if rows.shape[1] == 4 else np.insert(rows, 2, 0.0, axis=1)
 
 
@@ -242,7 +242,7 @@ class Triangle(Solid):
     _pickled: ClassVar[tuple[str, ...]] = ("vertices",)
     vertices: FloatArray
     ring_offsets: ClassVar[IntArray] = read_only(np.array([0, 3], np.int64))
-    """Of the plane's: those of its one ring."""
+    """Offsets of the single ring of a planar triangle."""
 
     def __init__(self, vertices: object) -> None:
         points = as_floats(vertices, 2, ("vertices",))

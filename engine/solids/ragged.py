@@ -1,4 +1,4 @@
-"""Ragged arrays: items of several lengths concatenated, and offsets of each, as in Arrow and shapely."""
+"""Ragged arrays: items of different lengths in one array, with the offsets of each, as in Arrow and shapely."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
 class Ragged(Columns):
-    """Base of results that are ragged arrays; a pickle is checked when it is read, since kernels trust offsets."""
+    """Base of results that are ragged arrays; a pickle is checked when read, since kernels trust offsets."""
 
     __slots__ = ()
 
     _levels: ClassVar[tuple[str, ...]]
-    """The field of the items, then the fields of offsets, each into the one before."""
+    """Name of the field of items, then those of the fields of offsets, each into the one before."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self)._restored, tuple(getattr(self, each.name) for each in fields(cast(Any, self)))
@@ -36,7 +36,8 @@ class Ragged(Columns):
 
 
 def as_lines(lines: object, dimension: int) -> tuple[FloatArray, IntArray]:
-    """Return the vertices (n, dimension) of polylines and the offsets (n_lines + 1,) of each; see `clip_lines`."""
+    """Return the vertices (n, dimension) of polylines and their offsets (n_lines + 1,); lines: as `clip_lines` takes
+    them."""
     where: Where = ("lines",)
     if isinstance(lines, tuple) and len(lines) == 2 and isinstance(lines[1], np.ndarray) and lines[1].ndim == 1:
         vertices = as_points(lines[0], dimension, (*where, 0))
@@ -58,7 +59,7 @@ def as_lines(lines: object, dimension: int) -> tuple[FloatArray, IntArray]:
 
 
 def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) -> tuple[FloatArray, IntArray]:
-    """Return the concatenated positions of lines, checked together, and their offsets."""
+    """Return the positions of a list of lines as one array, and the offsets of the lines."""
     try:
         offsets = np.cumsum([0, *map(len, lines)])
         if all(isinstance(line, np.ndarray) for line in lines):
@@ -72,19 +73,19 @@ def _joined(lines: list[Any] | tuple[Any, ...], dimension: int, where: Where) ->
 
 
 def summed(sizes: Sequence[int] | IntArray | BoolArray) -> IntArray:
-    """Return the offsets of parts of these sizes, read-only: (n + 1,), from 0."""
+    """Return read-only offsets (n + 1,) of parts of these sizes, from 0."""
     offsets = np.zeros(len(sizes) + 1, np.int64)
     np.cumsum(sizes, out=offsets[1:])
     return read_only(offsets)
 
 
 def within(offsets: IntArray, items: IntArray) -> IntArray:
-    """Return the group of each item: group g has the items from offsets[g] on; empty groups none."""
+    """Return the group of each item: group g has the items offsets[g] .. offsets[g + 1] - 1."""
     return np.searchsorted(offsets, items, "right") - 1
 
 
 def next_in_rings(ring_offsets: IntArray) -> IntArray:
-    """Return for each vertex the next vertex of its ring, (n,) int64."""
+    """Return (n,) int64: the index of the vertex that follows each vertex in its ring."""
     following = np.arange(1, ring_offsets[-1] + 1, dtype=np.int64)
     following[ring_offsets[1:] - 1] = ring_offsets[:-1]
     return following
@@ -153,8 +154,8 @@ def polygons(coordinates: object, ring_offsets: object, polygon_offsets: object)
 def parted(
     coordinates: object, ring_offsets: object, polygon_offsets: object
 ) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
-    """Return the checked arguments of `polygons`: vertices, starts of rings, their ends without a repeated position,
-    and offsets of polygons into the rings."""
+    """Check the arguments of `polygons`; return vertices, start and end of each ring (without a repeated last vertex),
+    and the offsets of polygons into the rings."""
     vertices = as_points(coordinates, 2, ("coordinates",))
     zeros = vertices == 0.0
     if np.signbit(vertices[zeros]).any():
@@ -168,7 +169,7 @@ def parted(
 
 
 def _of_rings(vertices: FloatArray, starts: list[int], ends: list[int], ring: int) -> Polygon:
-    """Return the polygon of these rings; ring: the caller's number of the first one."""
+    """Return the polygon of these rings; ring: index of the first of them among the caller's rings, for messages."""
     try:
         return Polygon([vertices[start:end] for start, end in zip(starts, ends)])
     except EngineError as error:
@@ -179,13 +180,14 @@ def _of_rings(vertices: FloatArray, starts: list[int], ends: list[int], ring: in
 
 
 def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return rings closed by a repeated first position, as GeoJSON and Arrow have them, and their offsets."""
+    """Return rings closed by a repeated first vertex, as GeoJSON and Arrow need them: positions (m, 2) and their
+    offsets."""
     firsts = ring_offsets[:-1]
     return np.insert(vertices, ring_offsets[1:], vertices[firsts], axis=0), ring_offsets + np.arange(len(firsts) + 1)
 
 
 def as_geojson(vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray) -> dict[str, Any]:
-    """Return pieces, each a shell and its holes, as a GeoJSON MultiPolygon; a Polygon where there is but one."""
+    """Return pieces (each a shell and its holes) as a GeoJSON MultiPolygon; a single piece as a Polygon."""
     positions, offsets = closed_rings(vertices, ring_offsets)
     rings = [positions[start:stop].tolist() for start, stop in pairwise(offsets.tolist())]
     pieces = [rings[start:stop] for start, stop in pairwise(piece_offsets.tolist())]

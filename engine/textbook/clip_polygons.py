@@ -34,7 +34,7 @@ from engine.types import FloatArray
 
 @allocating_kernel
 def clip_contour(contour: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
-    """Return what the half-space leaves of a closed contour (n, dim); at most 2 n vertices."""
+    """Return the part of a closed contour (n, dim) in the half-space normal . p + offset >= 0; at most 2 n vertices."""
     n = len(contour)
     kept = np.empty((2 * n, contour.shape[1]))
     m = 0
@@ -51,13 +51,14 @@ def clip_contour(contour: FloatArray, normal: FloatArray, offset: float) -> Floa
 
 
 def clip_polygon(contours: list[FloatArray], normal: FloatArray, offset: float) -> list[FloatArray]:
-    """Return the contours that are left of a multiply connected polygon."""
+    """Clip each contour of a multiply connected polygon to a half-space; return those that are not empty."""
     clipped = [clip_contour(contour, normal, offset) for contour in contours]
     return [contour for contour in clipped if len(contour) > 0]
 
 
 def on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray]:
-    """Return what a convex polyhedron, given by rows (normal, offset), leaves of a polygon: one plane after another."""
+    """Clip a polygon to a convex polyhedron of plane rows (normal, offset), one plane after another; return its
+    contours."""
     for row in planes:
         contours = clip_polygon(contours, row[:-1].copy(), float(row[-1]))
     return contours
@@ -65,7 +66,7 @@ def on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """A vertex or crossing of one ring, linked to its neighbours and, at a crossing, to its twin in the other ring."""
+    """A vertex or crossing of one ring, linked to its neighbours and, for a crossing, to its twin in the other ring."""
 
     x: float
     y: float
@@ -78,7 +79,8 @@ class Node:
 
 
 def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[float, float] | None:
-    """Return the parameters on ab and on cd where they cross, both strictly between 0 and 1."""
+    """Return the parameters (on ab, on cd), both strictly between 0 and 1, where two segments cross; None if they do
+    not."""
     u, v, w = b - a, d - c, c - a
     area = u[0] * v[1] - u[1] * v[0]
     if area == 0.0:
@@ -88,7 +90,7 @@ def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tupl
 
 
 def link(ring: FloatArray, crossings: list[Node], other: FloatArray) -> list[Node]:
-    """Return the nodes of a ring in order, linked, crossings marked as entry into `other` or exit from it."""
+    """Return the nodes of a ring in order, linked; a crossing is marked as entry into `other` or as exit."""
     nodes = [Node(float(x), float(y), (i, 0.0)) for i, (x, y) in enumerate(ring)]
     nodes = sorted(nodes + crossings, key=lambda node: node.at)
     inside = bool(by_half_line(ring[:1], other, np.array([0, len(other)]))[0])
@@ -101,7 +103,7 @@ def link(ring: FloatArray, crossings: list[Node], other: FloatArray) -> list[Nod
 
 
 def intersection(subject: FloatArray, clip: FloatArray) -> list[FloatArray]:
-    """Return the rings of the intersection of two simple rings (n, 2) and (m, 2)."""
+    """Return the rings of the intersection of the regions of two simple rings (n, 2) and (m, 2)."""
     of_subject, of_clip = [], []
     for i in range(len(subject)):
         for j in range(len(clip)):
@@ -132,7 +134,7 @@ def _without_crossings(subject: FloatArray, clip: FloatArray) -> list[FloatArray
 
 
 def _walk(start: Node, n_steps: int) -> FloatArray:
-    """Follow the boundary from a crossing; capped, since marks that do not take turns may never lead back."""
+    """Follow the boundary from a crossing and return the ring; at most n_steps: wrong marks may never lead back."""
     ring, node, forward = [], start, True
     for _ in range(n_steps):
         node.is_used = True

@@ -32,7 +32,7 @@ BOX_TRIANGLES: IntArray = np.array(
 
 @inline
 def has_vertex_inside(vertices: FloatArray, others: FloatArray, triangles: IntArray) -> bool:
-    """Tell whether one of `vertices` is in the polyhedron (others, triangles)."""
+    """Return whether one of `vertices` is in the polyhedron (others, triangles)."""
     ahead = Point3(0.6180339887498949, 0.4142135623730951, 0.6695263146546152)  # no direction that occurs in a mesh
     found = False
     for i in range(len(vertices)):
@@ -44,9 +44,8 @@ def has_vertex_inside(vertices: FloatArray, others: FloatArray, triangles: IntAr
 def by_vertices(
     vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray
 ) -> bool:
-    """Tell whether a vertex of one polyhedron is in the other: all vertices are tested, both ways.
-
-    What goes wrong: bodies that meet with edges only are missed; each test inherits what goes wrong with a half-line.
+    """Return whether a vertex of one polyhedron is in the other: all vertices are tested, both ways. What goes wrong:
+    bodies of which only edges meet are missed; each test inherits what goes wrong with a half-line.
     """
     return has_vertex_inside(vertices, other_vertices, other_triangles) or has_vertex_inside(
         other_vertices, vertices, triangles
@@ -55,8 +54,8 @@ def by_vertices(
 
 @inline
 def meets(p: Point3, q: Point3, a: Point3, b: Point3, c: Point3) -> bool:
-    """Tell whether the edge pq meets the face abc: its ends on opposite sides of the plane, inequality (22.9), and its
-    intersection with the plane in the face."""
+    """Return whether edge pq meets face abc: its ends are on opposite sides of the plane, inequality (22.9), and its
+    intersection with the plane is in the face."""
     normal = cross(minus(b, a), minus(c, a))
     at_p, at_q = dot(normal, minus(p, a)), dot(normal, minus(q, a))
     if (at_p > 0.0 and at_q > 0.0) or (at_p < 0.0 and at_q < 0.0) or at_p == at_q:
@@ -66,7 +65,8 @@ def meets(p: Point3, q: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 
 @inline
 def has_edge_through_face(vertices: FloatArray, triangles: IntArray, others: FloatArray, faces: IntArray) -> bool:
-    """Tell whether an edge of the first mesh meets a face of the second; every edge is met twice, from both sides."""
+    """Return whether an edge of the first mesh meets a face of the second; an edge is tested once for each of its two
+    faces."""
     for i in range(len(triangles)):
         for k in range(3):
             p, q = as_point3(vertices, triangles[i, k]), as_point3(vertices, triangles[i, (k + 1) % 3])
@@ -79,18 +79,16 @@ def has_edge_through_face(vertices: FloatArray, triangles: IntArray, others: Flo
 
 @kernel
 def by_edges(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray) -> bool:
-    """Tell whether an edge of one polyhedron meets a face of the other, both ways: edge penetration; quadratic.
-
-    What goes wrong: the intersection is rounded before it is tested, so an edge that passes close to the rim of two
-    faces may miss both; flush contact is decided by rounding; a body within the other has no edge that meets a face.
-    """
+    """Return whether an edge of one polyhedron meets a face of the other, both ways: edge penetration; quadratic. What
+    goes wrong: the intersection is rounded before it is tested, so an edge that passes close to the rim of two faces
+    may miss both; flush contact is decided by rounding; a body within the other has no edge that meets a face."""
     return has_edge_through_face(vertices, triangles, other_vertices, other_triangles) or has_edge_through_face(
         other_vertices, other_triangles, vertices, triangles
     )
 
 
 def meet(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray) -> bool:
-    """Tell whether two polyhedra collide: a vertex in the other, or an edge through a face."""
+    """Return whether two polyhedra collide: a vertex in the other, or an edge through a face."""
     arguments = (vertices, triangles, other_vertices, other_triangles)
     return bool(by_vertices(*arguments) or by_edges(*arguments))
 
@@ -98,7 +96,7 @@ def meet(vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, 
 def by_volumes(
     vertices: FloatArray, triangles: IntArray, other_vertices: FloatArray, other_triangles: IntArray
 ) -> bool:
-    """Tell whether two polyhedra collide, the cheapest test first; volumes only save time, else it is `meet`.
+    """Return whether two polyhedra collide, by boxes first, which only save time, then by `meet`.
 
     "First their bounding volumes are examined. If the two bounding volumes do not collide, then neither can the
     contained polyhedra collide. If the bounding volumes penetrate each other, then one polyhedra is tested against the
@@ -114,7 +112,7 @@ def by_volumes(
 
 
 def boxes_meet(low: FloatArray, high: FloatArray, other_low: FloatArray, other_high: FloatArray) -> bool:
-    """Tell whether two closed boxes have a common point."""
+    """Return whether two closed boxes have a common point."""
     return bool((low <= other_high).all() and (other_low <= high).all())
 
 
@@ -137,10 +135,8 @@ def farthest(vertices: FloatArray, start: Point3) -> Point3:
 
 @allocating_kernel
 def bounding_sphere(vertices: FloatArray) -> tuple[FloatArray, float]:
-    """Return centre (3,) and radius of Ritter's sphere around vertices (n, 3).
-
-    What goes wrong: it is some 5 to 20 % too large, and rounding may leave a vertex just outside.
-    """
+    """Return centre (3,) and radius of Ritter's sphere around vertices (n, 3). What goes wrong: it is some 5 to 20 %
+    too large, and rounding may leave a vertex just outside."""
     p = farthest(vertices, as_point3(vertices, 0))
     q = farthest(vertices, p)
     center, radius = along(p, q, 0.5), 0.5 * distance(p, q)
@@ -155,13 +151,13 @@ def bounding_sphere(vertices: FloatArray) -> tuple[FloatArray, float]:
 
 @inline
 def side(a: FloatArray, b: FloatArray, p: FloatArray) -> float:
-    """Return > 0 where p is on the left of the line from a to b."""
+    """Return a number > 0 where p is left of the line from a to b, < 0 right of it."""
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
 @inline
 def holds(triangle: FloatArray, p: FloatArray) -> bool:
-    """Tell whether a triangle of either orientation holds p, its edges included."""
+    """Return whether a triangle (3, 2) of either orientation contains p, edges included."""
     a, b, c = triangle[0], triangle[1], triangle[2]
     s0, s1, s2 = side(a, b, p), side(b, c, p), side(c, a, p)
     return (s0 >= 0.0 and s1 >= 0.0 and s2 >= 0.0) or (s0 <= 0.0 and s1 <= 0.0 and s2 <= 0.0)
@@ -169,13 +165,13 @@ def holds(triangle: FloatArray, p: FloatArray) -> bool:
 
 @inline
 def edges_cross(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> bool:
-    """Tell whether each of ab and cd has its ends on opposite sides of the other."""
+    """Return whether each of the segments ab and cd has its ends on opposite sides of the other (or on its line)."""
     return side(a, b, c) * side(a, b, d) <= 0.0 and side(c, d, a) * side(c, d, b) <= 0.0
 
 
 @inline
 def pair_collides(first: FloatArray, second: FloatArray) -> bool:
-    """Tell whether two triangles (3, 2) have a common point: an edge crosses an edge, or one holds a vertex."""
+    """Return whether two triangles (3, 2) have a common point: an edge crosses an edge, or one contains a vertex."""
     if holds(first, second[0]) or holds(second, first[0]):
         return True
     for i in range(3):
@@ -187,10 +183,8 @@ def pair_collides(first: FloatArray, second: FloatArray) -> bool:
 
 @allocating_kernel
 def of_triangles(first: FloatArray, second: FloatArray) -> BoolArray:
-    """Tell of each pair first[i], second[i], both (n, 3, 2), whether the closed triangles have a common point.
-
-    What goes wrong: triangles that touch in a point or along an edge get either answer where coordinates are not exact.
-    """
+    """Return (n,) bool: whether the closed triangles first[i] and second[i], both (n, 3, 2), have a common point. What
+    goes wrong: triangles that touch in a point or along an edge get either answer where coordinates are not exact."""
     found = np.zeros(len(first), np.bool_)
     for i in range(len(first)):
         found[i] = pair_collides(first[i], second[i])

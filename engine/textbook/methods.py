@@ -1,4 +1,4 @@
-"""Which of the textbook's methods answer a question about a solid, ready to be asked, and what an item costs them."""
+"""The textbook's methods that answer a question about a solid, as functions, with the number of steps an item takes."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from engine.textbook import clip_polygons, clip_segments, collision, polygons, p
 from engine.types import BoolArray, FloatArray
 
 Methods = dict[str, tuple[Callable[..., Any], int]]
-"""For each name how to ask, and how many steps an item takes."""
+"""By name of the method: the function that answers, and how many steps it takes for one item."""
 AHEAD: Final = np.array([0.5773, 0.2113, 0.7886])
-"""The direction of the half-line: no component is zero."""
+"""Direction of the half-line; no component is zero."""
 ANGLES: Final = 1e-6
-"""The tolerance that the unsigned sum of angles needs, and the textbook does not name."""
+"""Tolerance of the unsigned sum of angles, for which the textbook gives no number."""
 
 
 def of_points(solid: Any) -> Methods:
-    """Return what tells of points (n, dim) whether a solid contains them."""
+    """Return the methods for points (n, dim): functions that return (n,) bool, whether the solid contains each."""
     match solid.type:
         case "half_space":
             return {"half-space": (lambda points: solids.in_half_space(points, solid.normal, solid.offset), 1)}
@@ -45,7 +45,7 @@ def of_points(solid: Any) -> Methods:
 
 
 def _of_tree(solid: Any) -> Methods:
-    """Return the tree over the first method of every operand, nothing where one has none."""
+    """Return the method of a CSG tree, with the first method of each operand; {} if an operand has none."""
     if not all(operands := [list(of_points(operand).values())[:1] for operand in solid.operands]):
         return {}
     leaves: list[Any] = [leaf for ((leaf, _),) in operands]
@@ -64,7 +64,8 @@ def _of_rings(vertices: FloatArray, offsets: Any) -> Methods:
 
 
 def of_segments(region: Any) -> Methods:
-    """Return what clips segments (n, 2, dim): rows of both ends, NaN where nothing is kept."""
+    """Return the methods that clip segments (n, 2, dim): functions that return (n, 2 dim), both ends, NaN if nothing is
+    kept."""
     kernels: dict[str, tuple[str, Any, tuple[str, ...]]] = {
         "half_space": ("half-space", clip_segments.on_half_space, ("normal", "offset")),
         "aabb": ("Cohen-Sutherland", clip_segments.on_box, ("min", "max")),
@@ -84,7 +85,8 @@ def of_segments(region: Any) -> Methods:
 
 
 def of_polygons(region: Any) -> Methods:
-    """Return what tells of polygons of one ring (n, size, dim) whether anything of them is kept."""
+    """Return the methods for polygons of one ring (n, size, dim): functions that return (n,) bool, whether a part is
+    kept."""
     if region.type not in ("half_space", "convex", "aabb"):
         return {}
     rows = rows_of(region)
@@ -96,7 +98,7 @@ def of_polygons(region: Any) -> Methods:
 
 
 def of_pairs(first: Any, second: Any) -> Methods:
-    """Return what tells whether two bodies collide; a step is a face of one against a vertex of the other."""
+    """Return the methods that decide if two bodies collide; a step is a face of one against a vertex of the other."""
     if not first.type == second.type == "polyhedron":
         return {}
     meshes = first.vertices, first.triangles, second.vertices, second.triangles

@@ -22,11 +22,9 @@ from engine.types import BoolArray, FloatArray, IntArray
 
 @allocating_kernel
 def by_half_line(points: FloatArray, vertices: FloatArray, ring_offsets: IntArray) -> BoolArray:
-    """Tell of each point (n, 2) whether it is in the rings vertices[ring_offsets[r] : ring_offsets[r + 1]].
-
-    The half-line runs along x. What goes wrong: where it meets an edge is computed by a division and compared; near an
-    edge the answer is rounding's.
-    """
+    """Return (n,) bool: whether a point (n, 2) is in the rings vertices[ring_offsets[r] : ring_offsets[r + 1]]. The
+    half-line runs along x. What goes wrong: where it meets an edge is computed by a division and compared; near an edge
+    rounding decides."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         x, y = points[i]
@@ -45,13 +43,13 @@ def by_half_line(points: FloatArray, vertices: FloatArray, ring_offsets: IntArra
 
 @inline
 def signed_angle(ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the angle from u to v in (-pi, pi]."""
+    """Return the angle from vector u to vector v in (-pi, pi]."""
     return atan2(ux * vy - uy * vx, ux * vx + uy * vy)
 
 
 @inline
 def unsigned_angle(ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the angle between u and v in [0, pi], by the scalar product; pi where one of them is zero."""
+    """Return the angle between vectors u and v in [0, pi] by the scalar product; pi if one is zero."""
     size = hypot(ux, uy) * hypot(vx, vy)
     if size == 0.0:
         return pi
@@ -60,7 +58,8 @@ def unsigned_angle(ux: float, uy: float, vx: float, vy: float) -> float:
 
 @allocating
 def sum_of_angles(point: FloatArray, vertices: FloatArray, angle: Any) -> float:
-    """Return the sum of the angles under which the edges are seen from a point."""
+    """Return the sum of angle(u, v) over the edges of a ring, u and v being the vectors from the point to the edge's
+    ends."""
     total = 0.0
     for j in range(len(vertices)):
         u, v = vertices[j - 1] - point, vertices[j] - point
@@ -70,10 +69,8 @@ def sum_of_angles(point: FloatArray, vertices: FloatArray, angle: Any) -> float:
 
 @allocating_kernel
 def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
-    """Tell of each point (n, 2) whether the signed sum exceeds half a turn in size.
-
-    What goes wrong: it is twelve times slower than sides, and on an edge the angle is half a turn of either sign.
-    """
+    """Return (n,) bool for points (n, 2): whether the |signed sum| exceeds half a turn. What goes wrong: it is twelve
+    times slower than sides, and on an edge the angle is half a turn of either sign."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         contained[i] = abs(sum_of_angles(points[i], vertices, signed_angle)) > pi
@@ -82,7 +79,7 @@ def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
 
 @allocating_kernel
 def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: float) -> BoolArray:
-    """Tell of each point (n, 2) whether the unsigned sum is at least a full turn less `tolerance` (radians)."""
+    """Return (n,) bool for points (n, 2): whether the unsigned sum is at least a full turn - `tolerance` (radians)."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         contained[i] = sum_of_angles(points[i], vertices, unsigned_angle) >= 2.0 * pi - tolerance
@@ -91,11 +88,9 @@ def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: floa
 
 @allocating_kernel
 def by_same_side(points: FloatArray, vertices: FloatArray) -> BoolArray:
-    """Tell of each point (n, 2) whether it is on the same side of every edge of the convex ring vertices (m, 2).
-
-    Either orientation of the ring will do; a point on an edge counts as inside. What goes wrong: the cross product of a
-    point close to an edge may have the wrong sign.
-    """
+    """Return (n,) bool for points (n, 2): whether a point is on the same side of every edge of the convex ring vertices
+    (m, 2). Either orientation of the ring will do; a point on an edge counts as inside. What goes wrong: the cross
+    product of a point close to an edge may have the wrong sign."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         has_left, has_right = False, False

@@ -28,11 +28,9 @@ Leaf = Callable[[FloatArray], BoolArray]
 
 @allocating_kernel
 def in_implicit(points: FloatArray, powers: IntArray, coefficients: FloatArray) -> BoolArray:
-    """Tell of each point whether f >= 0, the sum of coefficient x^i y^j z^k.
-
-    points (n, dim), powers (t, dim), coefficients (t,). What goes wrong: near the surface f is a small difference of
-    large terms, and rounding decides the sign.
-    """
+    """Return (n,) bool for points (n, dim): whether the sum of coefficient x^i y^j z^k is >= 0. powers (t, dim),
+    coefficients (t,). What goes wrong: near the surface f is a small difference of large terms, and rounding decides
+    the sign."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         total = 0.0
@@ -47,7 +45,7 @@ def in_implicit(points: FloatArray, powers: IntArray, coefficients: FloatArray) 
 
 @inline
 def signed_distance(point: FloatArray, normal: FloatArray, offset: float) -> float:
-    """Return dot(normal, point) + offset: a distance up to the length of the normal, which points inward."""
+    """Return dot(normal, point) + offset: the distance times the length of the normal, which points inward."""
     total = 0.0
     for k in range(len(normal)):
         total += normal[k] * point[k]
@@ -56,11 +54,9 @@ def signed_distance(point: FloatArray, normal: FloatArray, offset: float) -> flo
 
 @allocating_kernel
 def in_convex(points: FloatArray, planes: FloatArray) -> BoolArray:
-    """Tell of each point (n, dim) whether every row (normal, offset) of planes (m, dim + 1) is >= 0 there.
-
+    """Return (n,) bool for points (n, dim): whether every plane row (normal, offset) of (m, dim + 1) is >= 0 there.
     What goes wrong: a row computed from rounded vertices is not the face's plane, and the sign is rounded once more: a
-    point within a few units in the last place of a plane gets either answer.
-    """
+    point within a few units in the last place of a plane gets either answer."""
     contained = np.ones(len(points), np.bool_)
     dim = points.shape[1]
     for i in range(len(points)):
@@ -72,24 +68,21 @@ def in_convex(points: FloatArray, planes: FloatArray) -> BoolArray:
 
 
 def in_half_space(points: FloatArray, normal: FloatArray, offset: float) -> BoolArray:
-    """Tell of each point (n, dim) whether it is in the half-space: a convex body of one plane."""
+    """Return (n,) bool for points (n, dim): whether a point is in the half-space, a convex body of one plane."""
     contained: BoolArray = in_convex(points, np.append(normal, offset)[None])
     return contained
 
 
 def clip_points(points: FloatArray, normal: FloatArray, offset: float) -> FloatArray:
-    """Return the points that the half-space holds: each is either removed or preserved."""
+    """Return those of the points (n, dim) that are in the half-space."""
     kept: FloatArray = points[in_half_space(points, normal, offset)]
     return kept
 
 
 def in_csg_tree(points: FloatArray, tree: Leaf | tuple[str, Any, Any]) -> BoolArray:
-    """Tell of each point whether the tree holds it; recursive, as deep as the tree.
-
-    A leaf is a function from points (n, dim) to bools (n,); a node is (operation, first, second), its operation applied
-    to their answers. What goes wrong: two values cannot tell "on the surface", so the difference of a closed set keeps
-    or loses its wall.
-    """
+    """Return (n,) bool: whether the tree contains a point; recursive, as deep as the tree. A leaf is a function from
+    points (n, dim) to bools (n,); a node is (operation, first, second), its operation applied to their answers. What
+    goes wrong: two values cannot tell "on the surface", so the difference of a closed set keeps or loses its wall."""
     if not isinstance(tree, tuple):
         return tree(points)
     operation, first, second = tree
@@ -105,7 +98,7 @@ def in_csg_tree(points: FloatArray, tree: Leaf | tuple[str, Any, Any]) -> BoolAr
 
 @inline
 def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
-    """Tell whether p is in the prism over abc, its side faces included."""
+    """Return whether p is in the prism over triangle abc, side faces included."""
     n = cross(minus(b, a), minus(c, a))
     return (
         dot(cross(minus(b, a), minus(p, a)), n) >= 0.0
@@ -116,9 +109,8 @@ def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 
 @allocating_kernel
 def by_products(points: FloatArray, triangle: FloatArray) -> BoolArray:
-    """Tell of each point (n, 3) whether it is in the prism over the triangle (3, 3).
-
-    What goes wrong: near the side faces the sign is rounding's; n underflows for small triangles (all is inside).
+    """Return (n,) bool for points (n, 3): whether a point is in the prism over the triangle (3, 3). What goes wrong:
+    near the side faces rounding decides the sign; n underflows for small triangles (all is inside).
     """
     contained = np.zeros(len(points), np.bool_)
     a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
@@ -129,13 +121,13 @@ def by_products(points: FloatArray, triangle: FloatArray) -> BoolArray:
 
 @inline
 def is_left(a: Point2, b: Point2, p: Point2) -> bool:
-    """Tell whether p is on the left of the line from a to b, or on it."""
+    """Return whether p is left of the line from a to b, or on it."""
     return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) >= 0.0
 
 
 @inline
 def project(p: Point3, axis: int) -> Point2:
-    """Return p without the coordinate `axis`."""
+    """Return p without its coordinate on `axis`."""
     if axis == 0:
         return Point2(p.y, p.z)
     if axis == 1:
@@ -145,7 +137,7 @@ def project(p: Point3, axis: int) -> Point2:
 
 @inline
 def axis_of_largest_area(a: Point3, b: Point3, c: Point3) -> int:
-    """Return the axis on which the normal has its largest component."""
+    """Return the axis on which the normal of triangle abc has its largest component."""
     n = cross(minus(b, a), minus(c, a))
     if abs(n.x) >= abs(n.y) and abs(n.x) >= abs(n.z):
         return 0
@@ -154,11 +146,9 @@ def axis_of_largest_area(a: Point3, b: Point3, c: Point3) -> int:
 
 @allocating_kernel
 def by_projection(points: FloatArray, triangle: FloatArray) -> BoolArray:
-    """Tell of each point (n, 3) whether its projection is in that of the triangle (3, 3): meant for its plane.
-
-    What goes wrong: near an edge the sign is rounding's, less often than in space since fewer terms are added; points
-    off the plane are answered by their projection.
-    """
+    """Return (n,) bool for points (n, 3): whether a point's projection is in that of the triangle (3, 3), for points in
+    its plane. What goes wrong: near an edge rounding decides the sign, less often than in space since fewer terms are
+    added; points off the plane are answered by their projection."""
     contained = np.zeros(len(points), np.bool_)
     corners = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
     axis = axis_of_largest_area(corners[0], corners[1], corners[2])
