@@ -47,8 +47,7 @@ class PairBatches:
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
         """Return the outlines or convex bodies in one pool, and the index of each solid in it, -1 for a solid not in
-        it.
-        """
+        it."""
         if self.cached_pool is None:
             self.cached_pool = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
         return self.cached_pool
@@ -58,8 +57,7 @@ class PairBatches:
         budget: Budget,
     ) -> Callable[[int, int], None]:  # fmt: skip
         """Return a task that fills relations[start:stop] for pairs (n, 2) of rows, UNSETTLED where a kernel cannot
-        decide. kinds: the solid of each row. poses: the pose of each row; row 0 is the identity, of any kind.
-        """
+        decide. kinds: the solid of each row. poses: the pose of each row; row 0 is the identity, of any kind."""
         (pool, places), flag = self.pool(budget), budget.flag
         kernel = entry_of(relate_outline_pairs if self.is_planar else relate_convex_pairs)
         bodies, options = places[kinds], (detail,) if self.is_planar else (boolean, not detail)
@@ -112,8 +110,7 @@ class SceneBatches:
     def related(
         self, kinds: IntArray, rotations: FloatArray, translations: FloatArray, n: int, boolean: bool, budget: Budget
     ) -> Int8Array:
-        """Return the relations of n pairs of consecutive rows, the first pair being rows 1 and 2; UNSETTLED where open.
-        """
+        """Return the relations of n pairs of consecutive rows, the first being rows 1 and 2; UNSETTLED where open."""
         relations = np.full(n, UNSETTLED, np.int8)
         if n and (self.pairs.cached_pool is not None or len(self.bodies.distinct) <= _FEW):
             pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)
@@ -132,8 +129,7 @@ def posed_batch(
     first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, boolean: bool, detail: bool, budget: Budget
 ) -> Callable[[int, int], None] | None:
     """Return a task that fills relations[start:stop] for these poses, UNSETTLED where open; None if it would be no
-    faster.
-    """
+    faster."""
     n, table = len(relations), PairBatches([first, second])
     if n < _LEAST_POSES or (not table.is_planar and None in (convex_body_of(first), convex_body_of(second))):
         return None
@@ -210,8 +206,7 @@ def bodies_of(
     check: Callable[[], object] | None = None,
 ) -> SceneBodies:  # fmt: skip
     """Return bodies of any type as arrays; kinds: index of each body's solid in distinct; check: as for
-    `Solid.prepared`.
-    """
+    `Solid.prepared`."""
     own = [own_box(solid, check) for solid in distinct]
     boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
@@ -238,8 +233,7 @@ def _place_bodies(
 
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
     """Return the distinct solids and the index of each body's solid; raise unless `collide` takes all, in one
-    dimension.
-    """
+    dimension."""
     distinct, kinds = distinct_of(bodies)
     for body in distinct:
         try:

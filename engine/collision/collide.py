@@ -52,8 +52,7 @@ PAIRS: dict[tuple[int, str, str], _Functions] = {
     **{(d, body, "sphere"): (collide_body_sphere, body_sphere_parts) for d, body in result.BODIES},
 }
 """Functions of each pair of kinds of solids: relation, and parts outside the other of two that overlap. Key: dimension
-and the kinds of both solids (`Row.meets`), in one order or both.
-"""
+and the kinds of both solids (`Row.meets`), in one order or both."""
 for _d, (_function, _parts) in _BODIES.items():
     PAIRS[_d, "box", "box"] = forms.closed_form_or(_function), _parts
     PAIRS[_d, "box", "sphere"] = forms.closed_form_or(forms.collide_form_sphere), body_sphere_parts
@@ -110,11 +109,8 @@ def posed(given: object, solid: Solid, *where: str | int) -> Pose | None:
 
 
 def collide_pair(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
-    """Return the relation of two checked solids under checked poses, within the budget of `work`.
-
-    Two equal poses are dropped: bodies moved together keep their relation, although rounded rotations stretch lengths a
-    little.
-    """
+    """Return the relation of two checked solids under checked poses, within the budget of `work`. Two equal poses are
+    dropped: bodies moved together keep their relation, although rounded rotations stretch lengths a little."""
     if poses[0] is not None and poses[0] == poses[1]:
         poses = None, None
     function, _, is_swapped = pair_function(first, second)
@@ -344,8 +340,7 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
     """Return the `Rcc8` codes for relations that a batch decided; overlapping is PO, by a crossing or points outside
-    both.
-    """
+    both."""
     return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 

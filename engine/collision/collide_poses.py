@@ -152,8 +152,7 @@ _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
 
 
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
-    """Return the relation under one pose. Two meshes need no `Pose`, whose construction takes as long as the decision.
-    """
+    """Return the relation under one pose. Two meshes need no `Pose`, whose constructor takes as long as deciding."""
     if first.type == "aabb" or first.type == second.type == "sphere":
         motion = poses.rotations[0], poses.translations[0]
         closed_form = relation_closed_form(first, second, motion_of(None, first.dimension), motion, work)
@@ -201,8 +200,7 @@ _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 def batch_of(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None] | None:
-    """Return a task by which kernels fill answers[start:stop], UNSETTLED where they cannot; None if there is no batch.
-    """
+    """Return a task by which kernels fill answers[start:stop], UNSETTLED where they cannot; None if no batch is."""
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses

@@ -40,8 +40,7 @@ N_NUMBERS = 9
 
 WEIGHTS = tuple(weight / 1024 for weight in (16, 25, 31, 38, 4, 11, 13, 22))
 """Weights by which the second interior point is moved toward the farthest vertex in each octant, different on each
-axis.
-"""
+axis."""
 
 _NO_CLAIM = np.inf
 

@@ -47,18 +47,20 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, Int8Array, IntArray, 
 _OUT, _WITHIN = 0, 1
 _POLL_EVERY = 256
 LARGEST_ERROR = 2.0**250
-"""Error bound reached where coordinates are about 2^299; products of four lengths stay finite below it."""
+"""Bound on the error of placed bodies: reached where coordinates are about 2^299; products of four lengths stay finite.
+"""
 
 
 @inline
 def relate_convex(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool, may_be_equal: bool
 ) -> int:
-    """Return the relation of two placed convex bodies where floats prove it, else UNSETTLED (contacts always).
+    """Return the relation code of two placed convex bodies where floats prove it, else UNSETTLED (always for a
+    contact).
 
-    is_boolean: of bodies other than two balls, proven common interior is OVERLAPPING, whether or not one contains the
-    other. may_be_equal: the caller does not ask whether bodies are equal, so two balls of one radius that overlap are
-    OVERLAPPING even about one centre; else that is UNSETTLED.
+    is_boolean: common interior points give OVERLAPPING, even if a body contains the other (but for two balls).
+    may_be_equal: the caller need not tell equal bodies apart, so two overlapping balls of one radius are OVERLAPPING,
+    whatever their centres.
     """
     error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:
@@ -82,10 +84,8 @@ def relate_convex(
 def relation_of_intersecting(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, square: float
 ) -> int:
-    """Return the relation of two bodies whose open interiors intersect, or UNSETTLED.
-
-    square: squared distance of an interior point of each.
-    """
+    """Return the relation code of two bodies whose open interiors intersect, or UNSETTLED. square: squared distance
+    between an interior point of the first and one of the second."""
     error = a.place.error + b.place.error
     first_lies = second_lies = _OUT
     if not exceeds_distance(square, pool.numbers[second, RADIUS], error):
@@ -101,7 +101,8 @@ def relation_of_intersecting(
 
 @inline
 def _relate_balls(distance: float, first_radius: float, second_radius: float, error: float, may_be_equal: bool) -> int:
-    """Return the relation of two balls by the distance of their centres, or UNSETTLED."""
+    """Return the relation code of two balls by the distance of their centres, or UNSETTLED. The distance is off by
+    sqrt(3) e and some u of itself: slack = 2^-40 (distance + radii) + 8 e + 2^-400."""
     both = first_radius + second_radius
     slack = 2.0**-40 * (distance + both) + 8.0 * error + 2.0**-400
     if distance > both + slack:
@@ -117,20 +118,23 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
 
 @merged
 def interior_point(numbers: FloatArray, body: int, f: PlacedBody, which: int) -> Point3:
-    """Return one of the two posed interior points of a body: CENTER or ASIDE."""
+    """Return the image of an interior point of a body; which: CENTER, or ASIDE (off its symmetries)."""
     return placed(Point3(numbers[body, which], numbers[body, which + 1], numbers[body, which + 2]), f.place)
 
 
 @merged
 def exceeds_distance(square: float, distance: float, error: float) -> bool:
-    """Return whether the square of a distance proves that it exceeds another one, which a pose may have stretched."""
+    """Return whether |p - q|^2 = `square` of placed points proves |p - q| > `distance` of a body not placed. A pose
+    stretches lengths by up to 1 + 1.5e-12 < 1 + 2^-30; error: of a coordinate of p - q."""
     limit = distance * (1.0 + 2.0**-30) + 8.0 * error
     return square > limit * limit + 2.0**-900
 
 
 @inline
 def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
-    """Return whether a body lies in the open interior of another: _WITHIN, _OUT (some of it does not) or UNDECIDED."""
+    """Return whether body `inner` lies in the open interior of body `outer`: _WITHIN, _OUT (some point does not) or
+    UNDECIDED. By face, n . a - n . p against slack = (e_n + 1e-11) extent + 8 (e_a + e_b), see the module; square: of
+    the distance between an interior point of each."""
     error = 8.0 * (a.place.error + b.place.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
@@ -149,7 +153,7 @@ def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody,
 
 @inline
 def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
-    """Return the same for a ball, by its centre and the farthest point of the other body."""
+    """Return whether body `a` lies in a ball, by its point farthest from the centre: _WITHIN, _OUT or UNDECIDED."""
     most = 0.0
     for point in range(a.first, a.stop):
         v = minus(placed(point_of(points, point), a.place), center)
@@ -161,7 +165,7 @@ def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius:
 
 @merged
 def _has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
-    """Return whether rows i and j are the same pose; then the two bodies count as unposed."""
+    """Return whether rows i and j are the same pose: the relation is then that of the bodies not moved."""
     for k in range(3):
         for m in range(3):
             if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
@@ -174,10 +178,9 @@ def relate_convex_pairs(
     pool: ConvexArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, is_boolean: bool, may_be_equal: bool,
     relations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows.
-
-    bodies: body of each row, or -1. poses: n_rows, row 0 the identity. Returns early when the flag is set.
-    """
+    """Replace the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows, where floats prove a relation.
+    bodies: index in the pool of each row's body, or -1. poses: of each row; row 0 is the identity. Returns early when
+    the flag is set."""
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
             return
@@ -201,13 +204,13 @@ _GUARD = 2.0**-900
 
 
 class PlacedBody(NamedTuple):
-    """One body of a pool under a pose.
+    """A body of the pool under a pose.
 
     | field | meaning |
     |---|---|
-    | place | placement, its error twice that of `placement.py`: for a difference of two coordinates, and a ball's |
-    | round | radius of a ball, 0.0 for others |
-    | first, stop | range of its vertices |
+    | place | its `Placement`; `error` is twice the bound of `meshes/placement.py`: for a difference of coordinates |
+    | round | radius of a ball, 0.0 for other bodies |
+    | first, stop | range of its vertices in the pool |
     """
 
     place: Placement
@@ -227,7 +230,8 @@ def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> 
 
 @merged
 def support_vertex(points: FloatArray, f: PlacedBody, local: Point3) -> int:
-    """Support mapping: return a vertex (about) farthest along a direction in the body's own coordinates."""
+    """Return the index of a vertex farthest, up to rounding, along a direction in the body's coordinates (support
+    mapping)."""
     best, support = -np.inf, f.first
     for point in range(f.first, f.stop):
         value = dot(point_of(points, point), local)
@@ -238,7 +242,7 @@ def support_vertex(points: FloatArray, f: PlacedBody, local: Point3) -> int:
 
 @inline
 def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
-    """Return max dot(d, p) over all points p of a posed body."""
+    """Return max d . p over all points p of a placed body."""
     local = rotate_back(f.place, d)
     best, other = -np.inf, -np.inf
     for point in range(f.first, f.stop - 1, 2):  # two chains: a maximum waits for the one before
@@ -252,14 +256,14 @@ def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
 
 @inline
 def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
-    """Return whether the first body provably lies below the second one along d."""
+    """Return whether max d . a < min d . b is proven, with d times vertices off by 1.1 |d|_1 error for either body."""
     size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(support_value(points, a, d) + support_value(points, b, negative(d)))
     return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
 
 
 @inline
 def tetrahedron_contains_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
-    """Return whether the origin is strictly inside the tetrahedron of exact points within `error` of these."""
+    """Return whether the origin is strictly inside the tetrahedron abcd for all corners within `error` of these."""
     m = max(largest_of(a), largest_of(b), largest_of(c), largest_of(d))
     bc, ad = cross(b, c), cross(a, d)
     size_ab, size_ac, size_ad = _size(cross(a, b)), _size(cross(a, c)), _size(ad)
@@ -281,11 +285,9 @@ def _size(a: Point3) -> float:
 
 @inline
 def refine_portal(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
-    """Minkowski portal refinement: return APART, MEETING (the open interiors intersect) or UNSETTLED.
-
-    v0: a point of M, preferably off its symmetry. Stages 0 and 1 choose two corners, 2 a third so that the ray from v0
-    to the origin passes between them, 3 moves the portal outward.
-    """
+    """Minkowski portal refinement: return APART, MEETING (the open interiors intersect) or UNSETTLED. v0: a point a - b
+    of the Minkowski difference, off its symmetries. Stages 0 and 1 choose two corners of the portal, 2 a third so that
+    the ray from v0 through the origin passes between them, 3 moves the portal outward."""
     error, rounding = a.place.error + b.place.error, a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0
     stage = 0

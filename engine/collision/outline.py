@@ -114,8 +114,7 @@ def _scale_divisor(outlines: list[Outline]) -> int:
 
 
 def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
-    """Return the exact ends of the parts of edges that even-odd does not cancel: the interior is on exactly one side.
-    """
+    """Return the exact ends of the parts of edges that even-odd does not cancel: the interior is on one side only."""
     arrangement, _ = arrange_outlines([outline], budget)
     live, down = [edge for edge, mask in enumerate(arrangement.masks) if mask], _scale_divisor([outline])
 
@@ -155,8 +154,7 @@ def single_points(outline: Outline) -> list[int]:
 
 def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
     """Return as `relate_placed`; UNSETTLED for large bodies, and for intersecting bodies with boundaries that are not
-    simple.
-    """
+    simple."""
     one, other = batch.outline_arrays(first), batch.outline_arrays(second)
     if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
         return UNSETTLED, 0, -1, -1, batch.APART
@@ -195,8 +193,7 @@ FIRST, SECOND, BOTH = 1, 2, 3
 def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the exact relation of two planar bodies by their arrangement. Bodies are closed sets under even-odd; an
     edge that cancels is still boundary, without interior next to it. A body without interior (zero area, doubled rings)
-    never overlaps.
-    """
+    never overlaps."""
     a, b = outline_of(first, poses[0], work.budget), outline_of(second, poses[1], work.budget)
     if (a.low.min(0) > b.high.max(0)).any() or (b.low.min(0) > a.high.max(0)).any():
         return result.NO_CONTACT
@@ -218,8 +215,7 @@ def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, wo
 
 class _MutualLocations(NamedTuple):
     """Labels of faces (FIRST | SECOND); whether boundaries meet; for each body, by edge and isolated point, whether it
-    lies in the other's open interior.
-    """
+    lies in the other's open interior."""
 
     labels: list[int]
     meet: bool

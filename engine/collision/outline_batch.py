@@ -102,8 +102,7 @@ def _arrays(vertices: FloatArray, offsets: IntArray) -> tuple[FloatArray, IntArr
 def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> None:
     """Fill sides (n,) int8: 1 if the interior is left of an edge, -1 right, 0 if coordinates are out of range. Caller
     guarantees edges that meet only in vertices. At the lexicographically smallest vertex of a ring the outside of that
-    ring is on the left; each enclosing ring flips the side.
-    """
+    ring is on the left; each enclosing ring flips the side."""
     for vertex in range(len(vertices)):
         for k in range(2):
             size = abs(vertices[vertex, k])
@@ -133,8 +132,7 @@ def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> N
 @inline
 def _classify_edges(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
     """Return CROSSING if open edges ab and cd provably cross in one point, APART, the kind of contact, or UNSURE.
-    error: of each coordinate.
-    """
+    error: of each coordinate."""
     slack = 2.0 * error
     if max(a.x, b.x) + slack < min(c.x, d.x) or max(c.x, d.x) + slack < min(a.x, b.x):
         return APART
@@ -246,8 +244,7 @@ def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -
 @inline
 def _rings_inside(points: FloatArray, following: IntArray, vertices: FloatArray, theirs: IntArray, error: float) -> int:
     """Return the locations of one body's rings in another body as bits _IN, _OUT, _MAYBE. Rings that meet an edge of
-    the other body add no bit.
-    """
+    the other body add no bit."""
     bits = 0
     for vertex in range(len(following)):
         if following[vertex] > vertex:  # not the last of its ring
@@ -265,8 +262,7 @@ def relate_placed(
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
     """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1; and
     their class. For bodies that are not simple the relation only says whether they meet. sides: empty if that suffices.
-    boxes: of the second body's blocks. error: of each coordinate.
-    """
+    boxes: of the second body's blocks. error: of each coordinate."""
     is_unsure, bits, first, second, kind = False, 0, -1, -1, APART
     for edge in range(len(following)):
         a, b = as_point2(points, edge), as_point2(points, following[edge])
@@ -312,8 +308,7 @@ def relate_outline_pairs(
     flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows; returns early when the flag is set.
-    bodies: body of each row, or -1. has_detail: overlaps other than PO stay UNSETTLED.
-    """
+    bodies: body of each row, or -1. has_detail: overlaps other than PO stay UNSETTLED."""
     placed, others = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2))
     boxes = np.empty((n_blocks(MOST_EDGES), 4))
     r, t = poses.rotations, poses.translations
@@ -353,8 +348,7 @@ def is_simple_body(solid: Solid) -> bool:
 
 IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST = 1, 2, 4
 """Bits of two bodies: IN_BOTH, the open interiors intersect; OUT_OF_SECOND, a part of the first is outside the second;
-OUT_OF_FIRST, vice versa.
-"""
+OUT_OF_FIRST, vice versa."""
 
 
 @inline
@@ -366,8 +360,7 @@ def is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
 @inline
 def _is_in_sector(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
     """Return whether the direction from p to x lies in the half-open sector from s (included) counter-clockwise to e
-    (excluded).
-    """
+    (excluded)."""
     by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
     if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
         if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
@@ -386,8 +379,7 @@ def _sectors_intersect(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) ->
 @inline
 def _sector_bits(p: Point2, before: Point2, after: Point2, side: int, c: Point2, d: Point2, their_side: int) -> int:
     """Return the bits IN_BOTH, ... at a point p of two boundaries. before, after: neighbours of p on one boundary; c,
-    d: on the other. side: 1 if the interior is on the left.
-    """
+    d: on the other. side: 1 if the interior is on the left."""
     s, e = (after, before) if side > 0 else (before, after)
     t, f = (d, c) if their_side > 0 else (c, d)
     bits = IN_BOTH if _sectors_intersect(p, s, e, t, f) else 0

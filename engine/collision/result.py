@@ -126,8 +126,7 @@ OVERLAP, TOUCH = Collision(Relation.OVERLAPPING, Witness("surface")), Collision(
 
 class Parts(NamedTuple):
     """Which of two overlapping bodies has a part outside the other. first, second: whether that body's open interior
-    has points outside the other. meet: whether the boundaries meet.
-    """
+    has points outside the other. meet: whether the boundaries meet."""
 
     first: bool
     second: bool

@@ -55,8 +55,7 @@ def are_boxes_apart(t: Facet, u: Facet) -> bool:
 @merged
 def against_edge(p: Point2, q: Point2, u: Facet) -> int:
     """Return the relation of triangle u to the closed half-plane left of the line p q. DISJOINT: u is strictly right;
-    SECOND_INSIDE_FIRST: strictly left; TOUCHING: right and on it; OVERLAPPING; UNSETTLED.
-    """
+    SECOND_INSIDE_FIRST: strictly left; TOUCHING: right and on it; OVERLAPPING; UNSETTLED."""
     a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
     if max(a, b, c) == UNDECIDED:
         return UNSETTLED
@@ -70,8 +69,7 @@ def against_edge(p: Point2, q: Point2, u: Facet) -> int:
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
     """Return the relation of triangle u to t by the lines of t's edges alone, or UNSETTLED. DISJOINT and
-    SECOND_INSIDE_FIRST are final; TOUCHING: the interiors are disjoint; OVERLAPPING: no edge of t separates.
-    """
+    SECOND_INSIDE_FIRST are final; TOUCHING: the interiors are disjoint; OVERLAPPING: no edge of t separates."""
     first = against_edge(t.p, t.q, u)
     if first in (UNSETTLED, DISJOINT):
         return first

@@ -163,8 +163,7 @@ def do_meet(first: Solid, second: Solid, poses: Poses, budget: Budget) -> bool:
 
 def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
     """Return the clearance of two bodies or, given `least`, whether it is at least that: by closed forms, planes, or a
-    search.
-    """
+    search."""
     if least == 0.0:
         return True
     planes = has_plane(first, second)
@@ -282,8 +281,7 @@ class _Batch:
 
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
         """Fill answers[start:stop], NaN on entry, with the distances under these poses; threads may fill different
-        ranges. least: then 0.0 for nearer bodies, infinity for others, instead of distances.
-        """
+        ranges. least: then 0.0 for nearer bodies, infinity for others, instead of distances."""
         if self.relate is not None and not self.is_small:
             self.relate(start, stop)
         if self.is_small:

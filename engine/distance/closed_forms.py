@@ -80,8 +80,7 @@ def product(a: float, b: float) -> Wide:
 @inline
 def root(a: Wide) -> Wide:
     """Return the square root of a positive double-double, within 4 u^2 of itself plus half the relative error of a.
-    With h the rounded root, sqrt(a) = h + (a - h^2) / 2h + O((u h)^2 / 2h); a - h^2 is < 2.1 u h^2, rounded twice.
-    """
+    With h the rounded root, sqrt(a) = h + (a - h^2) / 2h + O((u h)^2 / 2h); a - h^2 is < 2.1 u h^2, rounded twice."""
     h = np.sqrt(a.h)
     p, e = two_prod(h, h)
     return Wide(*fast_two_sum(h, ((a.h - p) - e + a.low) / (2.0 * h)))
@@ -172,8 +171,7 @@ def _wide(w: Any, at: int) -> Wide:
 def _place(form: FloatArray, turn: FloatArray, move: FloatArray, w: Any, first: int) -> float:
     """Write low and high bound of each axis of a posed box or ball centre to w[first:]; return a bound on their error.
     Infinite for a rotated box and out of range. A rotated coordinate is three exact products and three sums, each off
-    by 4 u^2 of all terms.
-    """
+    by 4 u^2 of all terms."""
     d, is_turned, size = move.shape[0], False, 0.0
     for k in range(d):
         for m in range(d):
@@ -202,8 +200,7 @@ def gap_of_forms(
 ) -> tuple[float, int, int, Wide, float]:  # fmt: skip
     """Return the distance of two posed boxes or balls, the faces of both with nearest points, distance of the boxes or
     centres alone as a double-double, and its error bound. Distance: 0.0 if they provably meet, or UNSURE. Faces: bits 2
-    axis + side. w (30,): receives the bounds of both bodies, then the gap on each axis.
-    """
+    axis + side. w (30,): receives the bounds of both bodies, then the gap on each axis."""
     d, error = move.shape[0], _place(form, turn, move, w, 0) + _place(other, their_turn, their_move, w, 12)
     faces = theirs = free = n_apart = 0
     square, rest = Wide(0.0, 0.0), Wide(0.0, 0.0)
@@ -251,8 +248,7 @@ def nearest_of_forms(
     their_move: FloatArray, points: FloatArray,
 ) -> tuple[float, int, int]:  # fmt: skip
     """Return distance and faces as `gap_of_forms`, and fill points (2, d) with nearest points; faces -1: points not
-    proven.
-    """
+    proven."""
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:

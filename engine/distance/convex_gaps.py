@@ -55,8 +55,7 @@ class Simplex(NamedTuple):
 
 @inline
 def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
-    """Return the barycentric weights of the point of triangle a b c, maybe degenerate, that is nearest to the origin.
-    """
+    """Return the barycentric weights of the point of triangle a b c, maybe degenerate, nearest to the origin."""
     u, v = minus(b, a), minus(c, a)
     ua, va, ub, vb, uc, vc = -dot(u, a), -dot(v, a), -dot(u, b), -dot(v, b), -dot(u, c), -dot(v, c)
     if ua <= 0.0 and va <= 0.0:
@@ -84,8 +83,7 @@ def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
 @inline
 def _add_corner(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
     """Reduce a simplex and a new corner to the sub-simplex that contains its point nearest to the origin; return that
-    point too.
-    """
+    point too."""
     best, reduced, nearest = np.inf, s, new.at
     for turn in range(3):
         p, q = (s.b if turn == 2 else s.a), (s.b if turn == 0 else s.c)
@@ -114,8 +112,7 @@ def _support_corner(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3)
 @merged
 def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: float) -> float:
     """Return a lower bound on the distance of two bodies without their radii: the width of the slab between them across
-    v. error: of a placed point, both bodies together.
-    """
+    v. error: of a placed point, both bodies together."""
     d = negative(v)
     size = abs(d.x) + abs(d.y) + abs(d.z)
     gap = -(support_value(pool.points, a, d) + support_value(pool.points, b, v)) - 2.25 * error * size
@@ -126,8 +123,7 @@ def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: fl
 def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, gap: float,
                   is_measured: bool) -> float:  # fmt: skip
     """Return the distance of two convex bodies, infinity if it is at least `gap`, NaN if unproven. is_measured: if
-    False, return 0.0 for a distance below `gap`.
-    """
+    False, return 0.0 for a distance below `gap`."""
     error = a.place.error + b.place.error
     v = minus(interior_point(pool.numbers, first, a, CENTER), interior_point(pool.numbers, second, b, ASIDE))
     corner, along = _support_corner(pool, a, b, v)
@@ -166,8 +162,7 @@ def _dual(pool: ConvexArrays, f: PlacedBody, vertex: int, shift: Wide3) -> Wide3
 @called
 def _certified_distance(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach: float) -> float:
     """Return the double nearest to the distance, measured between the features that simplex s names; NaN if unproven.
-    reach: bound on coordinates relative to the first body.
-    """
+    reach: bound on coordinates relative to the first body."""
     origin, p, q = Wide(0.0, 0.0), a.place.shift, b.place.shift
     here = Wide3(origin, origin, origin)
     there = Wide3(Wide(*two_diff(q.x, p.x)), Wide(*two_diff(q.y, p.y)), Wide(*two_diff(q.z, p.z)))
@@ -191,8 +186,7 @@ def _certified_distance(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: Placed
 
 @inline
 def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
-    """Return three vertices of a body, distinct ones first, and the code of the feature that they span: 0, 3 or FACE.
-    """
+    """Return three vertices of a body, distinct ones first, and the code of the feature they span: 0, 3 or FACE."""
     if i == j:
         j, k = k, j
     if i == j:
@@ -203,8 +197,7 @@ def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
 @merged
 def _excess_beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wide3, reach: float) -> float:
     """Return max(0, dot(n, x - base)) over the vertices x of a body, without those that floats prove to lie behind the
-    plane.
-    """
+    plane."""
     d, most = Point3(n.x.h, n.y.h, n.z.h), 0.0
     local = rotate_back(f.place, d)
     level = d.x * (base.x.h - shift.x.h) + d.y * (base.y.h - shift.y.h) + d.z * (base.z.h - shift.z.h)
@@ -222,8 +215,7 @@ def gaps_of_pairs(
 ) -> None:  # fmt: skip
     """Fill distances (n,) of disjoint pairs as of `gap_of_convex`, NaN if unproven; returns early when the flag is set.
     kinds (n, 2): the solids of each pair; forms (n_solids, 8): their boxes or balls, NaN for other solids; bodies
-    (n_solids,): their index in the pool, or -1; places (n, 2): rows of the poses, 0 for none.
-    """
+    (n_solids,): their index in the pool, or -1; places (n, 2): rows of the poses, 0 for none."""
     w = workspace(30)
     for item in range(places.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:

@@ -69,8 +69,7 @@ class ScaledGap(NamedTuple):
     def distance(self) -> float:
         """Return the double nearest to the distance; the smallest denormal instead of 0. Times scale the distance is
         sqrt(top / bottom) - radii = (sqrt(top bottom) - radii bottom) / bottom. Raises: NotRepresentableError beyond
-        the largest double.
-        """
+        the largest double."""
         top, bottom = self.gap.top, self.gap.bottom
         try:
             return nearest_with_root(-sum(self.radii) * bottom, 1, top * bottom, bottom * self.scale) or _SMALLEST
@@ -86,8 +85,7 @@ class ScaledGap(NamedTuple):
 
     def _toward(self, p: Rational, q: Rational, radius: int) -> list[float]:
         """Return the doubles nearest to the point at distance `radius` from p toward q: p + radius (q - p) / |q - p|.
-        With n, q - p times both denominators, that is p + radius n / sqrt(top).
-        """
+        With n, q - p times both denominators, that is p + radius n / sqrt(top)."""
         if not radius:
             return [nearest(x, p.denominator * self.scale) for x in p.numerators]
         n = (y * p.denominator - x * q.denominator for x, y in zip(p.numerators, q.numerators))
@@ -148,8 +146,7 @@ def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
 
 def _project(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
     """Return the foot of a point on a feature of a triangle, and the code of the feature that it lies on; None if
-    outside.
-    """
+    outside."""
     if feature < 3:
         return Rational(t[feature], 1), feature
     if feature < FACE:
@@ -183,8 +180,7 @@ def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] 
 
 def _edges(s: Corners, i: int, t: Corners, j: int) -> Gap | None:
     """Return the gap across edge i of s and edge j of t, None if its ends lie outside them. None also for parallel
-    edges: then the gap at an end of one is as small.
-    """
+    edges: then the gap at an end of one is as small."""
     u, v, w = minus(s[(i + 1) % 3], s[i]), minus(t[(j + 1) % 3], t[j]), minus(s[i], t[j])
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     size = uu * vv - uv * uv

@@ -31,8 +31,7 @@ from engine.types import FloatArray
 
 _MOST_PAIRS: Final = 1 << 18
 """Largest number of pairs of edges of two outlines of which all are tested: some milliseconds if no boxes separate
-them.
-"""
+them."""
 _NONE: Final = np.empty(0)
 PLANE: Final = Feature("plane")
 MEETING: Final = Clearance(0.0)
@@ -57,8 +56,7 @@ FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 
 
 def _gap_from_closed_form(distance: float, least: float | None) -> Clearance | bool | None:
     """Return the answer if a rounded distance decides it, else None. With `least`: whether the distance is at least
-    that; else MEETING for distance 0.
-    """
+    that; else MEETING for distance 0."""
     if least is not None and distance not in (UNSURE, least):
         return bool(distance > least)
     return MEETING if distance == 0.0 else None
@@ -66,8 +64,7 @@ def _gap_from_closed_form(distance: float, least: float | None) -> Clearance | b
 
 def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
     """Return the clearance of two boxes, balls or small planar bodies; given `least`, whether it is at least that; None
-    if unproven.
-    """
+    if unproven."""
     d, (pose, their_pose) = first.dimension, poses
     if first.type in FORMS and second.type in FORMS:
         form, other = form_of(first), form_of(second)
@@ -120,8 +117,7 @@ def distances_under_poses(
     first: Solid, second: Solid, motions: Sequence[FloatArray], least: Fraction | None, budget: Budget
 ) -> FloatArray:
     """Return the distances of two small planar bodies under poses, NaN if unproven. least: then 0.0 for nearer bodies
-    and infinity for others. motions: rotations and translations of each body, read-only.
-    """
+    and infinity for others. motions: rotations and translations of each body, read-only."""
     turns, moves, their_turns, their_moves = motions
     distances = np.empty(len(their_turns))
     entry_of(nearest_under_poses)(

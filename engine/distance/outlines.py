@@ -32,8 +32,7 @@ _LEAST_FACTOR: Final = 2.0**-300
 
 class Look(NamedTuple):
     """State of a scan for candidates in doubles: rows in `near`, least squared distance, largest squared distance of a
-    candidate, and error bound of distances.
-    """
+    candidate, and error bound of distances."""
 
     n: int
     least: float
@@ -62,8 +61,7 @@ def line_of(other: Placed, edge: int) -> Line:
 def way_to(p: Point2, line: Line) -> Point2:
     """Return p minus the nearest point of an edge, in doubles. error: less than 2^-47 of all coordinates. The foot is a
     point of the edge, displaced along it by 2^-50 of all coordinates over the length times the distance, or by at most
-    the length; the lesser displacement is below the bound.
-    """
+    the length; the lesser displacement is below the bound."""
     wx, wy = p.x - line.a.x, p.y - line.a.y
     share = min(max((line.u.x * wx + line.u.y * wy) * line.share, 0.0), 1.0)
     return Point2(wx - share * line.u.x, wy - share * line.u.y)
@@ -120,8 +118,7 @@ def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float
 
 @inline
 def look_for(a: Placed, b: Placed, near: Any) -> Look:
-    """Write the candidate pairs of vertex and edge to `near`, nearest blocks first; more than MOST_NEAR rows: too many.
-    """
+    """Write the candidate pairs of vertex and edge to `near`, nearest blocks first; more than MOST_NEAR: too many."""
     least, first, second = np.inf, 0, 0
     for i in range(len(a.boxes)):
         for j in range(len(b.boxes)):
@@ -153,8 +150,7 @@ def _least_face(following: IntArray, vertex: int) -> int:
 @inline
 def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tuple[VertexEdge, bool]:
     """Return the distance of a vertex of `a` from an edge of `b`, and whether the position of the foot is proven.
-    is_first: whether `a` is the first body.
-    """
+    is_first: whether `a` is the first body."""
     end = b.following[edge]
     p, c, d = point(a.points, vertex), point(b.points, edge), point(b.points, end)
     distance, bound, where = measure(p, c, d, a.error + b.error)
@@ -177,8 +173,7 @@ def _offset_between(a: Placed, b: Placed, pair: VertexEdge) -> Wide2:
 def _are_tied(a: Placed, b: Placed, one: VertexEdge, two: VertexEdge) -> bool:
     """Return whether two pairs of vertex and edge are provably at equal distances. True if all four ends are vertices,
     with equal offsets on each axis; or both feet lie within one edge, their vertices on a parallel of it; or within two
-    parallel edges that end in the vertices.
-    """
+    parallel edges that end in the vertices."""
     n, m = len(a.following), len(b.following)
     if a.error + b.error > 0.0:
         return False
@@ -214,8 +209,7 @@ def _rank(pair: VertexEdge) -> tuple[int, int, int, int]:
 @inline
 def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, bool]:
     """Return the nearest of the n candidates, ties by the lowest faces; a bound on how much nearer another may be; and
-    whether it is proven unique.
-    """
+    whether it is proven unique."""
     none, is_proven = Wide(np.inf, 0.0), True
     best, rival = VertexEdge(none, 0.0, True, -1, -1, 0, 0), none
     for row in range(n):
@@ -256,8 +250,7 @@ _POLL_EVERY: Final = 16
 @inline
 def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
     """Return whether the line perpendicular to the connection of a vertex and an edge provably separates two bodies.
-    error: for a direction n a product dot(n, x) is off by less than 8 u |n| of the largest coordinate.
-    """
+    error: for a direction n a product dot(n, x) is off by less than 8 u |n| of the largest coordinate."""
     way, low, high = way_to(as_point2(own.points, vertex), line_of(other, edge)), np.inf, -np.inf
     for vertex in range(len(own.following)):
         low = min(low, way.x * own.points[vertex, 0] + way.y * own.points[vertex, 1])
@@ -299,8 +292,7 @@ def _write_offset_point(
     at: Wide2, error: float, errors: float, pair: VertexEdge, way: Wide2, radius: float, points: FloatArray, end: int
 ) -> bool:
     """Write at + radius way / |way| to points[end]; return whether both coordinates are correctly rounded. error: of
-    the point `at`; errors: of both ends of the connection together. way: toward the other end.
-    """
+    the point `at`; errors: of both ends of the connection together. way: toward the other end."""
     is_proven = True
     for k in range(2):
         x, bound = (at.x if k == 0 else at.y), error
@@ -316,8 +308,7 @@ def _write_offset_point(
 def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray) -> tuple[float, int, int]:
     """Return the distance of two bodies with radii, and the features of their nearest points, which fill points (2, 2).
     Distance: 0.0 if they provably meet, or UNSURE. Feature: the vertex, or the number of vertices + the edge; -1 if
-    unproven. A ball is one vertex and a radius.
-    """
+    unproven. A ball is one vertex and a radius."""
     near = workspace(ROOM)
     look = look_for(a, b, near)
     are_apart = _are_apart(a, b, near, look)
@@ -358,8 +349,7 @@ def nearest_under_poses(
     distances: FloatArray, points: FloatArray, flag: FlagArray,
 ) -> tuple[float, int, int]:  # fmt: skip
     """Fill distances with the distance under each pose of the second body, unless empty; return `_nearest` of the last
-    pose. The first body has as many poses as the second, or one. Stops early when the flag is set.
-    """
+    pose. The first body has as many poses as the second, or one. Stops early when the flag is set."""
     n, m, k = len(following), len(their_following), _n_rows(following)
     room = np.empty((k + _n_rows(their_following), 4))
     at, boxes, their_at, their_boxes = room[:n], room[n:k], room[k : k + m], room[k + m :]

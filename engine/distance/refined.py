@@ -59,19 +59,15 @@ class View(NamedTuple):
 
 Heap = namedtuple("Heap", "bounds lanes")
 """Priority queue of pairs of boxes, least bound first: bounds (room,), and lanes (room, 2) int64, 8 node + lane or
-ROOT.
-"""
+ROOT."""
 
 Candidates = namedtuple("Candidates", "pairs bounds")
 """Candidate pairs of triangles: pairs (room, 4) int64, two triangles and a feature code of each; bounds (room,)
-float64, lower bounds on their distances.
-"""
+float64, lower bounds on their distances."""
 
 Room = namedtuple("Room", "heap candidates limits points frames work fixed")
-"""Work space of searches, one at a time.
-
-limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames, work, fixed: of `lanes/faces.py`.
-"""
+"""Work space of searches, one at a time. limits (2,): of a search (traversal.py). points (2, 3): the nearest. frames,
+work, fixed: of `lanes/faces.py`."""
 
 
 def new_room(room: int) -> Room:
@@ -138,8 +134,7 @@ def corner_of(place: Placement, p: Point3, shift: Wide3) -> Wide3:
 
 @inline
 def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
-    """Return the corners of a triangle under its placement in double-doubles, with `shift` in place of the translation.
-    """
+    """Return the corners of a triangle under its placement in double-doubles, with `shift` as the translation."""
     t = triangle_of(view.mesh, triangle)
     p, q = corner_of(view.place, scaled(t.p, view.unit), shift), corner_of(view.place, scaled(t.q, view.unit), shift)
     return Facet(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
@@ -162,8 +157,7 @@ def _reach(u: Wide3) -> float:
 def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
     """Return the point of a feature of t (vertex, edge, FACE) closest to a point, a margin and an error amplification.
     If the foot lies outside the feature, some other point of it. Margin: weights times their denominator, the smallest.
-    Amplification: lengths of the edges over the denominator. Both in the units of the module's table.
-    """
+    Amplification: lengths of the edges over the denominator. Both in the units of the module's table."""
     if feature < 3:
         return corner(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
@@ -187,8 +181,7 @@ def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, fl
 
 @called
 def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
-    """Return the closest points of a feature of s and one of t, margin and amplification as of `_closest_on_feature`.
-    """
+    """Return the closest points of a feature of s and one of t, margin and amplification as `_closest_on_feature`."""
     if second < 3:
         q = corner(t, second)
         p, inside, steepness = _closest_on_feature(q, s, first)
@@ -215,8 +208,7 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 @called
 def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
-    """Return the distance of the closest points of two features, and a bound on how much nearer the triangles may be.
-    """
+    """Return the distance of the closest points of two features, and a bound on how much nearer triangles may be."""
     p, q, _, _ = ends_of(s, t, first, second)
     n = less3(q, p)
     square = dot3(n, n)
@@ -251,8 +243,7 @@ def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
 def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int) -> tuple[float, int]:
     """Bound n candidates in double-doubles and remove those that cannot be nearest; return the distance and the new n.
     Distance: the nearest double, -1.0 if unproven. start, other: the translations of both bodies (3,). radii: of the
-    balls about their triangles, times the unit.
-    """
+    balls about their triangles, times the unit."""
     candidates, unit = s.room.candidates, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
     shift = shift_of(s, start, other)
@@ -278,8 +269,7 @@ _SLACK: Final = 2.0**-86
 @inline
 def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3,
                slack: float) -> bool:  # fmt: skip
-    """Return whether all corners of a triangle but those `known` lie strictly behind the plane through base across n.
-    """
+    """Return whether all corners of a triangle but those `known` lie strictly behind the plane at base across n."""
     for k in range(3):
         if view.mesh.triangles[triangle, k] in known:
             continue
@@ -294,8 +284,7 @@ def _write_offset_point(
     point: FloatArray,
 ) -> bool:  # fmt: skip
     """Write p + start, moved by radius along n, to point (d,); return whether it is correctly rounded. known: the
-    vertices of the feature that p lies on. error: of p.
-    """
+    vertices of the feature that p lies on. error: of p."""
     size, is_proven, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
     is_given = radius == 0.0 and not view.place.is_posed
@@ -317,8 +306,7 @@ def certify(
     s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int, points: FloatArray
 ) -> bool:
     """Fill points (2, d) with the nearest points of two bodies, and move their candidate to row 0, ties by the lowest
-    faces. Returns False if the n candidates do not prove the points. Other arguments as of `refine`.
-    """
+    faces. Returns False if the n candidates do not prove the points. Other arguments as of `refine`."""
     pairs, best = s.room.candidates.pairs, 0
     faces, their_faces = s.a.mesh.faces, s.b.mesh.faces
     here, there = named(s.a, pairs[0, 0], pairs[0, 2]), named(s.b, pairs[0, 1], pairs[0, 3])

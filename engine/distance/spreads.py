@@ -87,8 +87,7 @@ class SpreadPair:
 
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
         """Fill the NaN entries of answers[start:stop] with the distances under these poses; the triangles do not meet.
-        least: then 0.0 for nearer bodies, infinity for others.
-        """
+        least: then 0.0 for nearer bodies, infinity for others."""
         limits = (np.inf, -1.0) if least is None else _around(least + sum(map(Fraction, self._radii)))
         for _, item, pairs in self._unanswered(start, stop, answers, Query(*limits, *self._radii, self._reach, False)):
             gap, _ = self._least(item, pairs)
@@ -98,8 +97,7 @@ class SpreadPair:
         self, start: int, stop: int, answers: FloatArray, query: Query
     ) -> Iterator[tuple[int, int, Iterable[Sequence[int]]]]:
         """Yield (outcome, pose, candidates) for each pose that the search in floats does not answer; the consumer fills
-        the answer. Candidates: rows of two triangles and a feature code of each.
-        """
+        the answer. Candidates: rows of two triangles and a feature code of each."""
         (a, b), (own, poses) = self.meshes, self.poses
         while True:  # bound: an answer is filled, or the room doubles
             start, how, n = entry_of(find_nearest)(
@@ -118,8 +116,7 @@ class SpreadPair:
 
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the smallest gap of the candidates of pose `item`, ties by the lowest faces, and its two triangles;
-        exact.
-        """
+        exact."""
         self.n_exact += 1
         (a, b), (own, poses) = self.meshes, self.poses
         placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
@@ -226,8 +223,7 @@ Outline = tuple[FloatArray, IntArray, float, "_Names"]
 
 def outline_of(solid: Solid) -> Outline:
     """Return vertices (n, d), the end vertex of each edge, the radius, and the features of vertices, then edges;
-    cached. A ball is one vertex with a radius.
-    """
+    cached. A ball is one vertex with a radius."""
     cached: Outline | None = solid.cached("outline and names")
     return solid.prepared("outline and names", lambda: _outline(solid)) if cached is None else cached
 

@@ -36,8 +36,7 @@ from engine.types import FlagArray, Float32Array, FloatArray
 @inline
 def load_lane(view: View, at: int, fixed: Float32Array) -> None:
     """Write box (6 rows) and disc (8 rows) of child at = 8 node + lane to column 0 of `fixed`; ROOT: around the whole
-    tree.
-    """
+    tree."""
     if at == ROOT:
         for row in range(FIXED_ROWS):
             fixed[row, 0] = 4.0 if row > 11 else (2.0 if 3 <= row < 6 else (1.0 if row == 9 else 0.0))
@@ -59,8 +58,7 @@ FULL: Final = 1
 CLOSER: Final = 2
 INTERRUPTED: Final = 3
 """Outcomes of a search: DONE, all pairs seen; FULL, no room for more pairs; CLOSER, two points nearer than the limit;
-INTERRUPTED, the flag was set.
-"""
+INTERRUPTED, the flag was set."""
 _ABOVE_ONE: Final = 1.0 + 2.0**-22
 
 
@@ -75,8 +73,7 @@ def _triangle(view: View, item: int) -> Facet:
 def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, tuple[int, int]]:
     """Return a lower and an upper bound on the distance of two triangles, and the feature codes of nearly nearest
     points. error: bound on the rounding of points, both bodies together. If the lower bound is above `most`, features
-    are arbitrary.
-    """
+    are arbitrary."""
     origin = s.p
     s, t = relative_to(origin, s), relative_to(origin, t)
     slack = rounding_bound(s, t) + error
@@ -87,8 +84,7 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
 @merged
 def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatArray) -> tuple[int, int]:
     """Append the candidate pairs of triangles of leaf blocks i and j; return the outcome and the number of candidates.
-    limits: as of the module; the first falls to the least upper bound.
-    """
+    limits: as of the module; the first falls to the least upper bound."""
     frames, work, candidates, per_size = s.room.frames, s.room.work, s.room.candidates, _ABOVE_ONE / size_of(s.a)
     place_triangles(s.b.mesh.blocks, j, frames, work)
     for k in range(LANES):
@@ -130,8 +126,7 @@ _LARGEST: Final = 1e300
 class Query(NamedTuple):
     """Goal of a search. most: distances of triangles up to it count. enough: a distance below it ends the search.
     radius, other_radius: of balls about the triangles. reach: bound on sums of coordinates. is_answered: return
-    candidates of proven answers too.
-    """
+    candidates of proven answers too."""
 
     most: float
     enough: float
@@ -172,8 +167,7 @@ def drop_first(heap: Heap, n: int) -> None:
 def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
     """Push the pairs of one box with each child of a node of the other body; return the size of the heap. pair: the
     node, the child (8 node + lane, or ROOT) of the other body, whether the node is the first body's. most: pairs with a
-    greater bound are dropped.
-    """
+    greater bound are dropped."""
     node, other, is_first = pair
     view, fixed, own = (s.a, s.b, 0) if is_first else (s.b, s.a, 1)
     unit, their_unit = size_of(view), size_of(fixed)

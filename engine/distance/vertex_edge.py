@@ -63,8 +63,7 @@ def place(
     vertices: FloatArray, following: IntArray, turn: FloatArray, move: FloatArray, points: FloatArray, boxes: FloatArray
 ) -> tuple[float, float]:
     """Write the points and boxes of an outline under a pose; return `error` and `reach` of `Placed`. Each sum of three
-    is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles unchanged.
-    """
+    is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles unchanged."""
     reach, is_given = 0.0, True
     for k in range(2):
         reach = max(reach, abs(move[k]))
@@ -172,8 +171,7 @@ def _is_level(u: Wide2, error: float) -> bool:
 @called
 def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, int]:
     """Return the distance of p from segment ab, its error bound, and where p's foot lies: 0 at a, 1 at b, 2 between, -1
-    unproven. error: of the coordinates of both bodies together.
-    """
+    unproven. error: of the coordinates of both bodies together."""
     u, w, v = minus2(b, a), minus2(p, a), minus2(b, p)
     is_level = _is_level(u, error)
     if is_level:
@@ -199,8 +197,7 @@ def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, in
 @inline
 def foot_of(own: Placed, other: Placed, vertex: int, feature: int) -> tuple[Wide2, float]:
     """Return the point of `other` nearest to a vertex, on a feature known to contain it, and the point's error bound.
-    feature: a vertex, or number of vertices + edge.
-    """
+    feature: a vertex, or number of vertices + edge."""
     n, p, error = len(other.following), point(own.points, vertex), own.error + other.error
     if feature < n:
         return point(other.points, feature), other.error

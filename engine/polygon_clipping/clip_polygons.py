@@ -95,8 +95,7 @@ _FEW: Final = 3072
 """Most coordinates of a batch that is clipped at once: planning chunks would take longer."""
 _USUAL: Final = (2.0**-100, 2.0**120)
 """Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
-root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does.
-"""
+root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
 
 
@@ -217,8 +216,7 @@ def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> Clipp
 
 def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
     """Return ring offsets and polygon offsets of n polygons of one ring of `size` vertices; read-only, as kernels
-    expect.
-    """
+    expect."""
     numbers = np.arange(n + 1)
     return read_only(size * numbers), read_only(numbers)
 
@@ -254,8 +252,7 @@ class Batch(NamedTuple):
 def as_contours(polygons: Any, dimension: int) -> Contours:
     """Return the rings of all polygons of a call: an array (one ring a polygon), polygons, lists of rings, or GeoJSON.
     An array is not copied. No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring
-    without vertices; InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element.
-    """
+    without vertices; InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element."""
     if isinstance(polygons, np.ndarray):
         array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
         n, size = array.shape[:2]
@@ -362,8 +359,7 @@ def _clip(
     contours: Contours, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ClippedPolygons, int, int]:
     """Clip every polygon; return the result, the number of polygons beyond the filter, and of those in rational
-    arithmetic.
-    """
+    arithmetic."""
     d, vertices, ring_offsets, polygon_offsets, size = contours
     scene = kernel_scene(plan, vertices, size, budget.check)
     if scene is not None and scene.exponent == 0 and len(vertices) <= _FEW:
@@ -389,8 +385,7 @@ def _clip_few(
     vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
     """Clip few polygons (flat vertices) in one call; return the result, and the number of polygons beyond the filter.
-    None if one is left open, or does not fit.
-    """
+    None if one is left open, or does not fit."""
     d = tables.high.shape[1] - 1
     n, n_rings, clip = len(polygon_offsets) - 1, len(ring_offsets) - 1, entry_of(clip_rings, d)
     if clip is clip_rings:

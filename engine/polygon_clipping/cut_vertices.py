@@ -35,8 +35,7 @@ from engine.predicates.error_free import (
 
 VALUE_BOUND: Final = 16.0 * 2.0**-53
 """Relative error bound of a plane value in doubles: a term loses the low parts of row and vertex, a product, three
-sums; its size as much again.
-"""
+sums; its size as much again."""
 DD_VALUE_BOUND: Final = 32.0 * U2
 """The same in double-double: rows known to 2 u^2, products 5 u^2, three sums of 4 u^2."""
 EDGE_BOUND: Final = 64.0 * U2
@@ -66,8 +65,7 @@ def point_on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, floa
 @inline
 def is_exactly_at(x: float, y: float, a: float, b: float, place: float, guess: float) -> bool:
     """Return whether x + t (y - x) with t = (a - place) / (a - b) is proven to be `guess`, by products of exact
-    differences.
-    """
+    differences."""
     x_off, x_low = two_diff(x, guess)
     y_off, y_low = two_diff(y, guess)
     a_off, a_low = two_diff(a, place)
@@ -93,8 +91,7 @@ def distance_across(x: float, low: float, bound: float, at: float) -> tuple[floa
 
 class CutWeights(NamedTuple):
     """Where an edge p q is cut: |value| at p and q, their sum, t = |p| / sum, as double-doubles; r: relative error of
-    t.
-    """
+    t."""
 
     ph: float
     pl: float
@@ -109,8 +106,7 @@ class CutWeights(NamedTuple):
 
 @inline
 def interpolate(x: Triple, y: Triple, s: CutWeights) -> Triple:
-    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x); x, y and the result as double, remainder and error bound.
-    """
+    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x); x, y and the result as double, rest and error bound."""
     x_h, x_low, x_bound = x
     y_h, y_low, y_bound = y
     if x_low != 0.0 or y_low != 0.0 or x_bound != 0.0 or y_bound != 0.0:
@@ -183,8 +179,7 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
 @merged
 def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
     """Set vertex j to the crossing of original edge p q with a plane across an axis; return whether it is correctly
-    rounded.
-    """
+    rounded."""
     d, axis, place = len(s.names), plane.axis, plane.place
     a, b = s.pool[p * d + axis], s.pool[q * d + axis]
     th, tl, is_certified = edge_parameter(a, b, place)
@@ -217,8 +212,7 @@ def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
 @merged
 def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> bool:
     """Set vertex j to the crossing of edge p q, between any vertices, with a plane; return whether it is correctly
-    rounded.
-    """
+    rounded."""
     d = len(s.names)
     ph, pl, p_bound = value_of(s, plane, p, n_ring)
     qh, ql, q_bound = value_of(s, plane, q, n_ring)
@@ -244,8 +238,7 @@ def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: in
 @merged
 def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> bool:
     """Set vertex j to the crossing of edge v w with a plane; return whether it is correctly rounded. A part of an
-    original edge is cut as the whole edge.
-    """
+    original edge is cut as the whole edge."""
     edge, p, q = s.edges[v], v, w
     if edge >= 0:
         p, q = edge, edge + 1 if edge + 1 < n_ring else 0

@@ -79,8 +79,7 @@ class ExactScratch(NamedTuple):
 @allocating
 def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: IntArray) -> Any:
     """Allocate scratch of `clip_exactly` for rings that grow to `room` vertices, dropped ones included. row_heap,
-    row_places: of `PlaneTables`.
-    """
+    row_places: of `PlaneTables`."""
     first = _ROWS + row_heap.size
     heap = np.empty(first + 8 * SLOT + 48 * room, np.int64)
     heap[_ONE], heap[_ONE + 1], heap[_ONE + 2] = 1, 0, 1
@@ -97,8 +96,7 @@ def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: Int
 @inline
 def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
     """Set ``loaded[side]`` to the heap indices of vertex v's coordinates x, y[, z], w; an original vertex is stored
-    first.
-    """
+    first."""
     d = s.points.shape[1]
     for k in range(d + 1):
         if v >= n_ring:
@@ -193,8 +191,7 @@ def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -
 
 @inline
 def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
-    """Compute vertex j, the intersection of two planes (lines) in 2D, as exact integers; False if these are too long.
-    """
+    """Compute vertex j, the intersection of two planes (lines) in 2D, in exact integers; False if they are too long."""
     for k in range(3):  # the cross product of both rows
         a, b = (k + 1) % 3, (k + 2) % 3
         s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = s.rows[plane, a], s.rows[other, b], 1
@@ -210,8 +207,7 @@ def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
 @inline
 def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
     """Return the new vertex at the crossing of edge v w with a plane; TOO_LONG. is_left: the edge leaves the plane's
-    inner side.
-    """
+    inner side."""
     j, edge, d = s.used[0], s.edges[v], s.points.shape[1]
     if j + 1 >= s.points.shape[0]:
         return TOO_LONG
@@ -233,8 +229,7 @@ def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_rin
 @inline
 def append_vertex(s: ExactScratch, made: IntArray, n_left: int, v: int, is_on: bool, n_ring: int) -> int:
     """Append vertex v to a ring of n_left vertices; return their number then, or TOO_LONG. is_on: v lies on the plane.
-    A duplicate of the previous vertex is merged into it, and its outgoing edge inherited.
-    """
+    A duplicate of the previous vertex is merged into it, and its outgoing edge inherited."""
     s.on_plane[n_left] = is_on
     if n_left > 0 and is_on and s.on_plane[n_left - 1]:
         before = made[n_left - 1]
@@ -264,8 +259,7 @@ def close_ring(s: ExactScratch, made: IntArray, n_left: int, n_ring: int) -> int
 @inline
 def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int) -> tuple[int, int]:
     """Set the signs of the n vertices of a ring at a plane; return how many are outside (or TOO_LONG), and how many on
-    it.
-    """
+    it."""
     n_out, n_on = 0, 0
     for i in range(n):
         s.signs[i], is_known = sign_of_vertex(s, plane, ring[i], n_ring)
@@ -279,8 +273,7 @@ def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int)
 @inline
 def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray, n_ring: int) -> tuple[int, int]:
     """Clip a ring of n vertices, whose signs are set, by a plane into `made`; return the number of its vertices (or
-    TOO_LONG), and of cuts.
-    """
+    TOO_LONG), and of cuts."""
     n_left, n_cuts = 0, 0
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
@@ -325,8 +318,7 @@ def cut_by_planes(
     s: ExactScratch, planes: PlaneTables, cutting: Cutting, n_cutting: int, n_ring: int, stop: FlagArray
 ) -> tuple[int, int]:
     """Clip the loaded ring by the planes in order; return the number of its vertices, and its row in `rings`. TOO_LONG
-    or NO_ROOM in place of the number. Counts the contacts with each plane, and notes which dropped a vertex.
-    """
+    or NO_ROOM in place of the number. Counts the contacts with each plane, and notes which dropped a vertex."""
     n, now = n_ring, 0
     for i_plane in range(n_cutting):
         if n <= 0:
@@ -350,8 +342,7 @@ def clip_exactly(
     stop: FlagArray, clipped: Clipped, written: int,
 ) -> int:  # fmt: skip
     """Clip a polygon by the planes of `cutting`, whose contacts are reset, after `written` vertices of others. Returns
-    the number of vertices then, or NO_ROOM. A polygon with too long numbers is left OPEN.
-    """
+    the number of vertices then, or NO_ROOM. A polygon with too long numbers is left OPEN."""
     written_before, d = written, s.points.shape[1]
     first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]
     for i in range(n_cutting):

@@ -43,8 +43,7 @@ DOUBT: Final = -1
 _SLACK: Final = 2.0**-45
 LONG: Final = 8
 """Smallest number of vertices of a ring that is grouped into runs; in shorter rings most vertices are runs of their
-own.
-"""
+own."""
 MOST_BITS: Final = 30
 ALONE: Final = 1 << MOST_BITS
 """Mark of a vertex on a plane, or near one: it is a run of its own."""
@@ -94,8 +93,7 @@ def load_ring(
     s: Scratch, vertices: FloatArray, begin: int, end: int
 ) -> tuple[int, float, float, float, float, float, float]:
     """Load a ring, repeated vertices merged; return the number of its vertices, and low and high bound of each axis.
-    Zeros become +0.0. The first vertex may still be repeated at the end.
-    """
+    Zeros become +0.0. The first vertex may still be repeated at the end."""
     pool, d = s.vertices.pool, len(s.vertices.names)
     x, y, z = vertices[begin * d], vertices[begin * d + 1], 0.0 if d == 2 else vertices[begin * d + 2]
     pool[0], pool[1] = x + 0.0, y + 0.0
@@ -118,8 +116,7 @@ def load_ring(
 @merged
 def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
     """Set s.lows and s.highs to the box of rings first .. last - 1; return the number of vertices of the last ring,
-    loaded.
-    """
+    loaded."""
     vertices, offsets = polygons.vertices, polygons.ring_offsets
     n, x_low, x_high, y_low, y_high, z_low, z_high = load_ring(s, vertices, offsets[first], offsets[first + 1])
     for ring in range(first + 1, last):
@@ -135,8 +132,7 @@ def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
 @merged
 def choose_planes(s: Scratch, planes: PlaneTables) -> tuple[int, bool]:
     """List the planes that may cut a polygon in s.cutting; return their number, and whether one has all of it outside.
-    A plane with all vertices inside cuts nothing: later planes see convex combinations of the vertices.
-    """
+    A plane with all vertices inside cuts nothing: later planes see convex combinations of the vertices."""
     cutting, lows, highs, d = s.cutting, s.lows, s.highs, len(s.vertices.names)
     n, is_outside = 0, False
     for number in range(planes.high.shape[0]):
@@ -222,8 +218,7 @@ def group_into_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int
 @merged
 def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: int) -> tuple[int, int]:
     """Set the signs of n vertices at a plane across an axis; return how many are not outside (or DOUBT), and how many
-    on it.
-    """
+    on it."""
     pool, rests, d, axis, place = s.vertices.pool, s.vertices.rests, len(s.vertices.names), plane.axis, plane.place
     sense, n_in, n_on = 1 if plane.high[plane.number, axis] > 0.0 else -1, 0, 0
     for i in range(n):
@@ -244,8 +239,7 @@ def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: 
 
 @merged
 def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n: int) -> tuple[int, int]:
-    """Set the signs of n vertices at a plane across no axis; return as `classify_across`. None is proven to be on it.
-    """
+    """Set the signs of n vertices at an oblique plane; return as `classify_across`. None is proven to be on it."""
     row, n_in = row_of(s, plane), 0
     for i in range(n):
         value = value_at(s, row, ring[i])
@@ -296,8 +290,7 @@ def cut_ring(
 @merged
 def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
     """Clip the ring of n runs by the planes in order; return the number of vertices left (or DOUBT), and its row in
-    `rings`.
-    """
+    `rings`."""
     n_made, now, cutting = n_ring, 0, s.cutting
     for i_plane in range(n_cutting):
         plane = plane_of(planes, cutting.planes[i_plane])
@@ -340,8 +333,7 @@ def clip_in_doubles(
     s: Scratch,
 ) -> tuple[int, int, int, int]:  # fmt: skip
     """Clip polygons from `first` on until doubles do not decide one, after `written` vertices of earlier ones. Returns
-    the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut that polygon.
-    """
+    the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut that polygon."""
     d, offsets = len(s.vertices.names), polygons.ring_offsets
     for polygon in range(first, last):
         if stop[0]:

@@ -33,8 +33,7 @@ def integer_row(row: Sequence[float]) -> Row:
 
 def plane_through(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> Row:
     """Return the integer row of the plane through a, b, c, positive on the side opposite to the normal (b - a) x (c -
-    a).
-    """
+    a)."""
     n, scale = common_integers([*a, *b, *c])
     p, q, r = n[:3], n[3:6], n[6:]
     normal = cross(minus(r, p), minus(q, p))
@@ -51,8 +50,7 @@ def merge_repeated(contour: list[Vertex]) -> list[Vertex]:
 
 def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bool]:
     """Return a contour clipped by one plane, the number of points in which it met the plane, and whether a vertex was
-    dropped.
-    """
+    dropped."""
     values = [sum(a * x for a, x in zip(row, vertex)) for vertex in contour]
     if min(values) >= 0:
         return contour, values.count(0), False
@@ -76,8 +74,7 @@ def clip_polygon(
 ) -> tuple[list[list[list[float]]], bool]:
     """Return the contours of one polygon clipped by all planes, correctly rounded, and whether it may have bridge
     edges. rings: contours of at least one vertex each. planes: integer rows, applied in order. check: called for each
-    plane. A contour that vanishes is an empty list. Raises: TooComplexError.
-    """
+    plane. A contour that vanishes is an empty list. Raises: TooComplexError."""
     contours = []
     for ring in rings:
         dimension = len(ring[0])

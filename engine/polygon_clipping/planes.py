@@ -52,8 +52,7 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
 
 class Plan(NamedTuple):
     """The planes of a region, cached with it: integer rows in clipping order without duplicates; tables: for the
-    kernel, None if exponents are too far apart.
-    """
+    kernel, None if exponents are too far apart."""
 
     rows: list[Row]
     tables: PlaneTables | None
@@ -61,8 +60,7 @@ class Plan(NamedTuple):
 
 def plan_of(region: Solid, check: Check) -> Plan:
     """Return the planes of a region, cached with it. Raises: UnsupportedSolidError, for a polyhedron that is not convex
-    naming a face and a vertex beyond it.
-    """
+    naming a face and a vertex beyond it."""
     planes = row_of(region).planes
     if planes is None:
         more = " that is convex, or use overlay for polygons in the plane"
@@ -86,8 +84,7 @@ def planes_of_rows(region: HalfSpace | Aabb | Convex, _: Check) -> Iterable[Row]
 
 def planes_of_faces(region: Polyhedron, check: Check) -> Iterable[Row]:
     """Return the planes of the faces of a polyhedron as integer rows. Raises: UnsupportedSolidError if it is not
-    convex.
-    """
+    convex."""
     return starmap(plane_through, region.vertices[_outward_triangles(region, check)].tolist())
 
 
@@ -101,8 +98,7 @@ class KernelScene(NamedTuple):
 
 def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check) -> KernelScene | None:
     """Return the input of the kernel, scaled if necessary; None if exponents are too far apart. largest: magnitude of
-    any coordinate.
-    """
+    any coordinate."""
     exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
     if points is None or exponent < _DEEPEST:
@@ -113,8 +109,7 @@ def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check)
 
 def _plane_tables(planes: list[Row], exponent: int, check: Check) -> PlaneTables | None:
     """Return the tables of planes for vertices times 2^-exponent; None without planes, or if exponents are too far
-    apart.
-    """
+    apart."""
     if not planes:
         return None
     high, low = np.zeros((len(planes), len(planes[0]))), np.zeros((len(planes), len(planes[0])))

@@ -52,8 +52,7 @@ Clipped = namedtuple("Clipped", "vertices sizes state may_have_bridges")
 
 Cutting = namedtuple("Cutting", "planes slack contacts dropped")
 """The planes that may cut a polygon, in order. planes: their numbers. slack: error bounds of values in doubles.
-contacts: number of points in which all rings together met a plane. dropped: whether a ring lost a vertex to it.
-"""
+contacts: number of points in which all rings together met a plane. dropped: whether a ring lost a vertex to it."""
 
 
 @merged

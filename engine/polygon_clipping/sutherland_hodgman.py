@@ -29,8 +29,7 @@ from engine.types import BoolArray, FlagArray, FloatArray, IntArray
 @inline
 def room_for(ring_offsets: IntArray, first: int, last: int, n_planes: int) -> int:
     """Return the number of vertices, dropped ones included, to which a ring may grow; polygons that exceed it are left
-    open. A convex ring gains one vertex a plane.
-    """
+    open. A convex ring gains one vertex a plane."""
     largest = 0
     for ring in range(first, last):
         largest = max(largest, ring_offsets[ring + 1] - ring_offsets[ring])

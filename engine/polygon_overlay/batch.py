@@ -140,10 +140,8 @@ class OverlayBatch(Ragged):
 
     @property
     def areas(self) -> FloatArray:
-        """The doubles nearest to the exact areas of all pairs, (n_pairs,), computed now.
-
-        NaN where status is not 0, infinity for what is beyond the largest double.
-        """
+        """The doubles nearest to the exact areas of all pairs, (n_pairs,), computed now. NaN where status is not 0,
+        infinity for what is beyond the largest double."""
         exact = self._exact
         groups = exact.piece_offsets[summed(exact.counts[:, 0])]
         sides = [
@@ -181,8 +179,7 @@ class OverlayBatch(Ragged):
 
 def _polygons_in(solids: Any, name: str) -> Sequence[Solid]:
     """Return polygons as a tuple, or unchanged if they are a selection of arrays; other shapes are read
-    (`shapes.as_solid`).
-    """
+    (`shapes.as_solid`)."""
     return solids if isinstance(solids, PolygonSelection) else tuple(polygons_in(solids, name))
 
 
@@ -301,8 +298,7 @@ def _resolve(
     clips: Sequence[Solid], operation: Operation, workers: int | None, budget: Budget,
 ) -> tuple[PairResults, float, int]:  # fmt: skip
     """Return the results of all pairs, valid after rounding; `Accuracy.coordinates_ulp`; and the number of rational
-    decisions. rest: `OverlayBatch.status`, `_is_rounded_again` and `_apart`, filled here.
-    """
+    decisions. rest: `OverlayBatch.status`, `_is_rounded_again` and `_apart`, filled here."""
     status, is_rounded_again, apart = rest
     valid: dict[int, ValidPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}

@@ -40,16 +40,14 @@ _ROUNDED: Final = 2.0**-51
 _CERTAINLY_VALID: Final = 2.0**24
 _FINEST: Final = 2.0**49
 """Bounds of the largest coordinate in cells (_CERTAINLY_VALID), and of it times the longest edge (_FINEST), for rings
-to stay valid: see `_are_distinguishable`.
-"""
+to stay valid: see `_are_distinguishable`."""
 HALF_DIAGONAL: Final = nextafter(0.5**0.5, 1.0)
 
 
 class Grid(NamedTuple):
     """Multiples of ``base ** power``, base 2 or 10; spacing: the nearest double. into, back: a divisor and two factors
     that convert coordinates to units and back. A power of two may be no double, so it is split into two factors; the
-    first is exact.
-    """
+    first is exact."""
 
     base: int
     power: int
@@ -59,8 +57,7 @@ class Grid(NamedTuple):
 
     def to_units(self, vertices: FloatArray) -> FloatArray:
         """Return coordinates in units of the grid; for powers of ten rounded to doubles. Raises if the grid is too
-        fine.
-        """
+        fine."""
         near_integer = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
         units = np.empty_like(vertices)
         if not entry_of(scale)(vertices, *self.into, near_integer, _LEAST, units) < _MOST:
@@ -73,8 +70,7 @@ class Grid(NamedTuple):
 
     def to_coordinates(self, units: FloatArray) -> tuple[FloatArray, float]:
         """Return the doubles nearest to whole multiples of the grid, and their largest magnitude. Raises beyond the
-        range.
-        """
+        range."""
         places = np.empty_like(units)
         largest = entry_of(scale)(units, *self.back, 0.0, 0.0, places)
         if not largest < inf:
@@ -161,8 +157,7 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
 def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | None = None) -> PairResults:
     """Return valid rings of one pair snapped to integer points: DONE, or MAY_CROSS if they must be arranged again.
     Displacement is 0 if no vertex moved. Each row of sources is twice the vertex whose edge continues there. known: the
-    result of `snap_vertices` for these rings.
-    """
+    result of `snap_vertices` for these rings."""
     vertices, offsets = rings.vertices, rings.ring_offsets
     on_grid = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
     edges = np.arange(len(vertices)) if on_grid.edges is None else on_grid.edges.astype(np.int64)
@@ -178,8 +173,7 @@ def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | 
 def snapped_overlay(pair: PairResults, snapped: _SnappedRings, grid: Grid, start: int) -> Overlay | None:
     """Return the overlay of a pair in the units of its input, if snapping keeps its topology; else None. None also if
     doubles may not distinguish its multiples. start: the first vertex of the clip. Equal to the result of
-    `make_valid_after_rounding` and `from_units`.
-    """
+    `make_valid_after_rounding` and `from_units`."""
     if not snapped.keeps_topology:
         return None
     # by powers of ten a vertex and an edge come nearer by less than half a cell, below 2^51 cells
@@ -201,8 +195,7 @@ def _route_through_pixels(
     vertices: FloatArray, pixels: FloatArray, offsets: IntArray, passages: Int32Array
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return rings routed through the pixels that their edges pass, without repeated points, and by vertex its input
-    edge. passages (m, 2): edge, and vertex whose pixel it passes. pixels: by vertex.
-    """
+    edge. passages (m, 2): edge, and vertex whose pixel it passes. pixels: by vertex."""
     edges, others = passages.T
     ways = np.sign(vertices[next_in_rings(offsets)[edges]] - vertices[edges])
     along = (ways * pixels[others]).sum(axis=1)  # order: an edge that rises passes no pixel further left or below
@@ -247,8 +240,7 @@ def _displacement(displacement: float, grid: Grid, largest: float) -> float:
 
 def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budget) -> Overlay:
     """Return an overlay in units of the grid as one in the units of its input, with its own rings as exact rings.
-    start: the first vertex of the clip. again: function that arranges rounded rings.
-    """
+    start: the first vertex of the clip. again: function that arranges rounded rings."""
     vertices, largest = grid.to_coordinates(read_only(result.vertices))
     if grid.base == 10 and not _are_distinguishable(result.vertices, result.ring_offsets):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=PairStatus.MAY_CROSS)

@@ -66,8 +66,7 @@ def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArr
 class ImplicitRings(NamedTuple):
     """Exact rings whose vertices are input vertices or crossings, computed on request. sources: (n, 2) integers, see
     `overlay_pairs`; vertices of `clip` are numbered after those of `subject`. offsets: (n_rings + 1,) int64, where each
-    ring begins.
-    """
+    ring begins."""
 
     subject: RingArrays
     clip: RingArrays
@@ -87,15 +86,13 @@ class ImplicitRings(NamedTuple):
 
     def certified_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
         """Return the summed areas of rings groups[k] .. groups[k + 1] - 1, (n,) float64 nearest doubles, NaN if not
-        certified. And the number of NaN.
-        """
+        certified. And the number of NaN."""
         items = one_polygon(len(self.subject.offsets) - 1), one_polygon(len(self.clip.offsets) - 1)
         return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
         """Return the areas of `certified_areas`, those not certified by exact sums. Raises `NotRepresentableError` for
-        an area beyond the largest double.
-        """
+        an area beyond the largest double."""
         areas, n_uncertified = self.certified_areas(groups)
         for k in np.flatnonzero(np.isnan(areas)).tolist() if n_uncertified else ():
             areas[k] = self.some(range(groups[k], groups[k + 1])).nearest_area()
@@ -157,8 +154,7 @@ _FEW_IDENTITY_SOURCES: Final = _identity_sources(1024)
 
 
 def _ends_of_edges(vertices: FloatArray, offsets: IntArray, firsts: IntArray) -> IntArray:
-    """Return, for each vertex of `firsts`, the next vertex of its ring that differs from it (itself if there is none).
-    """
+    """Return, for each vertex of `firsts`, the next vertex of its ring that differs from it (else itself)."""
     rings = np.searchsorted(offsets, firsts, side="right") - 1
     starts, stops = offsets[rings], offsets[rings + 1]
     ends = firsts.copy()

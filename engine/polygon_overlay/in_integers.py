@@ -36,8 +36,7 @@ def overlay_exactly(
     is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:  # fmt: skip
     """Return the overlay of checked rings (either side may be empty), and the number of edge pairs decided exactly.
-    is_on_grid: snap the result to integer points.
-    """
+    is_on_grid: snap the result to integer points."""
     subdivision, inside = _label_arrangement(subject, clip, SELECTED[operation], budget, nesting)
     arrangement = subdivision.arrangement
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces)
@@ -121,8 +120,7 @@ def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
 
 def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResults:
     """Return the pieces with all nodes rounded to nearest doubles; DONE if none moves, else MAY_CROSS. Each row of
-    sources is twice the lowest edge along which the ring continues; vertices and crossings are alike.
-    """
+    sources is twice the lowest edge along which the ring continues; vertices and crossings are alike."""
     rings, nodes = rings_of(pieces), arrangement.nodes
     half_edges = [half_edge for ring in rings for half_edge in ring]
     used = [arrangement.origin(half_edge) for half_edge in polled(half_edges)]

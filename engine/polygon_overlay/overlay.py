@@ -191,8 +191,7 @@ def overlay_rings(
 ) -> tuple[Overlay, int, int]:  # fmt: skip
     """Return the overlay of checked rings (either side may be empty), edge pairs decided exactly, and those in
     rationals. nesting: of the subject's rings, for a rule other than even-odd; then there is no clip, and the operation
-    is "union".
-    """
+    is "union"."""
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
     if units is not None:
@@ -212,8 +211,7 @@ def overlay_rings(
 
 
 def ulps_moved(result: Overlay) -> float:
-    """Return the largest displacement of a vertex, in units in the last place of the largest coordinate; at least 0.5.
-    """
+    """Return the largest displacement of a vertex, in ulps of the largest coordinate; at least 0.5."""
     if not result.vertices_moved:
         return 0.5
     return max(0.5, result.largest_displacement / float(np.spacing(np.abs(result.vertices).max())))
@@ -370,8 +368,7 @@ def _arrange_all(
 
 def _rings_of_all(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
     """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of each polygon but the
-    first. Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
-    """
+    first. Polygons without rings have no number, so that the number of a ring is at least that of its polygon."""
     each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
     if not each:
         return NO_RINGS, np.zeros(0, np.int64), np.zeros(0, np.int64)

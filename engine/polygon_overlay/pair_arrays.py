@@ -116,8 +116,7 @@ _LEAST: Final = 3
 
 class PolygonArrays(NamedTuple):
     """Polygons as flat arrays: vertices (n, 2) float64; ring_offsets into them, first vertices not repeated;
-    polygon_offsets into the rings.
-    """
+    polygon_offsets into the rings."""
 
     vertices: FloatArray
     ring_offsets: IntArray

@@ -81,8 +81,7 @@ _Place = tuple[Fraction, Fraction]
 
 class Lost(NamedTuple):
     """Parts of an exact result that rounding removed: pieces by their shells, and holes, by ring numbers.
-    piece_offsets: of the exact result. unit: factor from the exact rings' coordinates to the caller's.
-    """
+    piece_offsets: of the exact result. unit: factor from the exact rings' coordinates to the caller's."""
 
     exact: Exact
     piece_offsets: IntArray
@@ -284,17 +283,14 @@ class Overlay(ByValue):
 
     @property
     def area(self) -> float:
-        """The double nearest to `area_exact`: a bound proves it, or the exact sum; no fraction is made.
-
-        Raises `NotRepresentableError` beyond the largest double.
-        """
+        """The double nearest to `area_exact`: a bound proves it, or the exact sum; no fraction is made. Raises
+        `NotRepresentableError` beyond the largest double."""
         return self.exact.nearest_areas(_all_of(self.exact.n_rings)).item(0)
 
     @property
     def piece_areas(self) -> FloatArray:
         """Areas of the pieces of the exact result, holes subtracted: (n_pieces_exact,), the nearest doubles. Where
-        rounding lost, joined or parted none these are those of `pieces`, in their order.
-        """
+        rounding lost, joined or parted none these are those of `pieces`, in their order."""
         return self.exact.nearest_areas(np.append(np.flatnonzero(self.exact.are_shells()), self.exact.n_rings))
 
 

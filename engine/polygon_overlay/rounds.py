@@ -42,8 +42,7 @@ def make_valid_after_rounding(
 ) -> Overlay | None:
     """Arrange the rounded rings of a pair until they are valid; None if ``rearrange`` cannot, or snapping is needed but
     not possible. exact: the rings that ``first`` is rounded from. rearrange: arranges rounded rings, with evidence.
-    may_snap: the rings are those of ``exact``, not scaled. snap: moves valid rings to integer points (grid.py).
-    """
+    may_snap: the rings are those of ``exact``, not scaled. snap: moves valid rings to integer points (grid.py)."""
     rings, displacement = first, float(first.displacement[0])
     rounds = int(displacement > 0.0)
     edges = own_edges = edges_along(first.sources)
@@ -85,8 +84,7 @@ def make_valid_after_rounding(
 
 def _changes(first: PairResults, rings: PairResults, origins: IntArray, exact: Exact) -> dict[str, Any]:
     """Return the counts of joined, parted and lost pieces and holes of a pair, as fields of `Overlay`. origins: rows
-    (ring of `rings`, ring of `first` that it comes from).
-    """
+    (ring of `rings`, ring of `first` that it comes from)."""
     is_shell, was_shell = _shells(rings), _shells(first)
     of_shells = is_shell[origins[:, 0]]
     pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
@@ -109,8 +107,7 @@ def _shells(pair: PairResults) -> BoolArray:
 
 def _compose_origins(evidence: IntArray, origins: IntArray) -> IntArray:
     """Return rows (ring, original ring): the evidence (ring, ring of the round before) composed with that round's
-    origins.
-    """
+    origins."""
     offsets = np.searchsorted(origins[:, 0], np.arange(evidence[:, 1].max(initial=-1) + 2))
     sizes = np.diff(offsets)[evidence[:, 1]]
     through = origins[places_of(offsets, evidence[:, 1]), 1]
@@ -125,8 +122,7 @@ def build_valid_overlay(rings: PairResults, first: PairResults, exact: Exact, **
 
 
 def _snap_exact_rings(first: PairResults, exact: Exact, budget: Budget) -> tuple[PairResults, float]:
-    """Return the exact rings snapped to the lattice of the largest coordinate's ulp, and half the diagonal of a pixel.
-    """
+    """Return the exact rings snapped to the lattice of the largest coordinate's ulp, and half a pixel's diagonal."""
     spacing = ulp(float(np.abs(first.vertices).max()))
     snapped, along = snap_rings(exact.some(range(first.counts[0, 1])).places(), frexp(spacing)[1] - 1, budget)
     vertices = np.array([vertex for ring in snapped for vertex in ring])
@@ -168,8 +164,7 @@ def count_changes(is_exact: BoolArray, origins: IntArray, n_parts: int) -> tuple
 
 class ValidPairs(NamedTuple):
     """Pairs that are valid after rounding: their numbers (n,) int64; their rings, pair after pair; ulps: the largest
-    displacement of a vertex, in units in the last place of the largest coordinate.
-    """
+    displacement of a vertex, in units in the last place of the largest coordinate."""
 
     pairs: IntArray
     rings: PairResults
@@ -179,8 +174,7 @@ class ValidPairs(NamedTuple):
 def make_pairs_valid(first: PairResults, rearrange: Arranger, budget: Budget) -> ValidPairs:
     """Arrange the MAY_CROSS pairs of ``first`` until they are valid, all in one call of ``rearrange`` a round. Pairs
     that become OPEN, or are not valid after the last round, are omitted. Only rings are returned: lost and joined parts
-    are computed for single pairs, on request. Raises as `Budget.check`.
-    """
+    are computed for single pairs, on request. Raises as `Budget.check`."""
     pairs = np.flatnonzero(first.status == PairStatus.MAY_CROSS)
     rings = take_pairs(first, pairs)
     displacement = rings.displacement
@@ -216,8 +210,7 @@ def make_pairs_valid(first: PairResults, rearrange: Arranger, budget: Budget) ->
 
 def _ulps_moved(first: PairResults, pairs: IntArray, valid: PairResults, doubtful: IntArray) -> float:
     """Return `ValidPairs.ulps` of ``valid``, which are ``pairs`` of ``first``; doubtful: pairs that may have new
-    vertices.
-    """
+    vertices."""
     ulps = 0.5
     for k in range(len(doubtful)):
         before, now = take_pairs(first, pairs[doubtful[k : k + 1]]), take_pairs(valid, doubtful[k : k + 1])

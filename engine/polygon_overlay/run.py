@@ -74,8 +74,7 @@ def run_kernel(
 ) -> PairResults:
     """Overlay polygons pair by pair; raises as `Budget.check`. selected: as of `overlay_pairs`, one of
     `SELECTED_ARRAYS`, or `EACH_PART`. nesting: of the rings of subjects, each a source of its own, as of
-    `overlay_pairs`.
-    """
+    `overlay_pairs`."""
     n_vertices, n_rings = map(sum, zip(subjects.largest_counts(), clips.largest_counts(), strict=True))
     is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and selected[3] < 2
     if is_plain and n_vertices >= max(_MANY, _MANY_IN_RING * n_rings):
@@ -92,8 +91,7 @@ def run_blocks(
 ) -> PairResults | None:  # fmt: skip
     """Overlay polygons pair by pair; with a ``size``, one pair reduced by blocks of so many edges. In that case None if
     a fraction ``max_active`` or more of the edges is active, or the pair is not DONE: doubtful rounded rings are
-    arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair.
-    """
+    arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair."""
     n, (n_vertices, n_rings) = len(subjects.polygon_offsets) - 1, largest
     first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
@@ -160,8 +158,7 @@ def overlay_compiled(
 ) -> tuple[Overlay, int] | None:  # fmt: skip
     """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN. grid: the
     coordinates are in its units. A scene outside the kernel's range is scaled into it by a power of two, if that is
-    exact.
-    """
+    exact."""
     pair, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
     if pair.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)

@@ -49,8 +49,7 @@ _BLOCK: Final = 1024
 
 class Touching(NamedTuple):
     """Lines and points of many pairs of polygons. lines, points: the pair of each line and point. vertices (n, 2)
-    float64 of all lines, offsets of lines into them; places (n_points, 2) float64.
-    """
+    float64 of all lines, offsets of lines into them; places (n_points, 2) float64."""
 
     lines: IntArray
     vertices: FloatArray
@@ -116,8 +115,7 @@ def _may_touch(arranged: PairResults) -> BoolArray:
 
 def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
     """Return, by vertex, a number that vertices at one point of one pair share; pairs: by ring. Valid rounded rings
-    have no two exact points with the same doubles.
-    """
+    have no two exact points with the same doubles."""
     keys = *arranged.vertices.T, np.repeat(pairs, np.diff(arranged.ring_offsets))
     order = np.lexsort(keys)
     is_new = np.zeros(len(order), np.bool_)
@@ -130,8 +128,7 @@ def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
 
 
 def _extract(arranged: PairResults, parts: IntArray, pairs: IntArray, places: IntArray) -> Touching:
-    """Return the lines and points of arranged rings; parts, pairs: by ring; places: by vertex the number of its point.
-    """
+    """Return the lines and points of arranged rings; parts, pairs: by ring; places: by vertex its point's number."""
     rings, after = ring_of_vertices(arranged.ring_offsets), next_in_rings(arranged.ring_offsets)
     n_places = int(places.max(initial=0)) + 1
     part = parts[rings]
@@ -154,8 +151,7 @@ def _order_lines(
     offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: BoolArray
 ) -> tuple[IntArray, IntArray]:
     """Return the edges of lines, by their first vertices, line after line, and the index of the first edge of each
-    line. goes_on: by vertex, whether at most two edges of lines meet there.
-    """
+    line. goes_on: by vertex, whether at most two edges of lines meet there."""
     sizes = np.diff(offsets)
     is_head = is_line & ~(is_line[np.arange(len(rings)) - 1] & goes_on)
     firsts = offsets[:-1]
@@ -184,8 +180,7 @@ Place = tuple[float, float]
 
 def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touching:
     """Return the lines and points to which rounding collapsed closed rings, given as (pair, vertices). A ring at one
-    place is a point; else its edges, split at other vertices on them, each once, joined to lines.
-    """
+    place is a point; else its edges, split at other vertices on them, each once, joined to lines."""
     lines: list[tuple[int, list[Place]]] = []
     points: list[tuple[int, Place]] = []
     for pair, ring in rings:

@@ -69,8 +69,7 @@ def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float,
 @inline
 def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[float, bool]:
     """Return p + t (q - p), and whether it is the proven nearest double; t is known to 18 u^2 + `slack`, relative.
-    Coordinates below 2^1000. A zero is never certified unless p = q.
-    """
+    Coordinates below 2^1000. A zero is never certified unless p = q."""
     sh, low, mh, _ = point_along(p, q, th, tl)
     bound = POINT_BOUND * (abs(p) + abs(mh)) + slack * abs(mh) + TINY
     return sh + low, (sh + (low - bound) == sh + (low + bound)) | (p == q)
@@ -81,8 +80,7 @@ def side_of(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, x: float, step: float, e: Components
 ) -> int:
     """Return the exact sign of (p w_q + q w_p) / (w_p + w_q) - (x + step), for weights given as expansions. `e` is a
-    workspace of 6 (n_wp + n_wq) places.
-    """
+    workspace of 6 (n_wp + n_wq) places."""
     n = 0
     ah, al = two_diff(p, x)
     bh, bl = two_diff(q, x)
@@ -156,8 +154,7 @@ def parameter_and_point(
     e: Components,
 ) -> tuple[float, bool]:  # fmt: skip
     """Set `point` to the nearest doubles of the crossing with weights wp, wq; return t, and whether all are certified.
-    axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`.
-    """
+    axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`."""
     sum_h, sum_l = dd_add(
         wp[n_wp - 1] if n_wp > 0 else 0.0,
         wp[n_wp - 2] if n_wp > 1 else 0.0,

@@ -34,8 +34,7 @@ SLOT: Final = 128
 MOST_DIGITS: Final = SLOT - 4
 QUOTIENT_BOUND: Final = 128.0 * U2
 """Relative error bound of a quotient of numbers known by five leading digits (2^-6 u^2), each read with five dd_add (20
-u^2).
-"""
+u^2)."""
 FARTHEST: Final = 900
 """Doubles made from numbers lie within 2^-900 .. 2^900, so that none is subnormal."""
 _MASK: Final = (1 << BITS) - 1
@@ -93,8 +92,7 @@ def sign_of(heap: IntArray, a: int) -> int:
 @inline
 def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
     """Store the sum of ``factor * a * b`` over n_terms rows ``terms[i] = (a, b, factor)`` at index c; False if it is
-    too long. a, b: indices of numbers. factor: 1 or -1.
-    """
+    too long. a, b: indices of numbers. factor: 1 or -1."""
     bottom, top, n_summed = 0, 0, 0
     for i in range(n_terms):
         a, b = terms[i, 0], terms[i, 1]
@@ -136,8 +134,7 @@ def negate(heap: IntArray, a: int) -> None:
 @inline
 def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
     """Return the five leading digits of the number at index a as a double-double, and the exponent of their unit in
-    digits.
-    """
+    digits."""
     n = heap[a]
     h, low, taken = 0.0, 0.0, min(n, 5)
     for i in range(taken):

@@ -76,8 +76,7 @@ def _fma_intrinsic(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
 
 def _workspace_intrinsic(typing_context: Any, size: Any) -> Any:
     """Typing and code of `workspace` for numba: an uninitialised float64 array on the caller's stack, not to be
-    returned. size: a literal.
-    """
+    returned. size: a literal."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         from numba.np.arrayobj import make_array, populate_array  # 0.1 s to import, and only the compiler needs it

@@ -24,14 +24,12 @@ Components = Any  # a float64 array, or a list of floats when the compiler is di
 LARGEST: Final = 2.0**120
 SMALLEST: Final = 2.0**-120
 """Coordinates of kernels that use double-double or expansions are zero or within these: products of degree four are
-exact (multiples of 2^-172 after a difference, of 2^-688 after a product of four).
-"""
+exact (multiples of 2^-172 after a difference, of 2^-688 after a product of four)."""
 
 
 @inline
 def is_safe(x: float) -> bool:
-    """Return whether x is zero or within SMALLEST .. LARGEST, so that products of degree four are exact as expansions.
-    """
+    """Return whether x is zero or within SMALLEST .. LARGEST, so that products of degree four are exact expansions."""
     return x == 0.0 or SMALLEST <= abs(x) <= LARGEST
 
 
@@ -77,8 +75,7 @@ def add_scaled(e: Components, n: int, f: Components, m: int, b: float) -> int:
 
 @inline
 def add_product(e: Components, n: int, f: Components, m: int, g: Components, k: int) -> int:
-    """Add the product of expansions f (m components) and g (k) to e in place, 2 m k more places; return the new length.
-    """
+    """Add the product of expansions f (m components) and g (k) to e in place, 2 m k places; return the new length."""
     for i in range(k):
         n = add_scaled(e, n, f, m, g[i])
     return n
@@ -108,8 +105,7 @@ def scale(f: Components, m: int, b: float, e: Components) -> int:
 @called
 def compress(e: Components, n: int) -> int:
     """Rewrite e in place with as few components as its bits need; return the new length. The last component is then
-    within an ulp of the value.
-    """
+    within an ulp of the value."""
     if n < 2:
         return n
     q = e[n - 1]

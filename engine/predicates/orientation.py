@@ -85,8 +85,7 @@ def orient2d_filter(a: Point2, b: Point2, c: Point2) -> int:
 @inline
 def orient2d(a: Point2, b: Point2, c: Point2) -> int:
     """Return 1 if a, b, c turn left, -1 if they turn right, 0 if they are collinear, or UNDECIDED (exponents out of
-    range).
-    """
+    range)."""
     side = orient2d_filter(a, b, c)
     if side != UNDECIDED:
         return side
@@ -119,8 +118,7 @@ def orient3d_filter(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def orient3d(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
-    """Return 1 if d is on the side to which the normal (b - a) x (c - a) points, -1 opposite, 0 coplanar, or UNDECIDED.
-    """
+    """Return 1 if d is on the side to which the normal (b - a) x (c - a) points, else -1, 0 coplanar, or UNDECIDED."""
     side = orient3d_filter(a, b, c, d)
     if side != UNDECIDED:
         return side
@@ -130,8 +128,7 @@ def orient3d(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 @inline
 def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
     """Return k such that magnitudes smallest .. largest, times 2^k, lie in [2^bottom, 2^top], or OUT_OF_RANGE.
-    smallest: of the nonzero magnitudes (infinity if there is none); largest: of all.
-    """
+    smallest: of the nonzero magnitudes (infinity if there is none); largest: of all."""
     if largest == 0.0:
         return 0
     high = frexp(largest)[1]
@@ -282,8 +279,7 @@ def orient3d_batch(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, s
 
 def tie_sign_exact(ax: Any, ay: Any, bx: Any, by: Any) -> int:
     """Return the sign of orient2d(a, b, q + (eps, eps^2)), given that orient2d(a, b, q) is 0; 0 if a = b. Any number
-    type.
-    """
+    type."""
     if ay != by:
         return 1 if ay > by else -1
     return 1 if bx > ax else -1 if bx < ax else 0

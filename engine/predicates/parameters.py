@@ -23,8 +23,7 @@ from engine.types import UNDECIDED
 
 EXACT_DIFFERENCES: Final = 24.0 * 2.0**-106
 """Relative error bound of `compare_in_pairs`, whose leading products are exact: four products of a tail, below u of a
-product each, are rounded once, and six sums of such terms.
-"""
+product each, are rounded once, and six sums of such terms."""
 
 TINY: Final = 2.0**-1000
 """Added to bounds: covers products that underflow, so that the filter is right for every finite input."""
@@ -35,8 +34,7 @@ def compare_ratios_filter(
     a: float, a_bound: float, b: float, b_bound: float, c: float, c_bound: float, d: float, d_bound: float
 ) -> int:
     """Return the sign of |a b| - |c d| for numbers known to +- their bounds, or UNDECIDED. ``||a b| - |exact|| <= |a|
-    b_bound + |b| a_bound + a_bound b_bound``; 2^-50 of each product covers every rounding.
-    """
+    b_bound + |b| a_bound + a_bound b_bound``; 2^-50 of each product covers every rounding."""
     a, b, c, d = abs(a), abs(b), abs(c), abs(d)
     left, right = a * b, c * d
     slack = a * b_bound + (b + b_bound) * a_bound + c * d_bound + (d + d_bound) * c_bound
@@ -67,8 +65,7 @@ def compare_differences(
 @inline
 def compare_in_pairs(ah: float, al: float, bh: float, bl: float, ch: float, cl: float, dh: float, dl: float) -> int:
     """Return the sign of a b - c d if the products' leading parts prove it, else UNDECIDED; a = ah + al and so on,
-    exact. UNDECIDED for infinities and NaN; underflow is covered.
-    """
+    exact. UNDECIDED for infinities and NaN; underflow is covered."""
     left, left_tail = two_prod(ah, bh)
     right, right_tail = two_prod(ch, dh)
     gap, gap_tail = two_diff(left, right)
@@ -109,8 +106,7 @@ def minor(
 @inline
 def add_absolute_product(e: Components, n: int, a: Components, na: int, b: Components, nb: int, factor: int) -> int:
     """Add factor |a b| (factor 1 or -1) to expansion e in place, for expansions a and b; 2 na nb more places. Returns
-    the new length.
-    """
+    the new length."""
     flip = float(factor * sign(a, na) * sign(b, nb))
     for i in range(na):
         n = add_scaled(e, n, b, nb, flip * a[i])

@@ -119,11 +119,8 @@ def side_rational(row: Sequence[Number], point: Sequence[Number]) -> int:
 def polynomial_sign_rational(
     powers: Sequence[Sequence[int]], coefficients: Sequence[Number], point: Sequence[Number]
 ) -> int:
-    """Return the sign of the sum of coefficient * prod(point[k] ** powers[k]) over the terms.
-
-    The point is written as P / w with integers P and w; every term is multiplied by w^degree, so that only integer
-    powers remain.
-    """
+    """Return the sign of the sum of coefficient * prod(point[k] ** powers[k]) over the terms. The point is written as P
+    / w with integers P and w; every term is multiplied by w^degree, so that only integer powers remain."""
     *tops, w = scaled_integers((*point, 1))
     exponents = [[int(power) for power in term] for term in powers]
     degree = max((sum(term) for term in exponents), default=0)
@@ -138,8 +135,7 @@ def polynomial_sign_rational(
 
 def nearest_float(value: Number) -> float:
     """Return the double nearest to `value`, ties to even; zero as +0.0. Raises: `NotRepresentableError` if the nearest
-    double would be infinite.
-    """
+    double would be infinite."""
     top, bottom = value.as_integer_ratio()
     try:
         return top / bottom + 0.0  # Python rounds a quotient of integers correctly, subnormals included
@@ -156,8 +152,7 @@ def nearest(numerator: int, denominator: int) -> float:
 
 
 def nearest_pair(numerator: int, denominator: int) -> tuple[float, float]:
-    """Return numerator / denominator as a double-double: the nearest double, and the double nearest to the remainder.
-    """
+    """Return numerator / denominator as a double-double: the nearest double, and that nearest to the remainder."""
     head = nearest(numerator, denominator)
     n, d = head.as_integer_ratio()
     return head, nearest(numerator * d - n * denominator, denominator * d)
@@ -239,8 +234,7 @@ def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
 def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, BoolArray]:
     """Return points 2^exponent, and which of them may have been rounded twice. Those are the ones rounded here: up to
     and including the smallest normal number. If nothing is rounded here, the nearest double of unlimited exponent is
-    the nearest double.
-    """
+    the nearest double."""
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(points, exponent)
         doubtful = (np.abs(result) <= SMALLEST_NORMAL) & (np.ldexp(result, -exponent) != points)

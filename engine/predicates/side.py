@@ -57,8 +57,7 @@ def side_of_plane(h: HalfSpace3, p: Point3) -> int:
 def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return a x + b y + c z + d as a double-double, and its error bound. Products are exact, or lose 2^-1074 by
     underflow; their tails and those of sums, together below 4 u S, are added with six roundings. An intermediate
-    infinity gives NaN.
-    """
+    infinity gives NaN."""
     x, y, z = point
     ah, al = two_prod(a, x)
     bh, bl = two_prod(b, y)
@@ -126,8 +125,7 @@ def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
 @inline
 def grow_shifted_product(e: Components, n: int, a: float, b: float, exponent: int) -> int:
     """Add the product of the significands of a and b, times 2^exponent, to expansion e, two more places. Not if it is
-    zero or would lose bits. Returns the new length.
-    """
+    zero or would lose bits. Returns the new length."""
     if a == 0.0 or b == 0.0 or exponent < LOWEST_SHIFT:
         return n
     p, tail = two_prod(frexp(a)[0], frexp(b)[0])

@@ -42,8 +42,7 @@ _LISTED: Final = 4
 
 class Bodies(Preparing):
     """Checked solids with a pose or None each, and their cached structures; safe to share between threads. whole: the
-    bodies of which these are a subset; both share what does not depend on poses. owners: the solid of each.
-    """
+    bodies of which these are a subset; both share what does not depend on poses. owners: the solid of each."""
 
     def __init__(
         self, solids: tuple[Solid, ...], poses: tuple[Pose | None, ...], whole: Bodies | None = None, owners: Any = None
@@ -73,8 +72,7 @@ class Bodies(Preparing):
         self, names: IntArray, poses: Sequence[Pose | None], low: FloatArray, high: FloatArray, budget: Budget
     ) -> None:
         """Set the boxes low, high of the CSG trees among bodies ``names``, combined from their operands' boxes under
-        the poses.
-        """
+        the poses."""
         arrays = self.arrays(budget)
         odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, Csg)])
         for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
@@ -85,8 +83,7 @@ class Bodies(Preparing):
         self, names: IntArray, poses: Sequence[Pose | None], budget: Budget
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return rotations (m, d, d), translations (m, d), and low and high of the boxes of bodies ``names`` under
-        other poses.
-        """
+        other poses."""
         arrays, m, d = self.arrays(budget), len(names), self.solids[0].dimension
         turns, moves = motions_of(poses, d)
         low, high, rows = np.empty((m, d)), np.empty((m, d)), np.arange(m)
@@ -161,8 +158,7 @@ class Bodies(Preparing):
 
     def words(self, budget: Budget) -> tuple[list[int], Any]:
         """Return the integers from which segment kernels read all bodies, and the arrays that their addresses refer to.
-        As of `words_of`.
-        """
+        As of `words_of`."""
         return self.prepared(
             "words", lambda: words_of(self.tree(budget), NOBODY, self.table(budget).rows), budget.check
         )
@@ -180,8 +176,7 @@ class Bodies(Preparing):
 
 def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray, FloatArray]:
     """Return low, high (dim,) of a box around a posed body, rounded outward; infinite if the body may be unbounded.
-    check: as for `Solid.prepared`.
-    """
+    check: as for `Solid.prepared`."""
     if isinstance(solid, Csg):
         box: tuple[FloatArray, FloatArray] = fold_csg_tree(solid, lambda leaf: body_box(leaf, pose, check), _csg_box)
         return box
@@ -211,8 +206,7 @@ _AS_GIVEN: Final = read_only(np.arange(_MANY))
 
 def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
     """Return the tree over bodies with boxes low, high (n, dimension). Up to most_listed bodies are listed without a
-    tree, and so are bodies so near each other that 1 / scale is not finite.
-    """
+    tree, and so are bodies so near each other that 1 / scale is not finite."""
     n, dimension = low.shape
     every = BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
     if n <= most_listed:
@@ -243,8 +237,7 @@ NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.
 
 def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[int], Any]:
     """Return a row of integers that encodes a `BodyTree` (columns of near_boxes.py), and the arrays whose addresses it
-    has. names: indices of the bodies in the scene; placed: rows of their `Table`.
-    """
+    has. names: indices of the bodies in the scene; placed: rows of their `Table`."""
     tree = bodies.tree
     numbers = _NO_NUMBERS if tree is _NO_TREE else np.array([bodies.inverse, *tree.origin.tolist()])
     read = bodies.low, bodies.high, tree.boxes, tree.child, bodies.bounded, bodies.listed, numbers, names, placed
@@ -259,8 +252,7 @@ def _address(array: Any) -> int:
 
 def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
     """Return an order of segments in which neighbours at parameter t follow each other, for the cache; for few, as
-    given.
-    """
+    given."""
     n = len(segments)
     if n < _MANY:
         return _AS_GIVEN[:n]

@@ -64,8 +64,7 @@ def clip_all(
 
 def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exact:
     """Return a function that gives the exact parameters of both ends of a piece; it caches the pieces of the last
-    bodies.
-    """
+    bodies."""
 
     @lru_cache(_CACHED_PIECES)
     def pieces(source: int, body: int) -> list[ExactPiece]:
@@ -79,8 +78,7 @@ def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exac
 def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces | BoolArray | None:
     """Clip a small batch of segments without the overhead of the general path; return None if the general path must be
     used. That is: a structure of the scene is still to be built, numbers are out of the kernels' range (NaN is), or
-    `keep` is invalid.
-    """
+    `keep` is invalid."""
     solids = scene.base.solids
     if not solids or not is_ready(segments, 2, solids[0].dimension) or not 0 < len(segments) <= _FEW:
         return None
@@ -111,8 +109,7 @@ def clip_first(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> ScenePieces:
     """Return the first piece of each segment that meets a body; of pieces that begin in one point, that of the lowest
-    body. searched: the result of `_first_hits`, if computed already.
-    """
+    body. searched: the result of `_first_hits`, if computed already."""
     state, out = searched or _first_hits(segments, scene, False, budget, workers)
     left, sure = np.flatnonzero(state == OPEN), ScenePieces(*out)
     if not len(left):
@@ -146,8 +143,7 @@ def _first_hits(
     segments: FloatArray, scene: Placements, is_any: bool, budget: Budget, workers: int | None
 ) -> tuple[FlagArray, Any]:
     """Return the state (MET, OPEN, SETTLED) of each segment and, unless `is_any`, the first pieces of those that are
-    MET.
-    """
+    MET."""
     n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget))
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
@@ -202,8 +198,7 @@ def _cut_near(
     segments: FloatArray, order: IntArray, first: int, last: int, scene: Placements, budget: Budget
 ) -> tuple[list[LoosePieces], list[IntArray], bool]:
     """Return the pieces of segments order[first:last], the pairs (segment, body) that kernels leave open, and a flag.
-    Flag: all numbers are in the kernels' range (NaN is not).
-    """
+    Flag: all numbers are in the kernels' range (NaN is not)."""
     parts, left, n = list[LoosePieces](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
     words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(scene.n_rows)
@@ -262,8 +257,7 @@ def _cut(
 def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
     """Return the pieces of segments (n, 2, dim) within one placed solid, sorted by source and t; indices of the
     segments that took rational arithmetic; and a flag. All indices if it is unknown which. Flag: the other pieces come
-    from boundary_cut.py.
-    """
+    from boundary_cut.py."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)

@@ -279,8 +279,7 @@ def _candidates(
     bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
 ) -> Iterator[IntArray]:
     """Yield sorted blocks of pairs whose boxes intersect. low: corners of the boxes, moved outward by the gap. wanted,
-    skipped: keys first * n + second to which pairs are restricted, and that are left out; None for no restriction.
-    """
+    skipped: keys first * n + second to which pairs are restricted, and that are left out; None for no restriction."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
@@ -299,8 +298,7 @@ def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntA
 
 def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
     """Return the keys first * n_bodies + second, first < second, of the caller's pairs. Raises if `named` is no such
-    array.
-    """
+    array."""
     try:
         array = np.asarray(named)
     except ValueError:
@@ -323,8 +321,7 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
 
 _STRETCHED: Final = 1.0 + 2.0**-38
 """Bound on the factor by which a pose may stretch: no entry of R' R - I exceeds 1e-12. Boxes have equal poses that
-`collide` drops.
-"""
+`collide` drops."""
 
 
 _NONE: Final = pool_bodies([])
@@ -332,8 +329,7 @@ _NONE: Final = pool_bodies([])
 
 def enlarged(bodies: SceneBodies, gap: float | None) -> FloatArray:
     """Return the low corners (n, d) of the boxes moved outward by the gap, so that boxes of bodies nearer than that
-    intersect.
-    """
+    intersect."""
     return bodies.low if gap is None else np.nextafter(bodies.low - gap * _STRETCHED, -np.inf)
 
 
@@ -341,8 +337,7 @@ def distances_below(
     batches: SceneBatches, pairs: IntArray, gap: float, is_measured: bool, budget: Budget, workers: int | None
 ) -> FloatArray:
     """Return the distances (n,) of disjoint pairs nearer than the gap, infinite for others; exact. is_measured: if
-    False, pairs nearer than the gap get 0.0 instead.
-    """
+    False, pairs nearer than the gap get 0.0 instead."""
     bodies, distances = batches.bodies, np.full(len(pairs), np.inf)
     if not gap:
         return distances

@@ -112,8 +112,7 @@ def sort_pieces(
 
 
 def _sort_exactly(pieces: LoosePieces, exact: Exact) -> tuple[Any, ...]:
-    """Return the arrays of `ScenePieces` for pieces of segments on which ends round alike, sorted by exact parameters.
-    """
+    """Return the arrays of `ScenePieces` for pieces of segments whose ends round alike, sorted by exact parameters."""
     pieces, ranks = (
         take_pieces(pieces, np.lexsort((pieces.body, pieces.source))),
         np.empty((len(pieces.source), 2), np.int64),

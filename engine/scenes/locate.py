@@ -206,8 +206,7 @@ def _locate_exactly(
     workers: int | None,
 ) -> tuple[Int8Array, Counts]:  # fmt: skip
     """Return the locations of pairs of point owners[i] and body bodies[i], by each body's own locator, and their
-    counts. has_new: a tree was built since the kernel ran, so it is run again first.
-    """
+    counts. has_new: a tree was built since the kernel ran, so it is run again first."""
     locations, order = np.full(len(owners), UNDECIDED, np.int8), np.argsort(bodies, kind="stable")
     if has_new:
         tables, names, scratch = scene.tables(budget), scene.rows_of(bodies), scratch_for(scene.n_rows)

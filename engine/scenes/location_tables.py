@@ -87,8 +87,7 @@ def locate_in_body(
     tables: LocateTables, body: int, is_flat: bool, p: tuple[float, ...], stack: Int32Array, flag: FlagArray
 ) -> tuple[int, bool]:
     """Return the location of point p in a body, and whether it took more than a filter. 1, 0, -1 (inside, boundary,
-    outside) or UNDECIDED. stack: (STACK,), scratch.
-    """
+    outside) or UNDECIDED. stack: (STACK,), scratch."""
     kind, slot = tables.kinds[body], tables.slots[body]
     q, blur = to_frame(tables, tables.frames[body], p)
     if kind == BodyKind.RINGS:
@@ -216,8 +215,7 @@ def concatenated(first: LocateTables, then: LocateTables) -> LocateTables:
 
 def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> tuple[FloatArray, FloatArray]:
     """Return low and high of boxes around posed finite boxes (n, 2 or 3), rounded outward; rows: pose of each, -1 for
-    none.
-    """
+    none."""
     low, high, n = np.empty_like(lows), np.empty_like(highs), len(rows)
     boxes, moves = np.stack([lows, highs], axis=1), (frames.rotations, frames.translations)
     with np.errstate(all="ignore"):

@@ -85,17 +85,14 @@ def scratch_at(words: IntArray) -> Scratch:
 BodyTree = namedtuple("BodyTree", "low high tree inverse bounded listed")
 """A tree over bodies. low, high (n, dimension): their boxes, infinite for unbounded ones; tree, inverse: a `Bvh` over
 the bounded ones, if there are enough, and 1 / its scale; bounded: the body of each item; listed: bodies tested one by
-one.
-"""
+one."""
 Where = namedtuple("Where", "together moved names")
 """Positions of the bodies of a scene. together: the `BodyTree` of all n as first placed; moved: that of the moved ones,
-numbered from n on; names: the indices of the moved ones in the scene, ascending.
-"""
+numbered from n on; names: the indices of the moved ones in the scene, ascending."""
 N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, NAMES, PLACED = range(12)
 """Columns of a `BodyTree` encoded as a row of integers, sizes and addresses: one argument instead of a hundred.
 NUMBERS: address of (4,), inverse and origin. NAMES: of (n,), indices of moved bodies. PLACED: of the rows of their
-`Table`.
-"""
+`Table`."""
 _MOST_WAY: Final = 2.0**1000
 _SLACK: Final = 2.0**-20
 """Enlargement of a box in tree coordinates (at most 2 where it matters) that covers its rounding to float32."""
@@ -158,8 +155,7 @@ def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
 @inline
 def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last: float, scratch: Scratch) -> int:
     """Return the next body whose box the segment may enter before parameter `last`, roughly in order of entry; -1 for
-    none.
-    """
+    none."""
     depths = scratch.depths
     while depths[0] > 0:  # bound: each node, and each body, waits once
         depths[0] -= 1
@@ -180,8 +176,7 @@ def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last:
 @inline
 def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray) -> int:
     """Fill scratch.near with the numbers of the bodies whose boxes a segment may meet; return how many. words: both
-    rows of `words_of`. room: of `scratch_for`.
-    """
+    rows of `words_of`. room: of `scratch_for`."""
     scratch, n_near = scratch_at(room), 0
     for side in range(1 + (words[1, N_BODIES] > 0)):
         bodies, n_before = tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
@@ -199,8 +194,7 @@ def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray
 def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) -> bool:
     """Return whether a segment may meet the box of a body (slab test). error: (box - start) / (end - start) is off by 4
     units of rounding on each axis, or 2^-1074 on underflow; differences beyond `_MOST_WAY`, which may be infinite,
-    decide nothing.
-    """
+    decide nothing."""
     meet, enters, leaves = True, 0.0, 1.0
     for k in range(segments.shape[2]):
         start, end = segments[item, 0, k], segments[item, 1, k]
@@ -216,8 +210,7 @@ def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) ->
 @inline
 def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, depth: int) -> int:
     """Push the children of a node whose boxes the segment enters before `last` on scratch.waiting, the nearest one on
-    top. Returns the new depth.
-    """
+    top. Returns the new depth."""
     waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
     bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
     while bits != 0:
@@ -236,8 +229,7 @@ def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, de
 @inline
 def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array, hits: IntArray) -> int:
     """Fill `hits` with the numbers of the bodies whose boxes intersect the box low .. high (dim,), maybe infinite;
-    return how many.
-    """
+    return how many."""
     n_hits, names = _of_box(low, high, where.together, 0, where.names, stack, hits, 0), where.names
     if names.size > 0:
         n_hits = _of_box(low, high, where.moved, where.together.low.shape[0], names[:0], stack, hits, n_hits)
@@ -247,8 +239,7 @@ def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array
 @inline
 def _is_met(low: FloatArray, high: FloatArray, bodies: BodyTree, body: int, left_out: IntArray) -> bool:
     """Return whether the box low .. high intersects that of a body, and the body is not among those left out
-    (ascending).
-    """
+    (ascending)."""
     meet = True
     for k in range(low.size):
         meet &= (low[k] <= bodies.high[body, k]) & (high[k] >= bodies.low[body, k])
@@ -267,8 +258,7 @@ def _of_box(
     hits: IntArray, n_hits: int,
 ) -> int:  # fmt: skip
     """Append to `hits` n_before + each body of a `BodyTree` whose box intersects low .. high; return the new number.
-    left_out: ascending bodies to skip.
-    """
+    left_out: ascending bodies to skip."""
     tree, inverse, depth, stack[0] = bodies.tree, bodies.inverse, 1, 0
     is_flat, x, y, z = low.size == 2, tree.origin[0], tree.origin[1], tree.origin[2]
     bottom, top = (0.0 if is_flat else low[2]) - z, (0.0 if is_flat else high[2]) - z
@@ -296,8 +286,7 @@ def _of_box(
 
 @kernel
 def put_keys(segments: Any, t: float, bodies: Any, keys: Any) -> None:
-    """Set keys (n,) to Morton codes, 32 cells an axis, of the points at parameter t of segments (G. M. Morton, 1966).
-    """
+    """Set keys (n,) to Morton codes, 32 cells an axis, of points at parameter t of segments (G. M. Morton, 1966)."""
     origin, inverse = bodies.tree.origin, bodies.inverse
     for item in range(segments.shape[0]):
         key = 0

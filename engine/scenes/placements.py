@@ -27,8 +27,7 @@ from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 _FEW: Final = 64
 _PART: Final = 4
 """Up to `_FEW` moved bodies, or 1 / `_PART` of the scene, are stored apart from the others; more become the scene's
-own.
-"""
+own."""
 _LISTED: Final = 128
 """Most moved bodies whose boxes are tested one by one, which is as fast as building a tree."""
 _NO_WORDS: Final = [0] * (PLACED + 1)
@@ -107,8 +106,7 @@ class Placements(Preparing):
         return (self._placed or self.placed_numbers(budget))[0]
 
     def placed_numbers(self, budget: Budget) -> tuple[Where, FloatArray, FloatArray]:
-        """Return the positions of all bodies, and rotations and translations of the moved ones, the identity for None.
-        """
+        """Return the positions of all bodies, rotations and translations of the moved ones, the identity for None."""
         if self._placed is None:  # who comes second makes the same
             tree, names = self.base.tree(budget), self.names
             if self.moved:
@@ -150,8 +148,7 @@ class Placements(Preparing):
     def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
         """Return the keys first * n + second of the pairs of a named body and another whose boxes meet, and their
         relations. Boxes are enlarged by `reach`; keys are unsorted; relations are those of the batch of convex bodies,
-        else UNSETTLED. Raises: as `collide_scene` for an unsupported body.
-        """
+        else UNSETTLED. Raises: as `collide_scene` for an unsupported body."""
         batches, (where, *moves), room = self.base.batches(budget), self.placed_numbers(budget), 16 + 6 * len(named)
         arrays, d = batches.bodies, batches.bodies.dimension
         still, moved = Placed(arrays.kinds, arrays.rotations, arrays.translations), Placed(arrays.kinds, *moves)
@@ -187,8 +184,7 @@ class Placements(Preparing):
 
     def has_new_trees(self, solids: list[Polyhedron]) -> bool:
         """Return whether cached location tables lack a tree or cells of some solids, cached by now; then these tables
-        are dropped.
-        """
+        are dropped."""
         known: set[int] = self.base.prepared("trees", lambda: set())
         new = {2 * id(solid) + (solid.cached("sides") is not None) for solid in solids} - known
         if new:
@@ -201,12 +197,10 @@ class Placements(Preparing):
 
 Placed = namedtuple("Placed", "kinds rotations translations")
 """Placements of n bodies: kinds (n,) their solids, rotations (n + 1, d, d) and translations (n + 1, d), row 0 the
-identity.
-"""
+identity."""
 PairRows = namedtuple("PairRows", "keys kinds rotations translations")
 """Pairs of bodies. keys (room,): first * n + second. kinds, rotations, translations (2 room + 1, ...): their bodies,
-those of pair i in rows 2 i + 1 and 2 i + 2; row 0 is the identity.
-"""
+those of pair i in rows 2 i + 1 and 2 i + 2; row 0 is the identity."""
 
 
 @inline
@@ -264,7 +258,6 @@ def list_pairs(
 @inline
 def _outward(value: float, reach: float, side: int) -> float:
     """Return a bound of a box moved outward (side 0: down, 1: up) by more than a pose may stretch `reach`
-    (bounding/aabb.py).
-    """
+    (bounding/aabb.py)."""
     far = 1.001 * reach
     return np.nextafter(value - far, -np.inf) if side == 0 else np.nextafter(value + far, np.inf)

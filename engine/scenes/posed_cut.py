@@ -52,8 +52,7 @@ def _turned(m: FloatArray, v: Vector) -> tuple[Vector, float]:
 @inline
 def in_frame(body: IntArray, segments: FloatArray, item: int) -> Frame:
     """Return start p' and vector e' of a segment in the frame of a body, each with the error bound of its coordinates.
-    body: row (4,) of a `Table`; without a pose both bounds are 0.
-    """
+    body: row (4,) of a `Table`; without a pose both bounds are 0."""
     is_flat = segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     way = difference(p, q)
@@ -81,8 +80,7 @@ def _plane_at(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[f
 @inline
 def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float]:
     """Return dot(n, v) + offset in doubles, and its error bound; blur: error of each coordinate of v. Three sums, a
-    product and the low part of v: ``|error| <= 5 u (|x| + |y| + |z| + |offset|)``, x, y, z the products.
-    """
+    product and the low part of v: ``|error| <= 5 u (|x| + |y| + |z| + |offset|)``, x, y, z the products."""
     x, y, z = row[0] * v[0][0], row[1] * v[1][0], row[2] * v[2][0]
     size = abs(x) + abs(y) + abs(z) + abs(offset)
     return x + y + z + offset, 2.0**-50 * size + 1.01 * blur * (abs(row[0]) + abs(row[1]) + abs(row[2]))
@@ -92,8 +90,7 @@ def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[floa
 def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
     """Return 1 if a segment provably meets the intersection of half-spaces, -1 if not, or UNDECIDED; and, for 1, the
     rows of the planes that cut it first and last, -1 for none; in doubles. Each parameter t = -s / d has the error r =
-    1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000.
-    """
+    1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000."""
     own, blur, along, along_blur = frame
     enters, leaves, first, last, is_proven = (-1.0, -1.0), (2.0, 2.0), -1, -1, True
     for face in range(rows.shape[0]):
@@ -128,8 +125,7 @@ def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
 @inline
 def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
     """Return 1, -1 or UNDECIDED as `_planes_cut` for the half-spaces of a body; and, unless `is_any`, both ends of the
-    piece. Ends as `put_piece` takes them.
-    """
+    piece. Ends as `put_piece` takes them."""
     frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
     own, blur, along, along_blur = frame
     meets, entered, left = _planes_cut(rows, frame)
@@ -149,8 +145,7 @@ def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool
 @inline
 def in_ball(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
     """Return as `between_planes` for a ball with centre c: d = q - p, and f = p - c, off by the rounding of the posed
-    c.
-    """
+    c."""
     c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     along = difference(p, q)

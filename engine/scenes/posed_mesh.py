@@ -35,8 +35,7 @@ UNSURE: Final = -1
 WANTS_BODY: Final = -2
 WANTS_TREE: Final = -3
 """Codes in place of a number of pieces: UNSURE, undecided; WANTS_BODY, WANTS_TREE: the body, or its location tree, must
-be prepared first.
-"""
+be prepared first."""
 
 
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
@@ -80,8 +79,7 @@ def _tree_of(address: int) -> Any:
 @inline
 def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
     """Fill cuts.met and cuts.codes with the triangles that segment pq crosses, and how; return their number. UNSURE if
-    one is not proven. With `is_any`, the first triangle proven to be met ends the search with 1.
-    """
+    one is not proven. With `is_any`, the first triangle proven to be met ends the search with 1."""
     cuts = scratch.cuts
     waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
     n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
@@ -97,8 +95,7 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
 def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
     """Merge sorted crossings in one point; return the number of crossings left, or UNSURE. If the location does not
     flip, a closed mesh is met in a point, or not left: such a point is written twice, the second time as -2 - face. At
-    least two crossings make such a point, so 4 n places suffice.
-    """
+    least two crossings make such a point, so 4 n places suffice."""
     cuts, order, n_out, begin = scratch.cuts, scratch.cuts.order, 2 * n, 0
     if 4 * n > MOST_MET:
         return UNSURE
@@ -142,8 +139,7 @@ def _values(at_p: tuple[float, ...], blur: float, normal: Any) -> Any:
 @inline
 def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
     """Compute crossing ``place`` (t and point), equal to an earlier one in the same corner or edge; return whether all
-    coordinates are correctly rounded.
-    """
+    coordinates are correctly rounded."""
     (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
@@ -193,8 +189,7 @@ def crossings_in(
 ) -> tuple[int, bool]:
     """Compute the crossings of a segment with a placed mesh, in order; return their number, and whether its start is
     inside. The number may be UNSURE, WANTS_BODY or WANTS_TREE. With `is_any` crossings are not computed, and any
-    positive number means that there is one.
-    """
+    positive number means that there is one."""
     is_placed, is_closed, scratch = body[3] != 0, body[1] != 0, scratch_at(words)
     lines, numbers = array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
     frame = in_frame(body, segments, item)

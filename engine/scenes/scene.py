@@ -228,8 +228,7 @@ class Scene(Immutable):
         self, named: list[int], query: PairQuery, budget: Budget, workers: int | None, progress: Progress | None
     ) -> tuple[ScenePairs, Accuracy]:
         """Return the pairs of a named body and any other; convex bodies in one batch, other pairs as a scene of their
-        own.
-        """
+        own."""
         standing, n = self._placements, len(self)
         reach = 0.0 if query.gap is None else checked_distance(query.gap, "gap")
         keys, relations = standing.pairs_with(np.array(named, np.int64), reach, bool(query.boolean), budget)
@@ -377,8 +376,7 @@ class Scene(Immutable):
 
 
 def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Pose | None, ...]]:
-    """Return solids of one dimension and a pose or None for each; other shapes are read as by `engine.solids.shapes`.
-    """
+    """Return solids of one dimension and a pose or None for each; other shapes are read by `engine.solids.shapes`."""
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
     solids = list(solids)

@@ -82,8 +82,7 @@ def _cut_on(
 
 @inline
 def _emit_points(cuts: Crossings, n: int, source: int, out: Pieces, row: int) -> int:
-    """Write each of the n crossings with a surface as a piece of one point, second face -2 - face; return their number.
-    """
+    """Write each of the n crossings with a surface as a one-point piece, second face -2 - face; return their number."""
     for place in range(n):
         i = cuts.order[place]
         out.source[row + place] = source
@@ -145,8 +144,7 @@ def cut_near(
 @inline
 def _record_first_hit(scratch: Scratch, name: int) -> None:
     """Store the piece in row 0 as first piece of the segment, if no stored one begins before it; name: its body. hit[1]
-    is set if both begin at parameters that round alike.
-    """
+    is set if both begin at parameters that round alike."""
     room, best, hit = scratch.room, scratch.best, scratch.hit
     t = room.t[0, 0]
     if t > best[0]:
@@ -181,8 +179,7 @@ def _query_body(
     words: IntArray, body: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
     """Clip a segment to one body for its first piece, or any. Returns SETTLED to continue with the next body, MET or
-    OPEN to end, or WANTS_BODY, WANTS_TREE.
-    """
+    OPEN to end, or WANTS_BODY, WANTS_TREE."""
     scratch = scratch_at(room)
     n_pieces = _cut_on(words, body, segments, item, is_any, room, stop, scratch.room, 0)
     if n_pieces < UNSURE:
@@ -203,8 +200,7 @@ def _query_body(
 def _first_hit_bound(scratch: Scratch, bodies: BodyTree, way: Way) -> Any:
     """Return a bound beyond the start of the first piece so far, as parameter of the segment in tree coordinates. On
     the longest axis k, t = (x - m) / e. The slack exceeds the rounding of m and e; it is taken twice. That of x, the
-    nearest double, is half an ulp where it was computed: much, in the tree, for a scene far from the origin.
-    """
+    nearest double, is half an ulp where it was computed: much, in the tree, for a scene far from the origin."""
     k = longest_axis(way.half)
     if scratch.hit[0] < 0 or way.half[k] == 0.0:
         return np.float32(1.0)
@@ -220,8 +216,7 @@ def _search_tree(
 ) -> int:
     """Clip a segment to the bodies of one `BodyTree`, about in order of entry, until none can have an earlier piece.
     side: 0 for the bodies as first placed, 1 for moved ones. With is_any one met body ends the search. Returns SETTLED
-    to continue with the next tree, MET or OPEN to end, or WANTS_BODY, WANTS_TREE.
-    """
+    to continue with the next tree, MET or OPEN to end, or WANTS_BODY, WANTS_TREE."""
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
     way, last = way_of(segments, item, bodies), np.float32(1.0)
     begin_way(bodies, way, scratch)

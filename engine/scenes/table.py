@@ -44,8 +44,7 @@ class Table:
         """The same, of one body."""
 
     def prepare(self, body: int, wanted: int) -> None:
-        """Fill the row of a body, or the location tree of its solid (WANTS_TREE). Caller holds the lock of the bodies.
-        """
+        """Fill the row of a body, or the location tree of its solid (WANTS_TREE). Caller holds the bodies' lock."""
         solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)
@@ -108,8 +107,7 @@ def _words_of(solid: Any) -> IntArray:
 
 def _frame_of(pose: Pose) -> FloatArray | None:
     """Return the frame of a pose (3, 7): by axis a row of R^-1 as double-doubles, then the translation; planar poses
-    fix z. None if numbers are out of the kernels' range.
-    """
+    fix z. None if numbers are out of the kernels' range."""
     entries, below = exact_inverse(pose)
     n, frame = pose.dimension, np.zeros((3, 7))
     frame[2, 4] = 1.0
@@ -119,6 +117,5 @@ def _frame_of(pose: Pose) -> FloatArray | None:
 
 
 def _are_safe(numbers: Iterable[float]) -> bool:
-    """Return whether all numbers are zero or within the range in which kernels compute without underflow or overflow.
-    """
+    """Return whether all numbers are zero or in the range in which kernels compute without underflow or overflow."""
     return all(x == 0.0 or SMALLEST <= abs(x) <= LARGEST for x in numbers)

@@ -158,10 +158,7 @@ def clip_segments(
 
 
 def plan_for(region: Solid) -> Plan:
-    """Return the cached clipping plan of a solid.
-
-    Raises: UnsupportedSolidError.
-    """
+    """Return the cached clipping plan of a solid. Raises: UnsupportedSolidError."""
     make = row_of(region).clip
     if make is None:
         raise refused(region, "clip_segments does not take", lambda row: row.clip, where=("region",))

@@ -48,8 +48,7 @@ T_TINY: Final = 2.0**-1060
 SHORTEST: Final = 2.0**-400
 LONGEST: Final = 2.0**400
 """Range of |d| (SHORTEST .. LONGEST) in which the bound of a crossing holds: quotients of products that underflow are
-below `_UNDERFLOW`.
-"""
+below `_UNDERFLOW`."""
 _UNDERFLOW: Final = 2.0**-600
 _CLOSE: Final = 48.0 * U2
 """Relative error of the difference of two parameters: 26 u^2 for both, 6 u^2 for the difference of their low parts;
@@ -74,8 +73,7 @@ class PlaneCrossing(NamedTuple):
 @merged
 def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing:
     """Return the crossing of a segment with the plane x = at; p, q: coordinates of its ends on that axis. plane: its
-    number, copied.
-    """
+    number, copied."""
     n, n_low = two_diff(at, p)
     d, d_low = two_diff(q, p)
     d = d if p != q else 1.0  # not met: any number
@@ -88,8 +86,7 @@ def slab_crossings(
     p: float, q: float, low: float, high: float, axis: float
 ) -> tuple[PlaneCrossing, PlaneCrossing, bool]:
     """Return the crossings where a segment enters and leaves the slab low .. high; False if q - p is out of range. p,
-    q: coordinates of its ends on the axis (0.0, 1.0, 2.0).
-    """
+    q: coordinates of its ends on the axis (0.0, 1.0, 2.0)."""
     is_entered, is_left = (p < low) | (p > high), (q < low) | (q > high)
     entered = plane_crossing(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
     left = plane_crossing(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
@@ -103,8 +100,7 @@ def slab_crossings(
 @merged
 def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]:
     """Return the parameter of a minus that of b, and whether its sign is proven; exactly 0.0 if both are proven equal.
-    Of exact differences equality is n_a d_b = n_b d_a (lattices: diagonals through corners).
-    """
+    Of exact differences equality is n_a d_b = n_b d_a (lattices: diagonals through corners)."""
     gap = (a.t - b.t) + (a.t_low - b.t_low)
     left, left_tail = two_prod(a.n, b.d)
     right, right_tail = two_prod(b.n, a.d)
@@ -115,8 +111,7 @@ def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]
 @merged
 def slab(p: float, q: float, low: float, high: float, not_entered: float, not_left: float) -> tuple[float, float]:
     """Return the parameters at which a segment enters and leaves low .. high, in doubles. p, q: coordinates of its ends
-    on the axis. not_entered, not_left: returned where it does not.
-    """
+    on the axis. not_entered, not_left: returned where it does not."""
     d = q - p if p != q else 1.0  # not met: any number
     enters, leaves = ((low if p < low else high) - p) / d, ((low if q < low else high) - p) / d
     return (enters if (p < low) | (p > high) else not_entered), (leaves if (q < low) | (q > high) else not_left)
@@ -125,8 +120,7 @@ def slab(p: float, q: float, low: float, high: float, not_entered: float, not_le
 @merged
 def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
     """Return state, plane entered and plane left (-1.0: none) of segment p q in a box low .. high. State: 0.0 REJECTED,
-    1.0 ACCEPTED, 2.0 OPEN, if doubles do not prove it.
-    """
+    1.0 ACCEPTED, 2.0 OPEN, if doubles do not prove it."""
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, low, high
     misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
     misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit

@@ -29,10 +29,8 @@ from engine.segment_clipping.pieces import ACCEPTED, BLOCK, REJECTED, is_plain, 
 from engine.types import OPEN, UNDECIDED, FlagArray, FloatArray, Int32Array, IntArray
 
 VALUE_BOUND: Final = 8.0 * 2.0**-53
-"""Error bound of a plane value a x + b y + c z + d in doubles, relative to sum |terms|.
-
-Each term has a factor of at most (1 + u)^4, so has sum |terms|: 8 u covers both and the rounding of the bound.
-"""
+"""Error bound of a plane value a x + b y + c z + d in doubles, relative to sum |terms|. Each term has a factor of at
+most (1 + u)^4, so has sum |terms|: 8 u covers both and the rounding of the bound."""
 VALUE_TINY: Final = 2.0**-1070
 """Error bound of products that underflow: 2^-1074 each."""
 T_ROUNDINGS: Final = 8.0 * 2.0**-53
@@ -44,8 +42,7 @@ NARROWEST: Final = 2.0**-960
 
 
 class Latest(NamedTuple):
-    """The last plane that a segment crosses: at t, known to +- slack; rival: largest t that any other plane may have.
-    """
+    """The last plane that a segment crosses: at t +- slack; rival: largest t that any other plane may have."""
 
     t: float
     slack: float
@@ -56,8 +53,7 @@ class Latest(NamedTuple):
 def as_columns(rows: FloatArray) -> FloatArray:
     """Return plane rows (m, dim + 1) as columns (dim + 3, m), with two columns of error bounds. The bounds of a value
     in doubles: relative to the largest coordinate, and absolute. They are zero if a value is a coordinate and a number,
-    rounded once: its sign is exact, and comparisons have room for a rounding of each.
-    """
+    rounded once: its sign is exact, and comparisons have room for a rounding of each."""
     with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
         slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
         floor = VALUE_BOUND * np.abs(rows[:, -1]) + VALUE_TINY
@@ -70,8 +66,7 @@ def as_columns(rows: FloatArray) -> FloatArray:
 
 @inline
 def are_safe(row: FloatArray, segment: FloatArray) -> bool:
-    """Return whether all numbers of a plane row and a segment are zero or in the range in which expansions are exact.
-    """
+    """Return whether all numbers of a plane row and segment are zero or in the range in which expansions are exact."""
     safe = True
     for k in range(row.size):
         safe = safe and is_safe(row[k])
@@ -100,8 +95,7 @@ def exact_sign(row: FloatArray, point: FloatArray) -> int:
 @called
 def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> int:
     """Return the exact sign of t_i - t_j, the parameters where a segment crosses two planes, all in the range of
-    `are_safe`.
-    """
+    `are_safe`."""
     p_i, q_i, p_j, q_j, e = workspace(8), workspace(8), workspace(8), workspace(8), workspace(200)
     n_pi, n_qi = expand_value(row_i, segment[0], p_i), expand_value(row_i, segment[1], q_i)
     n_pj, n_qj = expand_value(row_j, segment[0], p_j), expand_value(row_j, segment[1], q_j)
@@ -114,8 +108,7 @@ def decide_by_rows(
 ) -> tuple[int, int, int, int]:
     """Decide one segment by n chosen planes; return state, plane entered, plane left (-1: none), and 1 if beyond the
     filter. chosen: columns of the planes; planes are returned as indices into it. s_p, s_q, bounds: value of each plane
-    at both ends, and their error bound. An uncertain sign or order outside the safe range leaves the state OPEN.
-    """
+    at both ends, and their error bound. An uncertain sign or order outside the safe range leaves the state OPEN."""
     entered = left = -1
     beyond = 0
     for i in range(n):
@@ -159,8 +152,7 @@ def decide_by_rows(
 def compare_rows(
     segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, i: int, j: int
 ) -> tuple[int, bool]:
-    """Return the sign of t_i - t_j for chosen planes i and j that a segment crosses, and whether the filter sufficed.
-    """
+    """Return the sign of t_i - t_j for the planes i and j that a segment crosses, and whether the filter sufficed."""
     order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
     if order != UNDECIDED:
         return order, True
@@ -172,8 +164,7 @@ def compare_rows(
 
 @merged
 def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
-    """Return the later of the latest crossing so far, `best`, and a crossing at t +- slack, ignored unless is_crossed.
-    """
+    """Return the later of the latest crossing so far, `best`, and a crossing at t +- slack, only if is_crossed."""
     is_later = is_crossed & (t > best.t)
     other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
     return Latest(
@@ -186,8 +177,7 @@ def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best:
 def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> float:
     """Return the state (0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN) of a segment. entered: the last plane entered; left: the
     first plane left, with -t for t. t = s_p / (s_p - s_q) has the error bound / (|s_p| + |s_q|) if both values have the
-    error bound. is_out, is_open: already decided so.
-    """
+    error bound. is_out, is_open: already decided so."""
     start, end = entered.t, -left.t
     is_sure = max(start + entered.slack, entered.rival) < min(end - left.slack, -left.rival)
     is_sure = is_sure & ((entered.plane < 0.0) | (entered.rival < start - entered.slack))
@@ -210,8 +200,7 @@ def decide_alone(
     segments: FloatArray, item: int, columns: FloatArray, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
     """Decide segment ``item``; return as `decide_by_rows`, with planes as indices of rows. limit: `coordinate_limit`.
-    numbers (3, m), chosen (m,): scratch.
-    """
+    numbers (3, m), chosen (m,): scratch."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]

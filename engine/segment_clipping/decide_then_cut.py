@@ -32,8 +32,7 @@ Clipped = tuple[Pieces, int, int]
 
 FEW: Final = 32
 """Most segments of a small batch, run as one chunk; and most OPEN items for which the exact fallback costs no more than
-a search for a scale.
-"""
+a search for a scale."""
 
 
 _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
@@ -151,8 +150,7 @@ def _clip(
 class _Batch:
     """Clips chunks of a batch and writes each piece to its final row, after those of all earlier chunks. Rows are
     assigned in the order of the chunks: a chunk that is decided early waits, and the thread that decides the chunk
-    before it also fills it. Rows are allocated for a piece of every segment; unused ones cost address space only.
-    """
+    before it also fills it. Rows are allocated for a piece of every segment; unused ones cost address space only."""
 
     def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
         n, _, dimension = scene.points.shape
@@ -188,8 +186,7 @@ class _Batch:
 
     def _next_to_fill(self) -> tuple[int, Int32Array, Int32Array, int] | None:
         """Return first row, segments, planes and number of rows of the next chunk in order; None if it is still
-        undecided.
-        """
+        undecided."""
         with self._lock:
             if self._next not in self._waiting:
                 return None
@@ -220,8 +217,7 @@ class _Batch:
 
 def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, region: Solid, budget: Budget) -> Pieces:
     """Return the pieces in order of source, after the exact fallback recomputed uncertain rows and clipped OPEN
-    segments.
-    """
+    segments."""
     rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
     again = clip_exactly(segments, filled.source[rows], region, None, budget)
     filled.t[rows], filled.ends[:, rows], filled.faces[rows] = again.t, again.ends, again.faces

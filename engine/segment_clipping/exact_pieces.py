@@ -36,8 +36,7 @@ _CHECK_EVERY: Final = 64
 
 class Contact(NamedTuple):
     """Common part of a segment and an element (edge or triangle), from parameter `first` to `last`, equal for a point.
-    is_along: the segment lies in the element's plane or line. turns: the perturbed line crosses the element.
-    """
+    is_along: the segment lies in the element's plane or line. turns: the perturbed line crosses the element."""
 
     first: Fraction
     last: Fraction
@@ -53,8 +52,7 @@ def _cross(u: Integers, v: Integers) -> Integers:
 
 def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
     """Return first and last parameter of the common part of segment p q and edge a b, and whether they are collinear.
-    Collinear also if a = b. None if there is no common point.
-    """
+    Collinear also if a = b. None if there is no common point."""
     u, v, w = minus(q, p), minus(b, a), minus(a, p)
     normal = _cross(u, v)
     size = dot(normal, normal)
@@ -114,8 +112,7 @@ def triangle_overlap(
 
 def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
     """Return whether the line through p and q, moved by infinitesimals, crosses an edge or triangle. Seen along the
-    line, an element parallel to it has no length or no area: it contains no perturbed point.
-    """
+    line, an element parallel to it has no length or no area: it contains no perturbed point."""
     u = minus(q, p)
     if len(u) == 2:
         return len({_cross(u, minus(corner, p))[0] > 0 for corner in corners}) == 2
@@ -154,8 +151,7 @@ def nodes_with_locations(
 ) -> Iterator[tuple[Fraction, list[Contact], bool, bool]]:
     """Yield each parameter of `nodes_of` with its contacts, and of the span after it: is it along an element? is it
     inside? locations: of the ends of the segment. locate: returns the location at a parameter; called at most once, if
-    both ends are on the boundary.
-    """
+    both ends are on the boundary."""
     nodes = nodes_of(contacts)
     n_along, has_turned = 0, False
     are_along, have_turned = [], []  # of the span after each node; turned: against the first span

@@ -27,8 +27,7 @@ from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
 
 Joined = namedtuple("Joined", "vertices offsets source heads tails")
 """Output of `join_parts`: vertices (2 m, dim), offsets (m + 1,) into them, and by joined piece its line and its first
-and last piece of a segment (m,).
-"""
+and last piece of a segment (m,)."""
 _PER_BLOCK: Final = 1 << 20
 """Pieces whose columns are gathered between two polls of the flag."""
 
@@ -237,8 +236,7 @@ def _continues(faces: IntArray, at: IntArray, part: int, after: int) -> bool:
 @inline
 def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: FloatArray, first: int, last: int) -> int:
     """Return how many pieces at the start of a closed line continue its last piece, and so move behind it. 0 unless
-    first and last vertex are equal and inside, and some piece of the line is not connected to the next.
-    """
+    first and last vertex are equal and inside, and some piece of the line is not connected to the next."""
     if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
         return 0
     if not are_same(vertices, first, vertices, last):

@@ -29,8 +29,7 @@ BLOCK: Final = 64
 
 class Piece(NamedTuple):
     """One piece of one segment: parameters and points, correctly rounded, and faces crossed (-1: the segment's own
-    end).
-    """
+    end)."""
 
     t: tuple[float, float]
     start: list[float]
@@ -70,8 +69,7 @@ def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -
 
 
 def in_order_of_source(parts: Sequence[Pieces]) -> Pieces:
-    """Merge several sets of pieces by source; caller guarantees that the pieces of one source are in one set, in order.
-    """
+    """Merge several sets of pieces by source; the pieces of one source must be in one set, in order."""
     pieces = joined(parts)
     order = np.argsort(pieces.source, kind="stable")
     return Pieces(pieces.source[order], pieces.ends[:, order], pieces.t[order], pieces.faces[order])
@@ -114,8 +112,7 @@ def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
 
 @inline
 def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low: float, slack: float) -> bool:
-    """Write the point at parameter t + low, relative error slack; return whether it and t are proven nearest doubles.
-    """
+    """Write the point at parameter t + low, relative error slack; return whether both are proven nearest doubles."""
     bound = (T_BOUND + slack) * abs(t)
     sure = (slack < 0.001) & (t + (low - bound) == t + (low + bound))
     for k in range(segments.shape[2]):

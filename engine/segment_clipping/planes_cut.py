@@ -22,8 +22,7 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 @called
 def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: int, at: float) -> tuple[float, bool]:
     """Set `point` to the crossing of a segment with the plane of `row`, by expansions; return t, and whether all is
-    proven. axis, at: of an axis-parallel plane, whose row has a single 1 or -1; else -1 and anything.
-    """
+    proven. axis, at: of an axis-parallel plane, whose row has a single 1 or -1; else -1 and anything."""
     wp, wq, e = workspace(8), workspace(8), workspace(96)
     if axis >= 0:  # what is not safe on other axes is multiplied by zero
         safe = is_safe(segment[0, axis]) and is_safe(segment[1, axis]) and is_safe(at)
@@ -39,8 +38,7 @@ def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: 
 @merged
 def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
     """Return the crossing x, y, z of p q with a plane, t, and whether all are proven nearest doubles. sp, sq: the
-    plane's value at p and q as double-double and error bound. slack: relative error bound of t.
-    """
+    plane's value at p and q as double-double and error bound. slack: relative error bound of t."""
     sp_h, sp_l, sp_bound = sp
     sq_h, sq_l, sq_bound = sq
     sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)

@@ -58,8 +58,7 @@ Point = Sequence[Number]
 
 class Node(NamedTuple):
     """A node of a profile: parameter, location there, faces entered and left there, location of the open span after it.
-    A face is -1 for none; a face that contains an end of the segment is named if no other is.
-    """
+    A face is -1 for none; a face that contains an end of the segment is named if no other is."""
 
     t: Parameter
     at: int
@@ -72,8 +71,7 @@ def clip_exactly(
     segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> Pieces:
     """Return the pieces of segments `items` of (n, 2, dim) by exact arithmetic. locations: of both ends of each, if
-    known. Raises: UnsupportedSolidError, what `Budget.check` raises.
-    """
+    known. Raises: UnsupportedSolidError, what `Budget.check` raises."""
     sources: list[int] = []
     pieces: list[Piece] = []
     for place, item in enumerate(items.tolist()):
@@ -188,8 +186,7 @@ def unsupported(solid: Solid) -> UnsupportedSolidError:
 
 def check_cut(solids: Sequence[Solid]) -> bool:
     """Return True if segments can be clipped to all solids, leaves of CSG trees included; else raise
-    UnsupportedSolidError.
-    """
+    UnsupportedSolidError."""
     for body, solid in enumerate(solids):
         waiting = [solid]
         while waiting:  # bound: a tree has so many leaves at most
@@ -240,8 +237,7 @@ def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
 
 
 def _interval(a: Node, b: Node, between: int) -> list[Node]:
-    """Return the profile of one interval from node a to node b, maybe a point; between: the location of its open span.
-    """
+    """Return the profile of one interval from node a to node b, maybe a point; between: location of its open span."""
     nodes = [] if compare(a.t, ZERO) == 0 else [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE)]
     if compare(a.t, b.t) == 0:
         nodes.append(Node(a.t, min(a.at, b.at), a.entered, b.left, OUTSIDE))
@@ -296,8 +292,7 @@ def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
 
 def on_sphere(line: Line, solid: Sphere) -> list[Node]:
     """Return the profile of a segment in a ball. The ball is where a t^2 + 2 b t + c <= 0; c and c_end are the values
-    at t = 0 and t = 1.
-    """
+    at t = 0 and t = 1."""
     center: Point = solid.center.tolist()
     center, n = center if line.pose is None else to_world_frame(center, line.pose), len(center)
     numbers, _ = common_integers([*line.p, *line.q, *center, solid.radius])
@@ -362,8 +357,7 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
 
 
 def _near(elements: FloatArray, p: Point, q: Point) -> Any:
-    """Return the indices of the elements (k, corners, dim) that segment p q may meet, by their boxes, rounded outward.
-    """
+    """Return the indices of the elements (k, corners, dim) that segment p q may meet, by boxes rounded outward."""
     with np.errstate(all="ignore"):  # what is no number keeps an element
         a, b = (np.array([float(x) for x in point]) for point in (p, q))
         low, high = elements.min(axis=1), elements.max(axis=1)

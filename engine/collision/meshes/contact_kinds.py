@@ -46,8 +46,7 @@ BOTH = 3
 
 _BAD, FLUSH, N_SIGNS = 9, 10, 11
 """Slots of the work space after nine signs. _BAD: 1 if a sign is undecided; FLUSH: bits of the corners that lie in the
-plane of the other face, 3 bits a face.
-"""
+plane of the other face, 3 bits a face."""
 
 
 @called
@@ -67,8 +66,7 @@ def _orient_in_plane(
     work: Int8Array,
 ) -> int:  # fmt: skip
     """Return the orientation sign of three points of one plane; if it is undecided, return 0 and set ``work[_BAD]``.
-    off, axis: as of `turn_in_plane`.
-    """
+    off, axis: as of `turn_in_plane`."""
     turn = turn_in_plane(poses, a, b, c, off, axis, error)
     if turn == UNDECIDED:
         work[_BAD], turn = 1, 0
@@ -80,8 +78,7 @@ def _contact_with_face(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, axis: int, error: float, work: Int8Array
 ) -> int:
     """Return the strongest kind of contact of t with the open face u: EDGE_FACE, VERTEX_FACE, or VERTEX_EDGE if there
-    is none. sides: of t's corners at the plane of u. Sets ``work[_BAD]`` if a sign is undecided.
-    """
+    is none. sides: of t's corners at the plane of u. Sets ``work[_BAD]`` if a sign is undecided."""
     off, flat = off_plane_point(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     if not np.isfinite(off.x + off.y + off.z):
         work[_BAD] = 1
@@ -129,8 +126,7 @@ def _overlap_collinear(
     poses: FloatArray, t: Facet, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Int8Array
 ) -> bool:
     """Return whether edge k of t and the collinear segment c d share more than a point. Decided by orient3d against
-    planes through either end of the edge and off its line.
-    """
+    planes through either end of the edge and off its line."""
     a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), off_plane_point(t, axis)
     for end in range(2):
         p, q = (a, b) if end == 0 else (b, a)
@@ -146,8 +142,7 @@ def _interiors_of_edges_intersect(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Int8Array
 ) -> bool:
     """Return whether an open edge of t and an open edge of u have a common point. sides, their_sides: of the corners of
-    t at the plane of u, and vice versa. Sets ``work[_BAD]`` if a sign is undecided.
-    """
+    t at the plane of u, and vice versa. Sets ``work[_BAD]`` if a sign is undecided."""
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
     off, flat = off_plane_point(t, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     for k in range(3):
@@ -182,8 +177,7 @@ def _interiors_of_edges_intersect(
 @inline
 def single_coplanar_corner(sides: Signs) -> int:
     """Return the only corner of a face that lies in a plane, if the other two lie strictly on one side of it, else -1.
-    sides: of the three corners.
-    """
+    sides: of the three corners."""
     for k in range(3):
         if sides[k] == 0 and sides[(k + 1) % 3] * sides[(k + 2) % 3] == 1:
             return k
@@ -196,8 +190,7 @@ def classify_contact(
 ) -> tuple[int, int]:
     """Return the kind of contact of two faces with area (UNSETTLED if undecided), and bits of the open faces that it
     may cut. Bits: 1 for t, 2 for u, BOTH; 0 if the faces share a single point, or a part of their borders only. Sets
-    ``work[FLUSH]``.
-    """
+    ``work[FLUSH]``."""
     work[_BAD] = work[FLUSH] = 0
     sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
     for k in range(3):
@@ -271,8 +264,7 @@ def insert_sorted(
 ) -> tuple[int, int, int]:
     """Insert a pair of faces (i, j) and its kind into the last N_NAMED rows, in the order of `_precedes`, empty rows
     (-1) last. Returns the pair and kind pushed out, the last in order (possibly the given one); its first face is -1 if
-    a row was free.
-    """
+    a row was free."""
     n = kinds.shape[0]
     for place in range(n - N_NAMED if _precedes(faces, their_faces, i, j, pairs, n - 1) else n, n):
         if _precedes(faces, their_faces, i, j, pairs, place):
@@ -286,7 +278,6 @@ def insert_sorted(
 
 @inline
 def _precedes(faces: Any, their_faces: Any, i: int, j: int, pairs: Any, place: int) -> bool:
-    """Return whether the pair (i, j) sorts before that of row ``place``: by the caller's face numbers, then by index.
-    """
+    """Return whether the pair (i, j) sorts before that of row ``place``: by the caller's face numbers, then index."""
     p, q = pairs[place, 0], pairs[place, 1]
     return p < 0 or (faces[i], their_faces[j], i, j) < (faces[p], their_faces[q], p, q)

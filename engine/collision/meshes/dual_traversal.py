@@ -68,14 +68,12 @@ Descent = namedtuple("Descent", "stack frames work poses signs")
 Contacts = namedtuple("Contacts", "pairs kinds met")
 """Room for pairs of faces in contact: ``pairs`` (room, 2), and ``kinds`` (room,), their classes; room >= 1. met: empty,
 or for all faces of the first, then of the second body, whether a listed pair contains it. If it is not empty,
-`contact_kinds.py` selects the pairs to list, and there are N_NAMED rows more.
-"""
+`contact_kinds.py` selects the pairs to list, and there are N_NAMED rows more."""
 
 
 class Place(NamedTuple):
     """Placements of two bodies: a and b rounded (`place_pair`), the error of either, and that of exact signs under
-    poses.
-    """
+    poses."""
 
     a: Placement
     b: Placement
@@ -85,8 +83,7 @@ class Place(NamedTuple):
 
 class Search(NamedTuple):
     """One query about two bodies: meshes, placements, goal that ends it early (SEEK_...), room for contacts, cancel
-    flag.
-    """
+    flag."""
 
     first: MeshArrays
     second: MeshArrays
@@ -105,8 +102,7 @@ def new_descent() -> Descent:
 
 def new_contacts(room: int, n_faces: int = 0) -> Contacts:
     """Allocate room for pairs of faces in contact; n_faces: of both bodies, if pairs with a common corner are selected,
-    else 0.
-    """
+    else 0."""
     n = room + (N_NAMED if n_faces else 0)
     return Contacts(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
 
@@ -119,8 +115,7 @@ def capacity_of(contacts: Contacts) -> int:
 
 @inline
 def store_pose(poses: FloatArray, row: int, pose: PoseArrays, item: int) -> None:
-    """Write a pose to ``poses[row]`` for exact signs: nine numbers of the rotation, row by row, then the translation.
-    """
+    """Write a pose to ``poses[row]`` for exact signs: nine numbers of the rotation by rows, then the translation."""
     for i in range(3):
         for k in range(3):
             poses[row, 3 * i + k] = pose.rotations[item, i, k]
@@ -133,8 +128,7 @@ def place_bodies(
     second_item: int, descent: Descent,
 ) -> tuple[Place, bool]:  # fmt: skip
     """Place two bodies and fill the frames and poses of a search; return the placements, and whether the bodies are
-    proven disjoint.
-    """
+    proven disjoint."""
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
     is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
@@ -159,8 +153,7 @@ def placed_triangle(t: Facet, place: Placement) -> Facet:
 @inline
 def unposed_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
     """Return face i of the first and face j of the second body in their own coordinates, tagged with their pose
-    numbers.
-    """
+    numbers."""
     own = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
     return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
 
@@ -168,8 +161,7 @@ def unposed_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
 @inline
 def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
     """Return faces i and j as input of exact signs, and for each an axis along which its projection has an area. If
-    placing is exact (error 0) these are posed points; else points before their poses, with pose numbers.
-    """
+    placing is exact (error 0) these are posed points; else points before their poses, with pose numbers."""
     axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
     if s.place.error == 0.0:
         t, u = placed_triangle(triangle_of(s.first, i), s.place.a), placed_triangle(triangle_of(s.second, j), s.place.b)
@@ -186,8 +178,7 @@ def exact_error(s: Search) -> float:
 
 @merged
 def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
-    """Return CORNER + 3 k + m for two faces proven to share one corner only, else UNDECIDED; t, u: the faces as placed.
-    """
+    """Return CORNER + 3 k + m for two faces proven to share one corner, else UNDECIDED; t, u: the faces as placed."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their = unposed_faces(s, i, j)
@@ -221,8 +212,7 @@ def is_decisive(s: Search, kind: int, i: int, j: int) -> bool:
 @merged
 def pop_lowest_bit(low: int, high: int) -> tuple[int, int, int]:
     """Clear the lowest set bit of a 64-bit mask, given as two 32-bit halves (not both 0); return its index and both
-    halves.
-    """
+    halves."""
     if low != 0:
         return lowest_bit(low), low & (low - 1), high
     return 32 + lowest_bit(high), low, high & (high - 1)
@@ -272,8 +262,7 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
 @merged
 def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]:
     """Replace the nodes i and j on the stack by the pairs of children that may intersect. Returns the height of the
-    stack and two halves of a mask: for two leaf blocks, the pairs of faces that may intersect.
-    """
+    stack and two halves of a mask: for two leaf blocks, the pairs of faces that may intersect."""
     stack, frames, work, _, _ = s.descent
     child, their_child = s.first.child, s.second.child
     i_block, j_block = child[i, 0] < 0, their_child[j, 0] < 0
@@ -306,8 +295,7 @@ def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]
 @merged
 def search(s: Search) -> tuple[int, int]:
     """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...) and the number of pairs. If
-    one pair decides the query, it stands in row 0.
-    """
+    one pair decides the query, it stands in row 0."""
     stack = s.descent.stack
     stack[0, 0], stack[0, 1] = 0, 0
     n_stack, n_pairs = 1, 0

@@ -52,8 +52,7 @@ def on_lattice(value: float, shift: int) -> int:
 
 
 class ExactBody:
-    """A body under its pose, in integers: every coordinate times 2^shift. Vertices and planes are computed on demand.
-    """
+    """A posed body, in integers: every coordinate times 2^shift. Vertices and planes are computed on demand."""
 
     def __init__(self, mesh: MeshBody, pose: Pose | None, shift: int) -> None:
         self.mesh = mesh
@@ -138,8 +137,7 @@ def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
 @inline
 def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: FloatArray) -> bool:
     """Return whether the box of child ``lane`` of a node, posed and enlarged by ``margin``, is proven disjoint from
-    ``bounds``. bounds: x, y, z minimum, then maximum. A NaN proves nothing.
-    """
+    ``bounds``. bounds: x, y, z minimum, then maximum. A NaN proves nothing."""
     r, t = pose.rotations[0], pose.translations[0]
     for i in range(3):
         centre, half = t[i], margin
@@ -154,8 +152,7 @@ def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, mar
 @allocating_kernel
 def _faces_in_box(mesh: MeshArrays, pose: PoseArrays, bounds: FloatArray, hits: IntArray) -> int:
     """Write the triangles whose posed boxes may intersect ``bounds`` (6,) to ``hits`` (room,); return their number,
-    maybe more than the room.
-    """
+    maybe more than the room."""
     t = pose.translations[0]
     shift = max(abs(t[0]), abs(t[1]), abs(t[2]))
     margin = 2.0**-47 * (3.0 * mesh.extent.reach + shift) + 2.0**-1060  # 8 times the error of `placement.py`
@@ -219,8 +216,7 @@ def _common_weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector
 
 def _is_feasible(positive: list[Vector], not_negative: list[Vector]) -> bool:
     """Return whether some vector z gives dot(row, z) > 0 for all rows of `positive`, and >= 0 for all of
-    `not_negative`.
-    """
+    `not_negative`."""
     n = len(positive[0])
     rows = {(*row, True) for row in positive} | {(*row, False) for row in not_negative}
     for k in range(n):  # of rows that grow and fall with z[k], a sum without it
@@ -258,8 +254,7 @@ def classify_exact(t1: Corners, t2: Corners) -> int:
 
 def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
     """Return the kind of contact of two faces that intersect, the strongest one: face_face, edge_face, ...,
-    vertex_edge.
-    """
+    vertex_edge."""
     first, second = _features(as_simplex(t1)), _features(as_simplex(t2))
 
     def meet(d: int, e: int) -> bool:

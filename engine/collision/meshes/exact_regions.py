@@ -45,8 +45,7 @@ WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
 
 class Sides(NamedTuple):
     """Whether a body is inside just above a point, inside just below it, and inside at it (then the point lies on no
-    face).
-    """
+    face)."""
 
     above: bool
     below: bool
@@ -55,8 +54,7 @@ class Sides(NamedTuple):
 
 def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
     """Return whether `body` is inside just above q along `axis`, just below and at q. Caller guarantees that no face
-    through q is parallel to the axis.
-    """
+    through q is parallel to the axis."""
     sides = sides_over(body, q, axis, None)
     assert sides is not None
     return sides
@@ -64,8 +62,7 @@ def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
 
 def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
     """Return as `sides_at` for a point q of `plane`; None if a face through q, not parallel to that plane, makes it
-    ambiguous. plane None: that is not tested.
-    """
+    ambiguous. plane None: that is not tested."""
     if not body.mesh.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
@@ -93,8 +90,7 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
     """Return 1 if the body lies on the side of a clean face to which its normal points, -1 if on the other; 0 if
-    undecided. Cached in the mesh.
-    """
+    undecided. Cached in the mesh."""
     cached, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
     if cached[face] not in (1, -1):
         for q in points_within(body.corners(face)):
@@ -121,8 +117,7 @@ def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float]
 
 def _perturbed_line_hits(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
     """Return whether the line through (x, y) / w along the third axis, moved by (eps, eps^2), passes through a face. j,
-    k: the axes of x and y. Caller guarantees that the face is not parallel to the line.
-    """
+    k: the axes of x and y. Caller guarantees that the face is not parallel to the line."""
     before = 0
     for index in range(3):
         a, b = corners[index], corners[(index + 1) % 3]
@@ -142,8 +137,7 @@ def regions_of(
 ) -> Iterator[Homogeneous]:
     """Yield a point in each region into which the faces of `cutters` cut a face with area; no point lies on a trace.
     only: (side, faces): restricts the cutters to parts of these faces strictly on that side (1, -1) of the face's
-    plane.
-    """
+    plane."""
     traces = _traces(body, face, cutters, budget, only)
     if not traces:
         yield next(points_within(body.corners(face)))
@@ -153,8 +147,7 @@ def regions_of(
 
 def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
     """Yield an interior point and the four corners of each trapezoid between the traces of the body's other faces on a
-    face.
-    """
+    face."""
     plane, axis = body.plane(face), body.axis(face)
     for (x, y), (x0, x1, low, high) in _sample_regions(body, face, _traces(body, face, [body], budget, None), budget):
         corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
@@ -177,8 +170,7 @@ def _segment(p: Rational2, q: Rational2) -> Trace:
 
 
 def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None) -> list[Trace]:
-    """Return the segments in which other faces intersect the plane of a face, near the face, projected along its axis.
-    """
+    """Return the segments where other faces intersect the plane of a face, near the face, projected along its axis."""
     low, high = _around(body, [(*p, 1) for p in body.corners(face)])
     segments = set()
     for cutter in cutters:
@@ -195,8 +187,7 @@ def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget
 
 def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
     """Return the segments in which a face intersects a plane, projected along ``axis``; values: its corners' in the
-    plane's equation.
-    """
+    plane's equation."""
     if not any(values):
         return [(drop_axis(points[i], axis), drop_axis(points[i - 2], axis)) for i in range(3)]
     flat = [drop_axis(p, axis) for p in points]
@@ -237,8 +228,7 @@ def _sample_regions(
 
 
 class _Segment(NamedTuple):
-    """A segment of the plane: its ends, the same as integers (x, y, w), left and right, and its line a x + b y + c = 0.
-    """
+    """A planar segment: its ends, the same as integers (x, y, w), left and right, and its line a x + b y + c = 0."""
 
     ends: Trace
     left: Vector
@@ -276,8 +266,7 @@ def pieces_of_segment(
     body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
 ) -> Iterator[Homogeneous]:
     """Yield a point inside each piece into which the faces of `cutter` cut a segment, homogeneous; some may lie on a
-    face.
-    """
+    face."""
     p, q = ends
     low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}
@@ -297,8 +286,7 @@ def pieces_of_segment(
 
 def _planes_that_cut(cutter: ExactBody, face: int) -> Iterator[Plane]:
     """Yield the plane of a face, and the planes through its edges perpendicular to it. A segment enters or leaves the
-    body only where it crosses one of these.
-    """
+    body only where it crosses one of these."""
     plane = cutter.plane(face)
     if any(plane[:3]):
         yield plane

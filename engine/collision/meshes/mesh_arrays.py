@@ -116,8 +116,7 @@ def build_mesh_body(solid: Solid) -> MeshBody:
 def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:
     """Build the mesh of checked arrays; faces: the caller's face number of each triangle. Triangles and vertices are
     copied in the order of the tree, so that faces near a contact are close in memory; large meshes under many poses
-    depend on it.
-    """
+    depend on it."""
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
     boxes = np.empty((n_triangles, 6))
@@ -193,8 +192,7 @@ def _fill_blocks(
     vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float, blocks: Float32Array
 ) -> None:
     """Fill blocks (n_nodes, 9, 8) of leaf nodes with the corners of their triangles (x, y, z of each), in tree
-    coordinates.
-    """
+    coordinates."""
     for node in range(child.shape[0]):
         if child[node, 0] >= 0:
             continue
@@ -211,8 +209,7 @@ def _fill_blocks(
 @kernel
 def _lattice_of(vertices: FloatArray) -> tuple[float, int, int]:
     """Return the largest |coordinate|; the largest k such that 2^k divides all coordinates (0 if all are zero); and
-    some k >= 0 such that every coordinate times 2^k is an integer.
-    """
+    some k >= 0 such that every coordinate times 2^k is an integer."""
     reach, lowest, smallest = 0.0, 2000, 2000
     for vertex in range(vertices.shape[0]):
         for k in range(3):
@@ -237,8 +234,7 @@ def lattice_shift(values: FloatArray) -> int:
 
 def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
     """Return vertices, triangles and the face number of each triangle (xmin, xmax, ymin, ymax, zmin, zmax) of a box. A
-    flat box has the triangles of one face.
-    """
+    flat box has the triangles of one face."""
     flat, corners = box.min == box.max, corners_of_box(box.min, box.max)
     faces = np.arange(6)
     if not flat.any():

@@ -41,8 +41,7 @@ from engine.types import FloatArray, IntArray, Relation
 
 def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
     """Return whether both bodies are inside on one side of some region of a face, and whether the face has a point
-    inside the other body. own: 0 or 1, the body of the face. The second result is valid if the first is False.
-    """
+    inside the other body. own: 0 or 1, the body of the face. The second result is valid if the first is False."""
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
     if axis < 0:
@@ -118,8 +117,7 @@ def relation_from_kernel(
 @lru_cache(1 << 14)
 def decode_row(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
     """Return the answer encoded in a row of `relate_poses`, None if incomplete. Cached, since constructing one costs
-    more than a search. pierces: the contact shows a surface inside the other body.
-    """
+    more than a search. pierces: the contact shows a surface inside the other body."""
     if relation == DISJOINT:
         return NO_CONTACT
     if UNSETTLED in (relation, kind):
@@ -150,8 +148,7 @@ def _relation(pair: MeshPair) -> Collision:
 
 def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collision:
     """Return OVERLAPPING or TOUCHING for a pair that meets without a crossing that proves OVERLAPPING. patches: by
-    body, its patches inside the other body.
-    """
+    body, its patches inside the other body."""
     contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
     both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):
@@ -190,8 +187,7 @@ _ABOVE, _BELOW = regions.Sides(True, False, False), regions.Sides(False, True, F
 
 def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
     """Return which of two overlapping polyhedra or boxes has a part outside the other, and whether their boundaries
-    meet.
-    """
+    meet."""
     with np.errstate(all="ignore"):  # kernels, where they run uncompiled
         a, b, poses = mesh_body_of(first), mesh_body_of(second), unless_identity(poses)
         if poses == (None, None) and _have_equal_faces(a, b):
@@ -249,8 +245,7 @@ class _OverlappingPair(MeshPair):
 
     def _record_region(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
         """Record who sticks out, by the statuses of body `own` (ours) and of the other (theirs) on both sides of a
-        region.
-        """
+        region."""
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
                 self._sticks_out[own] = True

@@ -151,8 +151,7 @@ class MeshPair:
 
     def named(self, *, piercing: bool = False) -> Witness | None:
         """Return the witness: the strongest of the first contacts, among equals that of the lowest faces; None if not
-        requested.
-        """
+        requested."""
         if not self.work.witness:
             return None
         best = tuple(self.row[KIND:N_CONTACTS])
@@ -174,8 +173,7 @@ class MeshPair:
 
     def patches(self, own: int, in_contact: IntArray, place: int) -> list[IntArray]:
         """Return the patches (connected faces without contact) of body `own` whose location in the other body is
-        ``place``. in_contact: its faces in contact. Each patch is an array of faces.
-        """
+        ``place``. in_contact: its faces in contact. Each patch is an array of faces."""
         mesh, other = self.meshes[own], self.meshes[1 - own]
         if not other.has_inside:
             return []
@@ -201,8 +199,7 @@ class MeshPair:
 
     def patch_sides(self, own: int, patch: IntArray) -> Iterator[Sides]:
         """Yield whether body `own` is inside above, below and at each region of a patch. One result suffices, and is
-        all, if a face has the status change across it.
-        """
+        all, if a face has the status change across it."""
         body = self.exact[own]
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):

@@ -28,8 +28,7 @@ FACE: Final = 6
 """
 _ROUNDING: Final = 2.0**-47
 """Bound on the rounding of a distance, relative to the largest coordinate seen from a corner: a point on an edge or
-face takes 4 roundings a coordinate; three dot products of 3 terms and the differences, less than 30 u in all.
-"""
+face takes 4 roundings a coordinate; three dot products of 3 terms and the differences, less than 30 u in all."""
 _TINY: Final = 1e-300
 _AS_GOOD: Final = 1.0 - 2.0**-45
 """The lower bound on a distance suffices if it is at least so much of the upper bound."""
@@ -37,8 +36,7 @@ _AS_GOOD: Final = 1.0 - 2.0**-45
 
 class Nearest(NamedTuple):
     """Nearest points so far, p on the first and q on the second triangle, their features (codes above), squared
-    distance.
-    """
+    distance."""
 
     p: Point3
     q: Point3
@@ -85,8 +83,7 @@ def _nearest_on_edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Near
 @inline
 def _project_to_triangle(p: Point3, t: Facet) -> tuple[bool, Point3]:
     """Return whether the foot of p on the plane of t lies in the triangle, and the foot. The foot is a convex
-    combination of the corners: a point of the triangle even if the normal of a needle is badly rounded.
-    """
+    combination of the corners: a point of the triangle even if the normal of a needle is badly rounded."""
     u, v, w = minus(t.q, t.p), minus(t.r, t.p), minus(p, t.p)
     normal = cross(u, v)
     size = dot(normal, normal)
@@ -107,8 +104,7 @@ class SlabBounds(NamedTuple):
 @inline
 def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, most: float) -> SlabBounds:
     """Return the bounds for new nearest points: from below by the slab between the triangles across the line of the
-    points. most: a lower bound above it ends the search.
-    """
+    points. most: a lower bound above it ends the search."""
     gap = minus(nearest.q, nearest.p)
     largest = largest_of(gap)
     if not largest > 0.0:
@@ -122,8 +118,7 @@ def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, mos
 @inline
 def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, SlabBounds]:
     """Return nearly nearest points of two disjoint triangles, and bounds on the distance. If the triangles are proven
-    farther apart than `most`, the points are any.
-    """
+    farther apart than `most`, the points are any."""
     best, across = Nearest(s.p, t.p, 0, 0, np.inf), SlabBounds(-np.inf, np.inf, False)
     for i in range(3):
         for j in range(3):

@@ -64,15 +64,13 @@ OUTSIDE = -1
 INSIDE = 1
 MISSED = 3
 """Result of `ray_crosses` if the perturbed line misses the face; other results: 0 on the face, 1 above, -1 below,
-UNDECIDED.
-"""
+UNDECIDED."""
 
 
 @inline
 def perturbed_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
     """Return the side (1 left, -1 right) of the line a b, seen along z, on which q moved by (eps, eps^2) lies; 0 if a =
-    b in x, y; UNDECIDED. error: of each coordinate of q.
-    """
+    b in x, y; UNDECIDED. error: of each coordinate of q."""
     side = orient2d_near(Point2(a.x, a.y), Point2(b.x, b.y), Point2(q.x, q.y), error)
     return side if side != 0 else tie_sign(a.x, a.y, b.x, b.y)
 
@@ -80,8 +78,7 @@ def perturbed_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
 @inline
 def ray_crosses(t: Facet, q: Point3, error: float) -> int:
     """Return where the vertical line through q, moved by (eps, eps^2), intersects t. 1: above q, -1: below q, 0: at q;
-    MISSED or UNDECIDED.
-    """
+    MISSED or UNDECIDED."""
     p_side, q_side = perturbed_side(t.p, t.q, q, error), perturbed_side(t.q, t.r, q, error)
     r_side = perturbed_side(t.r, t.p, q, error)
     has_left = p_side == 1 or q_side == 1 or r_side == 1
@@ -198,8 +195,7 @@ def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
 @inline
 def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
     """Return the next face whose box intersects ``box``, -1 if there is none left, and the new height of the stack.
-    stack (STACK,) int32: nodes, and faces coded as in `MeshArrays.child`; on entry the root, 0.
-    """
+    stack (STACK,) int32: nodes, and faces coded as in `MeshArrays.child`; on entry the root, 0."""
     while n > 0:  # bound: each node and face enters once
         n -= 1
         child = int(stack[n])
@@ -216,8 +212,7 @@ def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any])
 @inline
 def side_of_corner(mesh: MeshArrays, face: int, t: Facet, other: int, k: int, p: Point3) -> int:
     """Return the side (orient3d) of the plane of face t on which p, corner k of face ``other``, lies; 0 if t has that
-    vertex.
-    """
+    vertex."""
     return 0 if is_corner(mesh, face, other, k) else orient3d(t.p, t.q, t.r, p)
 
 
@@ -265,8 +260,7 @@ def is_corner(mesh: MeshArrays, face: int, other: int, k: int) -> bool:
 @inline
 def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return the state (STATE_...) of a face, computed at first use; STATE_STACKED without area. poses: any (n, 12)
-    array, unused values.
-    """
+    array, unused values."""
     if mesh.state[face] == STATE_UNKNOWN:
         mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
     return int(mesh.state[face])
@@ -326,8 +320,7 @@ SIDE_UNKNOWN: Final = 2
 
 @called
 def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
-    """Return a point inside a face, ``item`` 0, 1 or 2 of three, with corner weights (1, 1, 1), (1, 1, 2) or (2, 1, 1).
-    """
+    """Return a point inside a face, ``item`` 0, 1 or 2, with corner weights (1, 1, 1), (1, 1, 2) or (2, 1, 1)."""
     t = triangle_of(mesh, face)
     u, v = 2.0 if item == 2 else 1.0, 2.0 if item == 1 else 1.0
     w = 3.0 if item == 0 else 4.0
@@ -340,8 +333,7 @@ def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
 @allocating
 def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return 1 if the body lies on the side of a face to which its normal points, -1 if on the other, or SIDE_UNKNOWN;
-    cached. poses: as of `state_of`.
-    """
+    cached. poses: as of `state_of`."""
     if mesh.inner[face] == 0:
         mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else SIDE_UNKNOWN
     return int(mesh.inner[face])

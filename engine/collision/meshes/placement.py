@@ -37,8 +37,7 @@ from engine.types import UNDECIDED, Float32Array, FloatArray, Point2, Point3
 
 
 class PoseArrays(NamedTuple):
-    """Poses of a body for kernels: rotations (n, 3, 3), translations (n, 3); is_posed: False if the body has no pose.
-    """
+    """Poses of a body for kernels: rotations (n, 3, 3), translations (n, 3); is_posed: False if it has no pose."""
 
     rotations: FloatArray
     translations: FloatArray
@@ -145,8 +144,7 @@ def column(place: Placement, axis: int) -> Point3:
 @inline
 def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
     """Return orient2d of points known to +- `error` a coordinate; UNDECIDED if that could change the sign. With e twice
-    the error and M the largest difference, ``|det - exact| <= 4 e M + 2 e^2`` (four entries, each times one).
-    """
+    the error and M the largest difference, ``|det - exact| <= 4 e M + 2 e^2`` (four entries, each times one)."""
     if error == 0.0:
         return orient2d(a, b, c)
     ux, uy = b.x - a.x, b.y - a.y
@@ -162,8 +160,7 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
 @inline
 def axis_at(axis: int, place: Placement) -> int:
     """Return the axis onto which a placement maps a coordinate axis; caller guarantees that it permutes axes, or no
-    pose.
-    """
+    pose."""
     if not place.is_posed or axis < 0:
         return axis
     there = column(place, axis)
@@ -194,8 +191,7 @@ def set_frame(
     b_scale: float, defect: float,
 ) -> bool:  # fmt: skip
     """Fill frame (22, 8) float32 with the map from tree b to tree a and its margin; return whether the trees are proven
-    apart.
-    """
+    apart."""
     ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
     there = rotate(b, origin)
     v = rotate_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))

@@ -58,8 +58,7 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> 
 @called
 def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
     """Fill the row of a pair from all its n contacts; the first n_named name the witness. Sorts the contacts; unless a
-    class is UNDECIDED, each class becomes DECIDED + bits of corners in the other face's plane.
-    """
+    class is UNDECIDED, each class becomes DECIDED + bits of corners in the other face's plane."""
     pairs, kinds, _ = s.contacts
     first, second = s.first, s.second
     has_crossing = False
@@ -131,8 +130,7 @@ def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
 @inline
 def sort_named_first(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
     """Move the first N_NAMED of n pairs to the front, sorted: COPLANAR pairs first, then by the caller's faces, then by
-    index.
-    """
+    index."""
     for item in range(1, n):
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
         key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item

@@ -54,8 +54,7 @@ _SAMPLED = 16
 
 class Vertices(NamedTuple):
     """Vertices (n, 3) of a body as input of exact signs, its placement, and its pose number (UNPOSED where placing is
-    exact).
-    """
+    exact)."""
 
     points: Any
     place: Placement
@@ -64,8 +63,7 @@ class Vertices(NamedTuple):
 
 @inline
 def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
-    """Return a vertex as input of exact signs: placed if placing is exact, else before its pose, with the pose number.
-    """
+    """Return a vertex as input of exact signs: placed if that is exact, else before its pose, with the pose number."""
     p = as_point3(v.points, vertex)
     if v.pose == UNPOSED:
         p = placed(p, v.place)
@@ -75,8 +73,7 @@ def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
 @called
 def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
     """Return the closed side (1, -1) of a plane that contains n_samples vertices, 0 if all lie on it; UNDECIDED
-    otherwise.
-    """
+    otherwise."""
     common_side, n = 0, v.points.shape[0]
     for vertex in range(0, n, max(1, n // n_samples)):
         side = sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error)
@@ -119,8 +116,7 @@ def _edge_enters_interior(
     s: Search, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, mesh: MeshArrays, face: int
 ) -> int:
     """Return OVERLAPPING if an edge of t passes through the open face u to the inner side of u's body; else TOUCHING or
-    UNSETTLED. sides: of the corners of t at the plane of u. face: number of u in its mesh.
-    """
+    UNSETTLED. sides: of the corners of t at the plane of u. face: number of u in its mesh."""
     for k in range(3):
         a, b, apex = sides[k], sides[(k + 1) % 3], sides[(k + 2) % 3]
         if a == 0 and b == 0:
@@ -135,8 +131,7 @@ def _edge_enters_interior(
 @called
 def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPoint3) -> tuple[int, bool]:
     """Return the relation that two coplanar faces prove, and whether they share an area. OVERLAPPING: they share an
-    area and both bodies lie on the same side; TOUCHING: not so; UNSETTLED. off: a point off the plane.
-    """
+    area and both bodies lie on the same side; TOUCHING: not so; UNSETTLED. off: a point off the plane."""
     poses, error = s.descent.poses, exact_error(s)
     how = separation(poses, t, u, axis, error)
     if how == UNDECIDED or how >= 0:
@@ -153,8 +148,7 @@ def _corners_on_face(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
     """Return a bit for each corner of t that lies on the closed face u, -1 if undecided; sides: of the corners at u's
-    plane.
-    """
+    plane."""
     corners = 0
     for k in range(3):
         how = is_on_face(poses, corner(t, k), u, off, axis, error) if sides[k] == 0 else 0
@@ -167,8 +161,7 @@ def _corners_on_face(
 @called
 def decide_contact(s: Search, item: int) -> tuple[int, bool]:
     """Return OVERLAPPING if contact ``item`` proves it, else TOUCHING, or UNSETTLED; and whether its faces share an
-    area. Its class becomes DECIDED + bits of the corners that lie on the other face.
-    """
+    area. Its class becomes DECIDED + bits of the corners that lie on the other face."""
     i, j, kinds = s.contacts.pairs[item, 0], s.contacts.pairs[item, 1], s.contacts.kinds
     if CORNER <= kinds[item] < DECIDED:
         common = kinds[item] - CORNER
@@ -218,8 +211,7 @@ def relate_clean(s: Search, n: int) -> int:
 def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> int:
     """Return OVERLAPPING or TOUCHING if the n contacts of two placed bodies decide it, else UNSETTLED. is_free: no
     contact is flush or cuts an open face; the classes then name the corners in the plane of the other face.
-    has_crossing: some contact is a crossing, but none proves overlapping.
-    """
+    has_crossing: some contact is a crossing, but none proves overlapping."""
     both = s.first.has_inside and s.second.has_inside
     if both and is_free:
         relation = relate_by_locations(s, n, np.empty(0, np.bool_))
@@ -241,8 +233,7 @@ DECIDED = 64
 @inline
 def hash_slot(known: IntArray, vertex: int) -> int:
     """Return the slot of key ``vertex`` in an open-addressing hash table (size a power of two), or the free slot for
-    it.
-    """
+    it."""
     last = known.shape[0] - 1
     place = vertex & last
     while known[place] >= 0 and known[place] != vertex:  # bound: half the places are free
@@ -324,8 +315,7 @@ def _where_within(
     source: MeshArrays, face: int, place: Placement, mesh: MeshArrays, target: Placement, defect: float
 ) -> int:
     """Return the location in the other body of a sampled point within a face; UNDECIDED if no sample decides. Placing
-    rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of its terms.
-    """
+    rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of its terms."""
     for item in range(3):
         p = parity.point_within(source, face, item)
         q = parity.to_local_frame(p.point, place, target, defect)
@@ -345,8 +335,7 @@ def has_interior_beside(s: Search, source: MeshArrays, face: int) -> bool:
 @allocating
 def relate_by_locations(s: Search, n: int, shares: BoolArray) -> int:
     """Return OVERLAPPING or TOUCHING if the locations of the faces in contact decide it, else UNSETTLED. shares: as of
-    `where_faces_are`.
-    """
+    `where_faces_are`."""
     n_places = 16
     while n_places < 6 * n:
         n_places *= 2

@@ -67,8 +67,7 @@ def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
 def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
     """Return the vertex (0, 1, 2) of a triangle that is alone on one closed side of a plane, and that side (1 or -1).
     p, q, r: sides of the vertices, not all zero, not all on one strict side. The other two lie on the opposite closed
-    side, and not both of them on the plane unless the lone one is off it.
-    """
+    side, and not both of them on the plane unless the lone one is off it."""
     n_above, n_below = (p > 0) + (q > 0) + (r > 0), (p < 0) + (q < 0) + (r < 0)
     if n_above == 1:
         side, wanted = 1, 1
@@ -104,8 +103,7 @@ def rotate_vertices(t: Facet, lone: int) -> Facet:
 @inline
 def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
     """Return two triangles, each with its lone vertex first and turned so that this vertex lies above the other's
-    plane. sides: of t1's vertices at the plane of t2; their_sides: of t2's vertices at the plane of t1.
-    """
+    plane. sides: of t1's vertices at the plane of t2; their_sides: of t2's vertices at the plane of t1."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
     a, b = rotate_vertices(t1, lone1), rotate_vertices(t2, lone2)
@@ -178,8 +176,7 @@ def sign_of_four(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
 ) -> int:
     """Return the exact sign of orient3d of four posed points (`orient3d_posed`), or UNDECIDED. 0 without arithmetic if
-    two points coincide, or all share a coordinate, under one pose.
-    """
+    two points coincide, or all share a coordinate, under one pose."""
     if is_same(a, d) or is_same(b, d) or is_same(c, d) or is_same(a, b) or is_same(a, c) or is_same(b, c):
         return 0
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
@@ -208,8 +205,7 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
 @called
 def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return the class of two triangles with area by exact signs; UNDECIDED only if exponents are out of range. poses
-    (n, 12), error: as of `orient3d_posed`. axis: along it t1, before its pose, has an area.
-    """
+    (n, 12), error: as of `orient3d_posed`. axis: along it t1, before its pose, has an area."""
     p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):
         return APART
@@ -255,8 +251,7 @@ def turn_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
 ) -> int:
     """Return the orientation sign of a, b, c within their common plane. axis >= 0: of the projection along it (no
-    poses). Else seen from ``off``, a point off the plane that fixes the sign.
-    """
+    poses). Else seen from ``off``, a point off the plane that fixes the sign."""
     if axis >= 0:
         return orient2d(projected(a, axis), projected(b, axis), projected(c, axis))
     return sign_of_four(poses, a, b, off, c, error)
@@ -335,8 +330,7 @@ def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, ax
 @inline
 def separation(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return 1 if two coplanar triangles with area are disjoint, 0 if only their borders meet, -1 if their interiors
-    do. UNDECIDED if a sign is. axis: as of `classify`.
-    """
+    do. UNDECIDED if a sign is. axis: as of `classify`."""
     off = off_plane_point(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):
         return UNDECIDED

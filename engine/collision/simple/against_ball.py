@@ -44,8 +44,7 @@ _SPREAD = 64
 @inline
 def _box_distance(t: Facet, center: Point3, slack: float) -> float:
     """Return a lower bound on the squared distance of a triangle's box from the centre. slack: error of coordinates; as
-    of `box_distance_bounds`.
-    """
+    of `box_distance_bounds`."""
     square = 0.0
     for c, p, q, r in (
         (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),
@@ -60,8 +59,7 @@ def _box_distance(t: Facet, center: Point3, slack: float) -> float:
 def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
     """Return 1 if a triangle provably has a point in the open ball, 0 if it provably misses the closed ball, else
     UNSETTLED. error: corners relative to the centre are off by its error and a rounding, distances by less than twice
-    that.
-    """
+    that."""
     t, none = relative_to(own.point, t), Point3(0.0, 0.0, 0.0)
     center = Facet(none, none, none)
     slack = 4.0 * rounding_bound(t, center) + 2.0 * own.error + 2.0**-50 * radius
@@ -78,8 +76,7 @@ def _surface_against_ball(
 ) -> tuple[int, int]:
     """Return the relation of a mesh's faces to a ball, and a witness face (-1 for none). DISJOINT, TOUCHING (a face
     enters the open ball) or UNSETTLED. The witness, if is_named, is the entering face with the nearest box, the lowest
-    of equal ones.
-    """
+    of equal ones."""
     center, error = own
     sizes = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
     local, slack = in_tree(mesh, center), parity.SLACK + (error + 2.0**-48 * sizes) / mesh.scale
@@ -124,8 +121,7 @@ def _ball_contains_vertex(vertex: int, own: parity.OwnPoint, radius: float, mesh
 @inline
 def _ball_contains_mesh(own: parity.OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
     """Return 1 if all vertices of a mesh provably lie in the open ball, 0 if one provably does not, else UNSETTLED. A
-    sample spread over the mesh is tested first, since neighbours give the same result.
-    """
+    sample spread over the mesh is tested first, since neighbours give the same result."""
     n, result = mesh.vertices.shape[0], 1
     for step in (n // _SPREAD + 1, 1):
         for vertex in range(0, n, step):
@@ -237,8 +233,7 @@ def _is_ball_clear_of_box(body: Solid, center: list[float], radius: float) -> bo
 
 def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> Collision | None:
     """Return the relation of a mesh (first) and a ball with its witness, None if floats do not prove it. center: x, y,
-    z in the mesh's coordinates, then a bound on the error of each.
-    """
+    z in the mesh's coordinates, then a bound on the error of each."""
     mesh, results = mesh_body_of(body), np.empty((1, 2), np.int64)
     entry_of(relate_balls)(mesh.arrays, np.array([center]), float(radius), work.witness, results, work.budget.flag)
     work.budget.check()
@@ -308,8 +303,7 @@ def _any_part_enters(boundary: Boundary, faces: IntArray, center: Vector, limit:
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
     """Return whether a ball into which no live part reaches, only walls that cancel, lies inside the body. Off those
     walls the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve (t, t^2,
-    t^3) from the centre, which meets a plane at most three times: one of them is on no wall.
-    """
+    t^3) from the centre, which meets a plane at most three times: one of them is on no wall."""
     location = rational_location(center, body, pose, work.budget.check)
     if location != Location.BOUNDARY:
         return location == Location.INSIDE
@@ -323,8 +317,7 @@ def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: flo
 
 def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, work: Work) -> bool:
     """Return whether every vertex lies strictly inside the ball, farthest first by float64 bounds; limit: squared
-    radius.
-    """
+    radius."""
     n = int(boundary.ends.max()) + 1 if len(boundary.ends) else 0
     some = boundary.floats(np.arange(4) * n // 4)
     if (boundary.bounds(center, some, some)[0] > rounded(limit) * (1.0 + 2.0**-50)).any():
@@ -343,8 +336,7 @@ def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, wo
 def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Parts:
     """Return which of a body (first) and a ball (second) that overlap has a part outside the other. The ball has one
     exactly if a live part of the body's boundary enters the open ball: else the ball is all inside. The body has one
-    exactly if some point of its live boundary, and then a vertex, is outside the ball.
-    """
+    exactly if some point of its live boundary, and then a vertex, is outside the ball."""
     center, limit = image_point(ball.center, poses[1]), Fraction(ball.radius) ** 2
     boundary = boundary_of(body, poses[0], work)
     nearest, farthest = boundary.face_bounds(center)

@@ -192,8 +192,7 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
 
 def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImage, FloatArray, float]:
     """Return (N, D), exact, with N . p + D the plane's value at the image of p; then N and D rounded, the largest
-    scaled to 1.
-    """
+    scaled to 1."""
     normal, offset = plane
     if pose is not None:
         offset += dot(normal, as_vector(pose.translation.tolist()))
@@ -213,8 +212,7 @@ def segment_distance(point: Sequence[Any], a: Sequence[Any], b: Sequence[Any]) -
 
 def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
     """Return the squared distance of `point` from the closed segment or triangle of these corners, degenerate or not;
-    exact. Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge; in integers.
-    """
+    exact. Over an open triangle it is the distance to the plane, elsewhere that to the nearest edge; in integers."""
     d, (numbers, scale) = len(point), common_integers([*point, *chain(*corners)])
     q, *ends = [tuple(numbers[at : at + d]) for at in range(0, len(numbers), d)]
     if len(ends) == 2:
@@ -228,8 +226,7 @@ def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
 
 def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vector, ...]]:
     """Yield triangles, unposed, that fill the part of a face that even-odd does not cancel; the face itself if none
-    does.
-    """
+    does."""
     if mesh.arrays.axis[face] == NO_AREA:
         return
     if state_at(mesh.arrays, face) != STATE_STACKED:

@@ -73,8 +73,7 @@ def relation_closed_form(
     first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: result.Work
 ) -> result.Collision | None:
     """Return the relation of a box or ball and a box or ball by `relate_forms`; None if undecided or without its
-    witness.
-    """
+    witness."""
     form, other, d = form_of(first), form_of(second), first.dimension
     if form is None or other is None:
         return None
@@ -105,8 +104,7 @@ def _named(code: int) -> result.Collision:
 
 def collide_form_sphere(first: Aabb | Sphere, ball: Sphere, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the exact relation of a box or ball (first) and a ball, in rationals. A posed box is treated as any body.
-    Flat boxes and balls of radius 0 have no interior and never overlap.
-    """
+    Flat boxes and balls of radius 0 have no interior and never overlap."""
     center, r, s = image_point(ball.center, poses[1]), Fraction(ball.radius), Fraction(0)
     if isinstance(first, Sphere):
         low = high = image_point(first.center, poses[0])
@@ -132,8 +130,7 @@ def collide_half_spaces(
     first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work
 ) -> result.Collision:
     """Return the exact relation of two half-spaces (half-planes in 2D). Equal ones overlap; opposite ones with a common
-    plane touch. One is inside if its plane lies strictly inside.
-    """
+    plane touch. One is inside if its plane lies strictly inside."""
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]  # m = factor n if parallel
@@ -193,8 +190,7 @@ def _by_scan(
 ) -> result.Collision | None:
     """Return the relation of a half-space and a mesh if floats decide the sides of nearly all vertices, else None. The
     witness is the face at the first vertex beyond the plane, or on it. Nothing cancels, so the open interior is next to
-    it.
-    """
+    it."""
     mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
     normal, sizes, offset, size = function
     plane = np.array([normal, sizes, [offset, size, 0.0]])
@@ -230,8 +226,7 @@ def _by_scan(
 def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
     """Return 1 or -1 if the side of a vertex at a plane is proven, else 0; plane: as of `scan_sides`. Each weight may
     be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three products and a number
-    by 2^-50 of the sum of magnitudes more.
-    """
+    by 2^-50 of the sum of magnitudes more."""
     p = as_point3(mesh.vertices, vertex)
     around = Point3(abs(p.x), abs(p.y), abs(p.z))
     value = dot(as_point3(plane, 0), p) + plane[2, 0]
@@ -278,8 +273,7 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
 def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
     """Return the linear function of a half-space in the frame of a body, rounded, with bounds. Under a pose of the body
     a weight is the sum of three products, the offset one of four numbers: seven roundings of 2^-53 of their magnitudes,
-    whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals.
-    """
+    whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals."""
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
     if poses[0] is not None:
@@ -296,8 +290,7 @@ def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
 def _side_of_box(function: _Function, body: Solid) -> int:
     """Return the side (1, -1) of a plane on which the box around a body provably lies, 0 if undecided. error: the
     extremes of dot(n, p) + d over a box are sums of products of its bounds: at most seven roundings of 2^-53 of the sum
-    of magnitudes, and as much for the errors of weights and offset, far below 2^-48 of it.
-    """
+    of magnitudes, and as much for the errors of weights and offset, far below 2^-48 of it."""
     weights, sizes, offset, size = function
     low, high, _ = own_box(body)
     least, most, reach = offset, offset, 0.0
@@ -332,8 +325,7 @@ def sphere_sphere_parts(first: Sphere, second: Sphere, poses: result.Poses, work
 
 
 def half_spaces_parts(first: HalfSpace, second: HalfSpace, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return which of two overlapping half-spaces has a part outside the other: neither if they are equal, else both.
-    """
+    """Return which of two overlapping half-spaces has a part outside the other: neither if equal, else both."""
     (n, d), (m, e) = image_half_space(first, poses[0]), image_half_space(second, poses[1])
     axis = largest_axis(n)
     factor = m[axis] / n[axis]

@@ -47,8 +47,7 @@ class Placed(NamedTuple):
 @inline
 def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
     """Return m and +-1 if row ``axis`` of a rotation has its only nonzero entry +-1 in column m; -1, 0.0 if it has
-    others.
-    """
+    others."""
     source, factor = -1, 0.0
     for m in range(turn.shape[0]):
         if turn[axis, m] != 0.0:
@@ -71,8 +70,7 @@ def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
 @inline
 def _place(a: Placed, w: Any, first: int) -> bool:
     """Write the bounds of a posed box as exact sums of two doubles; return False if the pose mixes axes, or out of
-    range. Bounds: low and high of each axis, from w[first] on.
-    """
+    range. Bounds: low and high of each axis, from w[first] on."""
     form, turn, move = a
     for axis in range(turn.shape[0]):
         if source_of(turn, axis)[0] < 0:
@@ -87,8 +85,7 @@ def _place(a: Placed, w: Any, first: int) -> bool:
 
 @inline
 def _rank(w: Any, d: int, ranks: Any) -> None:
-    """Write for each bound how many of the four bounds on its axis are smaller; pairs are compared lexicographically.
-    """
+    """Write for each bound how many of the four bounds on its axis are smaller; pairs compare lexicographically."""
     for axis in range(d):
         for i in range(4):
             ranks[3 * i + axis] = 0.0
@@ -146,8 +143,7 @@ def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
 def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind, and faces << 3 and << 6, of a contact of two boxes of space that overlap, or UNSETTLED. Faces in one
     plane on one side share an area. If there are none, an edge of one box passes through a face of the other: on each
-    axis either both ends of one box lie within the other, or one of each.
-    """
+    axis either both ends of one box lie within the other, or one of each."""
     for face in range(6):
         axis, side = face >> 1, face & 1
         if ranks[3 * side + axis] == ranks[_THEIRS + 3 * side + axis]:
@@ -170,8 +166,7 @@ def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 @inline
 def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
     """Return kind, and faces << 3 and << 6, of the contact of two boxes of space that touch. They share a part of a
-    face, an edge or a vertex, by the number of axes on which they only touch; faces: on the first of these.
-    """
+    face, an edge or a vertex, by the number of axes on which they only touch; faces: on the first of these."""
     n, faces = -1, 0
     for axis in range(3):
         side = 1 if ranks[3 + axis] == ranks[_THEIRS + axis] else 0
@@ -247,8 +242,7 @@ def _relate_boxes(a: Placed, b: Placed) -> int:
 @inline
 def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: float) -> int:
     """Add ``factor`` (+-1) times a bound of a posed box, or a coordinate of a posed ball's centre, to expansion e.
-    Returns the number of components. side: 0 low, 1 high.
-    """
+    Returns the number of components. side: 0 low, 1 high."""
     form, turn, move = a
     if form[IS_BALL] == 0.0:
         n = grow(e, n, factor * bound_at(form, turn, axis, side))
@@ -260,8 +254,7 @@ def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: fl
 
 @inline
 def _are_safe(a: Placed) -> bool:
-    """Return whether expansions of degree four are exact for a posed box or ball, and the pose of a box mixes no axes.
-    """
+    """Return whether expansions of degree four are exact for a posed box or ball, and that of a box mixes no axes."""
     form, turn, move = a
     safe = is_safe(form[RADIUS])
     for axis in range(turn.shape[0]):
@@ -275,8 +268,7 @@ def _are_safe(a: Placed) -> bool:
 @inline
 def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
     """Set expansion e to how far a ball's centre lies beyond a bound of a box (or another centre) along an axis.
-    Negative if it does not. side: 0 the low bound, 1 the high one. Returns the number of components.
-    """
+    Negative if it does not. side: 0 the low bound, 1 the high one. Returns the number of components."""
     factor = 1.0 if side == 0 else -1.0
     n = _grow_coordinate(e, 0, a, axis, side, factor)
     return _grow_coordinate(e, n, ball, axis, 0, -factor)
@@ -285,8 +277,7 @@ def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
 @called
 def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
     """Return the exact sign of distance^2 - (ball's radius + factor a's radius)^2. Distance: from the ball's centre to
-    the nearest point of box a (or a's centre), the farthest if is_far.
-    """
+    the nearest point of box a (or a's centre), the farthest if is_far."""
     total, n = workspace(_N_TOTAL), 0
     below, above, both = workspace(_N_COORDINATE), workspace(_N_COORDINATE), workspace(_N_COORDINATE)
     for axis in range(a.turn.shape[0]):
@@ -341,7 +332,6 @@ def relate_forms(
 ) -> int:  # fmt: skip
     """Return the code of a box or ball and a box or ball, each with rotation (d, d) and translation (d,); if one is a
     box, the first. The code is the relation; for two intersecting boxes of space, with the kind of contact and the
-    faces in higher bits. UNSETTLED if undecided.
-    """
+    faces in higher bits. UNSETTLED if undecided."""
     a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)
     return _relate_boxes(a, b) if other[IS_BALL] == 0.0 else _relate_to_ball(a, b)

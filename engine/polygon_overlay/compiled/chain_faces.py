@@ -79,8 +79,7 @@ def _following(chains: Chains, stars: Stars, half: int) -> int:
 @inline
 def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int, stop: FlagArray) -> int:
     """Number the cycles of half-chains around faces: write the cycle of each half-chain, -1 unless it represents
-    itself. Returns the number of cycles.
-    """
+    itself. Returns the number of cycles."""
     cycle[: 2 * n_chains] = -1
     n_cycles = 0
     for first in range(2 * n_chains):
@@ -102,8 +101,7 @@ def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int
 @inline
 def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
     """Return whether a ray from vertex v straight up meets edge e before edge f. The ray runs an infinitesimal step to
-    the right of v; caller guarantees that it meets both. Exact.
-    """
+    the right of v; caller guarantees that it meets both. Exact."""
     x = edges.x
     a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
     c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
@@ -117,8 +115,7 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
 @inline
 def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
     """Return the exact sign of ``height(ab) - height(cd)`` at the x of vertex v; caller guarantees x_a < x_b, x_c <
-    x_d. ``height(ab) = -orient(a, b, v) / (x_b - x_a)``, above v.
-    """
+    x_d. ``height(ab) = -orient(a, b, v) / (x_b - x_a)``, above v."""
     x = edges.x
     first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
     n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)
@@ -136,8 +133,7 @@ def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> in
 @merged
 def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
     """Return edge e if the ray up from vertex v meets it before edge ``nearest`` (NOTHING: none so far), else
-    ``nearest``.
-    """
+    ``nearest``."""
     x = edges.x
     b = edges.after[e]
     if (x[e] <= x[v]) == (x[b] <= x[v]):  # it does not pass from there to the right of there
@@ -201,8 +197,7 @@ def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, c
 _ENCLOSES: Final = 1
 _IS_UNKNOWN: Final = 2
 """Bits of the state of a component: its box contains another component's box; the edge above it is still to be
-computed.
-"""
+computed."""
 
 Components = namedtuple("Components", "highest number state")
 """Connected components of rings. highest, state: by component its last vertex (x, then y) and the bits above; number:
@@ -215,8 +210,7 @@ def _find_components(
     edges: Edges, tops: IntArray, rings: IntArray, n: int, components: Components, boxes: FloatArray
 ) -> int:
     """Group rings into connected components: fill ``components`` and the box of each component; return their number.
-    tops: by ring its last vertex (x, then y). rings: union-find forest of connected rings. n: number of vertices.
-    """
+    tops: by ring its last vertex (x, then y). rings: union-find forest of connected rings. n: number of vertices."""
     x, y, highest, number = edges.x, edges.y, components.highest, components.number
     n_components, at = 0, 0
     while at < n:  # bound: each turn passes one ring
@@ -242,8 +236,7 @@ def _find_components(
 
 @inline
 def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree) -> None:
-    """Set _ENCLOSES on each component whose box contains the box of component k, and _IS_UNKNOWN on k if there is one.
-    """
+    """Set _ENCLOSES on each component whose box contains the box of component k, and _IS_UNKNOWN on k if any is."""
     stack, n_leaves, boxes, state = tree.stack, leaves_of(n), tree.boxes, components.state
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -266,8 +259,7 @@ def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree)
 @inline
 def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Int32Array) -> int:
     """Write to ``names`` the edges of all components marked _ENCLOSES, and to ``tree.boxes`` their boxes; return how
-    many.
-    """
+    many."""
     x, y, boxes = edges.x, edges.y, tree.boxes
     m = 0
     for e in range(n):
@@ -285,8 +277,7 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int], stop: FlagArray) -> None:
     """Unite, in ``faces.joined``, the outer cycle of each component with a cycle of the face that the component lies
     in. w: the `Workspace`; its tree is overwritten, but for the marks. names: scratch by point. sizes: the numbers of
-    vertices, cycles and RUN edges.
-    """
+    vertices, cycles and RUN edges."""
     n, n_cycles, n_runs = sizes
     given, tree, faces, components, stars = w.given, w.tree, w.faces, w.components, w.stars
     for i in range(n_cycles + 1):

@@ -65,15 +65,13 @@ Rings = namedtuple("Rings", "point edge meets offset region")
 
 Walk = namedtuple("Walk", "path place")
 """Scratch of a walk. path: its half-chains in order; place: by node where rings meet, its index in ``path``, -1 if not
-on it.
-"""
+on it."""
 
 
 @inline
 def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) -> None:
     """Write the bits BOUNDS and INSIDE of each half-chain to ``faces.state``, from the parts of its two faces
-    (``inside``).
-    """
+    (``inside``)."""
     cycle, inside, state = faces.cycle, faces.inside, faces.state
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -91,8 +89,7 @@ def join_regions(
 ) -> None:
     """Unite faces that no boundary chain separates into regions, and count the boundary chains of nodes in
     ``faces.fan``. ``faces.state`` is the result of `mark_boundary`. is_named: unite faces outside the result too.
-    sizes: the numbers of chains, simple nodes and all nodes.
-    """
+    sizes: the numbers of chains, simple nodes and all nodes."""
     n_chains, n_simple, n_nodes = sizes
     cycle, state = faces.cycle, faces.state
     for chain in range(n_chains):
@@ -124,8 +121,7 @@ def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
 @merged
 def _next_boundary_edge(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
     """Return the boundary half-chain that follows ``half`` around the region to its left, and whether rings meet there.
-    The second result is `_is_forked` of the first.
-    """
+    The second result is `_is_forked` of the first."""
     state, across = faces.state, across_end(chains, half)
     if across >= 0:
         left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
@@ -152,8 +148,7 @@ def emit_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets:
 @merged
 def emit_vertex(edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, at: int) -> int:
     """Append input vertex v, from which the boundary follows ``edge``, if the boundary turns at v; return the next
-    index.
-    """
+    index."""
     turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
     return emit_point(rings, at, v, edge, turns, marks[edge] & RUN)
 
@@ -164,8 +159,7 @@ def _emit_ring(
     last: int, rings: Rings, n_points: int, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
     """Append the points of the ring of half-chains ``path[first:last]`` where it turns; return the number of points
-    then. sizes: as of `walk_rings`.
-    """
+    then. sizes: as of `walk_rings`."""
     _, _, n, n_simple = sizes
     edge = leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
@@ -243,8 +237,7 @@ def has_only_proper_crossings(
     given: Given, events: Events, contacts: Contacts, n_rings: int, selected: FlagArray
 ) -> bool:
     """Return whether two simple rings meet in proper crossings only and `walk_crossings` applies to the ``selected``
-    labels.
-    """
+    labels."""
     if (
         n_rings != 2
         or contacts.n_exact > 0
@@ -271,8 +264,7 @@ def _follow_to_crossing(
     rings: Rings, n: int, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Append a crossing, and the vertices of its ring up to the next crossing; return that crossing's event and the
-    number of points. event: on the edge that the walk follows. place: by event its index in ``along.order``.
-    """
+    number of points. event: on the edge that the walk follows. place: by event its index in ``along.order``."""
     edge, at = events.edge[event], place[event]
     n = emit_point(rings, n, events.point[event], edge, True, 0)
     step = 1 if is_forward else -1
@@ -294,8 +286,7 @@ def walk_crossings(
 ) -> tuple[int, int]:  # fmt: skip
     """Trace the boundary rings of two simple rings that only cross properly; return the numbers of rings and points.
     Crossing c has the events 2 c, on its first edge, and 2 c + 1. place: scratch by event. ``events.turn`` is
-    overwritten.
-    """
+    overwritten."""
     edges, ring = given.edges, given.edges.ring
     for k in range(2 * n_crossings):
         place[along.order[k]] = k

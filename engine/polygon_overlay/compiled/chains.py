@@ -58,8 +58,7 @@ Stars = namedtuple("Stars", "node_of point starts ends half place")
 
 Loose = namedtuple("Loose", "half masks dx dy")
 """Half-chains that leave nodes with a star, ascending, not yet sorted. Scratch: masks, by chain, before coinciding
-chains are united; dx, dy: the directions of one star's half-chains, float64.
-"""
+chains are united; dx, dy: the directions of one star's half-chains, float64."""
 
 
 @merged
@@ -89,16 +88,14 @@ def across_end(chains: Chains, half: int) -> int:
 @merged
 def to_the_left(across: int, half: int) -> int:
     """Return the half-chain that leaves a simple node to the left of ``half``, which ends there. across: `across_end`
-    of ``half``.
-    """
+    of ``half``."""
     return (across & ~1) - 1 + ((across ^ half) & 1)
 
 
 @merged
 def place_before(chains: Chains, stars: Stars, at: int, half: int) -> int:
     """Return the index in ``stars.half`` of the half-chain before index ``at``, cyclically, around the origin of
-    ``half``.
-    """
+    ``half``."""
     node = origin(chains, half)
     return (at if at > stars.starts[node] else stars.ends[node]) - 1
 
@@ -106,8 +103,7 @@ def place_before(chains: Chains, stars: Stars, at: int, half: int) -> int:
 @merged
 def leaving_edge(chains: Chains, half: int) -> int:
     """Return the edge along which a half-chain leaves its origin: the first edge of its chain, or the last if it runs
-    back.
-    """
+    back."""
     return chains.last[half >> 1] if half & 1 else chains.first[half >> 1]
 
 
@@ -123,8 +119,7 @@ def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
 
 @merged
 def _link_crossing(events: Events, chains: Chains, stars: Stars, point: int, crossing: int, chain: int, e: int) -> None:
-    """Record that chain ``chain`` leaves a simple node along edge e; the second call of a node fills ``chains.across``.
-    """
+    """Record that chain ``chain`` leaves a simple node along edge e; the second call at a node fills ``across``."""
     other = stars.node_of[point]
     if other < 0:  # here for the first time
         stars.node_of[point] = chain
@@ -213,8 +208,7 @@ def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
 @called
 def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
     """Return -1, 0 or 1: half-chain g leaves its node before, with or after h, counter-clockwise from straight up.
-    Exact.
-    """
+    Exact."""
     e, f = leaving_edge(chains, g), leaving_edge(chains, h)
     half_g, half_h = _half_turn(edges, e, g & 1), _half_turn(edges, f, h & 1)
     if half_g != half_h:
@@ -227,8 +221,7 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, last: int, masks: IntArray) -> int:
     """Replace coinciding half-chains of the sorted ``star[first:last]`` by their lowest chain; return the new end.
     ``chains.mask`` of that chain becomes the exclusive or of ``masks``. The node at the other end chooses the same
-    chain.
-    """
+    chain."""
     n_unique = at = first
     while at < last:  # bound: each turn passes one group
         stop = at + 1
@@ -258,8 +251,7 @@ def _group_loose(
     chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
     """Bucket the loose half-chains by their origin: fill ``stars.half``, ``starts`` and ``ends``, unsorted within a
-    node.
-    """
+    node."""
     starts, ends = stars.starts, stars.ends
     for k in range(n_loose):
         if k & POLL == 0 and stop[0]:
@@ -284,8 +276,7 @@ def _group_loose(
 @inline
 def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, first: int, last: int) -> bool:
     """Sort the half-chains ``star[first:last]`` of a node counter-clockwise; return whether two have the same
-    direction.
-    """
+    direction."""
     x, y, dx, dy = edges.x, edges.y, loose.dx, loose.dy
     has_twins = False
     for k in range(first, last):
@@ -321,8 +312,7 @@ def build_stars(
     edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
     """Fill the stars of nodes n_simple .. n_nodes - 1, sorted counter-clockwise, one representative for coinciding
-    chains.
-    """
+    chains."""
     _group_loose(chains, stars, loose, n_simple, n_nodes, n_loose, stop)
     star = stars.half
     for node in range(n_simple, n_nodes):

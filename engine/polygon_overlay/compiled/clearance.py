@@ -83,14 +83,12 @@ _NOT_YET: Final = -2.0
 
 Rounded = namedtuple("Rounded", "x y moved crossing_x crossing_y error")
 """x, y, moved: by point of rings, its nearest doubles, and 1 if they differ from the point (uint8); crossing_x,
-crossing_y, error: by crossing, its nearest doubles and a bound of its displacement.
-"""
+crossing_y, error: by crossing, its nearest doubles and a bound of its displacement."""
 
 
 class _Cut(NamedTuple):
     """Crossing of edges e and f: the weights a, b of the ends of e as positive double-doubles, their sum, and a bound
-    of the relative error of a coordinate.
-    """
+    of the relative error of a coordinate."""
 
     e: int
     f: int
@@ -112,8 +110,7 @@ def _abs2(h: float, low: float) -> tuple[float, float]:
 @called
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
     """Return x, y of the doubles nearest to the crossing of edges e and f, and a bound of the rounding error of each.
-    Error bound 0: that double is the coordinate itself. LOST: the nearest double is not determined.
-    """
+    Error bound 0: that double is the coordinate itself. LOST: the nearest double is not determined."""
     ends, others = _ends_of(edges, e), _ends_of(edges, f)
     (x, has_x), (y, has_y) = common_places(ends, others)
     if has_x and has_y:
@@ -138,8 +135,7 @@ def _ends_of(edges: Edges, e: int) -> Ends:
 @merged
 def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[float, bool]]:
     """Return (x, has_x), (y, has_y): the x of a vertical edge and the y of a horizontal one, if one of two edges is
-    such.
-    """
+    such."""
     ax, ay, bx, by = first
     cx, cy, dx, dy = second
     return ((ax if ax == bx else cx), (ax == bx) | (cx == dx)), ((ay if ay == by else cy), (ay == by) | (cy == dy))
@@ -148,8 +144,7 @@ def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[
 @merged
 def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, float]:
     """Return |orient| of both ends of an edge against the line of ``others`` as double-doubles, and 2.5 r. r bounds the
-    relative error of both. Expansions compute them where r would exceed 0.001, if exponents allow.
-    """
+    relative error of both. Expansions compute them where r would exceed 0.001, if exponents allow."""
     ax, ay, bx, by = ends
     cx, cy, dx, dy = others
     ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
@@ -187,8 +182,7 @@ def leading(e: Any, n: int) -> tuple[float, float]:
 @merged
 def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
     """Return the double nearest to one coordinate of a crossing, and its error bound; as of `round_crossing`. axis: 0
-    for x, 1 for y. p, q: that coordinate of the ends of edge e.
-    """
+    for x, 1 for y. p, q: that coordinate of the ends of edge e."""
     rh, rl = dd_scale(cut.bh, cut.bl, p)
     sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)
@@ -201,8 +195,7 @@ def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple
 
 @called
 def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
-    """Return as `_coordinate`, decided by exact signs; h: a double near the coordinate, bound: of its distance from it.
-    """
+    """Return as `_coordinate`, decided by exact signs; h: a double near the coordinate, bound: of the difference."""
     if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
         h = _from_expansions(edges, e, f, axis)
     side = crossing_against(edges, e, f, axis, h, 0.0)
@@ -229,8 +222,7 @@ def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: flo
 @called
 def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
     """Return a coordinate (axis 0 or 1) of the crossing of edges e and f, with an error below one unit in its last
-    place.
-    """
+    place."""
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb = workspace(16), workspace(16)
@@ -257,8 +249,7 @@ def round_points(
     stop: FlagArray,
 ) -> float:  # fmt: skip
     """Round the ``points`` of all rings (vertices below n, crossing c as n + c) into ``rounded``. Returns the largest
-    displacement of a point, or LOST.
-    """
+    displacement of a point, or LOST."""
     x, y, error = edges.x, edges.y, rounded.error
     error[:n_crossings] = _NOT_YET
     farthest = 0.0
@@ -289,8 +280,7 @@ MARGIN: Final = 16.0 * 2.0**-52
 @inline
 def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: float, margin: float) -> bool:
     """Return whether the next node on either edge at vertex v is further than the margin from the other of these edges.
-    share_before, share_after: the part of the edge before v, and of that after v, that lies between v and that node.
-    """
+    share_before, share_after: the part of the edge before v, and of that after v, that lies between v and that node."""
     x, y = edges.x, edges.y
     p, q = edges.before[v], edges.after[v]
     ux, uy, wx, wy = x[p] - x[v], y[p] - y[v], x[q] - x[v], y[q] - y[v]
@@ -303,8 +293,7 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 @inline
 def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: FlagArray) -> bool:
     """Return whether, at every vertex, the next events on its two edges are further than the margin from the other
-    edge. along: filled by `sort_events`. False also if ``stop`` is set.
-    """
+    edge. along: filled by `sort_events`. False also if ``stop`` is set."""
     starts, keys = along.starts, along.keys
     for e in range(n):
         if e & POLL == 0 and stop[0]:
@@ -328,8 +317,7 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: F
 @merged
 def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
     """Return whether edges ab and cd, which are rounded, are proven neither to touch nor to fold while their ends move.
-    points: equal numbers are one point. square: the margin, squared.
-    """
+    points: equal numbers are one point. square: the margin, squared."""
     if points[a] == points[d]:
         c, d = d, c
     elif points[b] == points[c]:
@@ -346,8 +334,7 @@ def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, 
 @inline
 def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: FlagArray) -> bool:
     """Return whether rounding made a point collinear with both neighbours in its ring; points where rings meet are
-    exempt.
-    """
+    exempt."""
     x, y, moved = rounded.x, rounded.y, rounded.moved
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
@@ -369,8 +356,7 @@ def certify(
 ) -> bool:  # fmt: skip
     """Return whether floats prove the rounded rings valid: no edges without a common point are within MARGIN of each
     other. n: number of points in ``rings``. tree, tails, heads: scratch of that size. Edges marked RUN are not tested;
-    nothing that moves is near them.
-    """
+    nothing that moves is near them."""
     x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0
     for k in range(n):

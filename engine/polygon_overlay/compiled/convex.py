@@ -37,13 +37,11 @@ _NONE: Final = -1
 
 Passages = namedtuple("Passages", "enters leaves")
 """By edge: the edge of the other polygon through which it enters that polygon, and the one through which it leaves, or
-_NONE.
-"""
+_NONE."""
 
 Points = namedtuple("Points", "x y firsts seconds")
 """Points of the result. x, y: doubles; firsts, seconds: v and -1 for input vertex v, two edges for their crossing, that
-along which the result continues first.
-"""
+along which the result continues first."""
 
 
 @merged
@@ -99,8 +97,7 @@ def load_convex(
 ) -> tuple[int, int]:  # fmt: skip
     """Write a ring to ``edges`` from ``start`` on: counter-clockwise, from its smallest vertex (x, then y), repeated at
     the end. Returns the index of its largest vertex, GENERAL unless it is proven strictly convex; and 1, or -1 if
-    reversed. origins: receives ``base`` + the index of each vertex.
-    """
+    reversed. origins: receives ``base`` + the index of each vertex."""
     size = vertices.shape[0]
     low = _lowest_vertex(vertices)
     after, before = (low + 1 if low + 1 < size else 0), (low if low > 0 else size) - 1
@@ -125,8 +122,7 @@ def load_convex(
 @inline
 def _record_crossing(edges: Edges, e: int, f: int, passages: Passages) -> int:
     """Write the crossing of edges e and f to ``passages``; return 1 if they cross, 0 if proven not to, GENERAL if
-    undecided.
-    """
+    undecided."""
     x, y = edges.x, edges.y
     to_f = turns(x, y, e, e + 1, f, f + 1)
     nearest_f = smaller_turn(to_f)
@@ -151,8 +147,7 @@ def _find_passages(
     edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: FlagArray
 ) -> int:  # fmt: skip
     """Write the crossings of two x-monotone chains to ``passages``; return their number, or GENERAL. i, j: leftmost
-    vertex of each chain, i_end, j_end its last, i_step, j_step: 1 for a lower chain, -1 for an upper one.
-    """
+    vertex of each chain, i_end, j_end its last, i_step, j_step: 1 for a lower chain, -1 for an upper one."""
     x, y = edges.x, edges.y
     while i != i_end and x[i + i_step] < x[j]:
         i += i_step
@@ -184,8 +179,7 @@ def _find_passages(
 @inline
 def _locate_vertex(edges: Edges, first: int, last: int, v: int) -> int:
     """Return 1, -1 or 0: vertex v is proven inside the convex ring of edges first .. last - 1, proven outside, or
-    undecided.
-    """
+    undecided."""
     x, y = edges.x, edges.y
     side = 1
     for i in range(first, last):
@@ -212,8 +206,7 @@ def _add_stretch(
     edges: Edges, origins: Int32Array, e: int, f: int, first: int, last: int, points: Points, n: int
 ) -> int:  # fmt: skip
     """Append the vertices of the ring first .. last - 1 from edge e, counter-clockwise, to edge f; return the number of
-    points.
-    """
+    points."""
     if f >= e:
         return _add_vertices(edges, origins, e + 1, f + 1, points, n)
     n = _add_vertices(edges, origins, e + 1, last, points, n)
@@ -223,8 +216,7 @@ def _add_stretch(
 @inline
 def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: Points, n: int) -> float:
     """Write the rounded crossing of edges e and f as point n; return a bound of its displacement, infinity if
-    undetermined.
-    """
+    undetermined."""
     x, y, ex, ey = round_crossing(edges, e, f)
     points.x[n], points.y[n], points.firsts[n], points.seconds[n] = x, y, e_name, f_name
     if ex < 0.0 or ey < 0.0:
@@ -288,8 +280,7 @@ def intersect_convex(
 ) -> tuple[int, int, float]:  # fmt: skip
     """Intersect two convex rings; return the number of points or GENERAL, the index of the smallest one (x, then y),
     and the largest displacement by rounding. points: filled counter-clockwise; vertices of ``clip`` are numbered after
-    those of ``subject``. given and passages have room for two more than all vertices, points for four times as many.
-    """
+    those of ``subject``. given and passages have room for two more than all vertices, points for four times as many."""
     edges, origins, x, y = given.edges, given.origins, points.x, points.y
     n = subject.shape[0]
     top, step = load_convex(subject, 0, edges, origins, 0, stop)

@@ -31,10 +31,8 @@ WEIGHT_ROOM: Final = 16
 """Most components of a weight: two products of two differences, each of two components."""
 
 Edges = namedtuple("Edges", "x y after before ring")
-"""Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``.
-
-x, y: float64; after, before, ring: int64; one entry a vertex.
-"""
+"""Closed rings as vertices; edge i runs from vertex i to vertex ``after[i]``. x, y: float64; after, before, ring:
+int64; one entry a vertex."""
 
 Ends = tuple[float, float, float, float]
 """x and y of the first end of an edge, then of the second."""
@@ -124,8 +122,7 @@ def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
 @called
 def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
     """Return -1, 0 or 1: along edge e, its crossing with edge f comes before, with or after that with edge g. Exact.
-    Caller guarantees that f and g each cross e in a point inside both.
-    """
+    Caller guarantees that f and g each cross e in a point inside both."""
     a, b, fb, gb = e, edges.after[e], edges.after[f], edges.after[g]
     wfa, wfb, wga, wgb = workspace(16), workspace(16), workspace(16), workspace(16)
     nfa, nfb = exact_weight(edges, f, fb, a, wfa), exact_weight(edges, f, fb, b, wfb)
@@ -143,8 +140,7 @@ def order_of_crossings(edges: Edges, e: int, f: int, g: int) -> int:
 @called
 def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail: float) -> int:
     """Return the exact sign of ``coordinate - (value + tail)`` for the crossing of edges e and f; axis 0: x, 1: y.
-    Caller guarantees that e and f cross in a point inside both, and that ``value + tail`` rounds to ``value``.
-    """
+    Caller guarantees that e and f cross in a point inside both, and that ``value + tail`` rounds to ``value``."""
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb, p, q = workspace(16), workspace(16), workspace(4), workspace(4)

@@ -110,8 +110,7 @@ Events = namedtuple("Events", "edge point other t slack reach first second turn"
 
 Unions = namedtuple("Unions", "points is_node rings")
 """points: union-find forest of equal points; is_node: by vertex, uint8, 1 if another edge meets it or a ring begins
-there; rings: union-find forest of rings that touch.
-"""
+there; rings: union-find forest of rings that touch."""
 
 
 @merged
@@ -124,8 +123,7 @@ def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: fl
 @inline
 def _add_vertex_on_edge_event(edges: Edges, events: Events, unions: Unions, at: int, e: int, v: int) -> int:
     """Append an event for vertex v if it lies inside edge e; unite v with an end of e that equals it; return the number
-    of events. Caller guarantees that v lies on the line of e.
-    """
+    of events. Caller guarantees that v lies on the line of e."""
     x, y = edges.x, edges.y
     a, b = e, edges.after[e]
     for end in (a, b):
@@ -152,8 +150,7 @@ def _add_contact(
     edges: Edges, events: Events, unions: Unions, n: int, n_events: int, n_crossings: int, e: int, f: int
 ) -> tuple[int, int]:
     """Append the events of all common points of edges e and f, decided exactly; return the numbers of events and
-    crossings. n: number of vertices. There is room for four more events.
-    """
+    crossings. n: number of vertices. There is room for four more events."""
     parent, rings = unions.points, unions.rings
     a, b, c, d = e, edges.after[e], f, edges.after[f]
     if b == c or d == a:  # consecutive edges: their common vertex is all, unless they fold
@@ -204,8 +201,7 @@ def _add_contact(
 class Contacts(NamedTuple):
     """Result of noding. n_events: number of events, -1 if they exceed the room; n_exact: number of edge pairs decided
     exactly; are_far: all edges without a common point are further apart than the margin, and all contacts are proper
-    crossings.
-    """
+    crossings."""
 
     n_events: int
     n_crossings: int
@@ -250,8 +246,7 @@ def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: FlagArray
 ) -> Contacts:
     """Node the edges: write all contacts of the n edges to ``events``, crossings and vertices on edges, and fill
-    ``unions``. tree: over the boxes of the edges, enlarged by the margin.
-    """
+    ``unions``. tree: over the boxes of the edges, enlarged by the margin."""
     for i in range(n):
         unions.points[i] = i
     unions.is_node[:n] = 0
@@ -306,8 +301,7 @@ def find_contacts(
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
     """Append the event of a proper crossing on ``edge``, proven by floats. ends: orientations A, B of the two ends of
     ``edge`` relative to ``other``. ``t = A / (A + B)``; with A and B off by at most r, ``error <= r / (A + B) + 3
-    roundings``.
-    """
+    roundings``."""
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)
     events.reach[at] += margin * ends.length / total

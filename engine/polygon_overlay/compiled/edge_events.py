@@ -20,8 +20,7 @@ _RUN: Final = 16
 
 Along = namedtuple("Along", "starts order keys spare_keys spare")
 """Events sorted along each edge: those of edge e are ``order[starts[e]:starts[e + 1]]``, and ``keys`` has their
-parameters. spare_keys, spare: scratch as large as keys and order.
-"""
+parameters. spare_keys, spare: scratch as large as keys and order."""
 
 
 @called
@@ -147,8 +146,7 @@ def sort_events(
 ) -> bool:
     """Sort the events along each edge into ``along``, unite points of events that coincide, and mark their crossings
     NOT_SIMPLE. Returns whether, on every edge, events are further from each other than the sum of their reaches, and
-    further from both ends than their own reach.
-    """
+    further from both ends than their own reach."""
     if not _group_events(events, along, n, n_events, stop):
         return False
     starts, order, keys = along.starts, along.order, along.keys

@@ -92,16 +92,14 @@ def box_contains(boxes: FloatArray, i: int, others: FloatArray, j: int) -> bool:
 @merged
 def heading(ux: float, uy: float) -> int:
     """Return the direction bits of an edge: 2 right, 4 left, 8 up, 16 down; caller guarantees that (ux, uy) is not
-    zero.
-    """
+    zero."""
     return 2 * (ux > 0.0) + 4 * (ux < 0.0) + 8 * (uy > 0.0) + 16 * (uy < 0.0)
 
 
 @merged
 def _is_one_run(mark: int) -> bool:
     """Return whether edges with these combined direction bits all head for one quadrant (never right and left, up and
-    down).
-    """
+    down)."""
     return (mark & 6) != 6 and (mark & 24) != 24
 
 
@@ -118,8 +116,7 @@ def _interleave_zeros(bits: int) -> int:
 def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
     """Fill ``places`` with 0 .. n - 1 in Morton order of the boxes' lower left corners; return whether they were
     sorted. They stay in the given order where the path through the corners is short: in Morton order it grows like
-    ``sqrt(n)``.
-    """
+    ``sqrt(n)``."""
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
     way, x_last, y_last = 0.0, boxes[0, 0], boxes[0, 2]
@@ -155,8 +152,7 @@ def build_tree(tree: BoxTree, n: int, stop: FlagArray) -> None:
 @inline
 def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
     """Fill ``nodes`` and ``node_marks`` from ``places``; nodes without boxes get inverted boxes. added: bits for every
-    mark.
-    """
+    mark."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
     for leaf in range(n_leaves):
@@ -193,8 +189,7 @@ def push_children(tree: BoxTree, node: int, depth: int) -> int:
 @inline
 def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
     """Continue the dual traversal: write intersecting pairs to ``tree.pairs``; return their number and the stack's
-    depth.
-    """
+    depth."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     stack, pairs = tree.stack, tree.pairs
     n_leaves, n_pairs, steps = leaves_of(n), 0, 0
@@ -242,8 +237,7 @@ def begin_pairs(tree: BoxTree) -> int:
 @inline
 def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
     """Write the next portion of intersecting pairs to ``tree.pairs``, each pair once; return their number and the new
-    depth. Depth 0: the traversal has ended. Caller guarantees a built tree if n > FEW.
-    """
+    depth. Depth 0: the traversal has ended. Caller guarantees a built tree if n > FEW."""
     if n <= FEW:
         return _all_pairs(tree, n), 0
     return _next_pairs(tree, n, depth)

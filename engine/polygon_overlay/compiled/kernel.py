@@ -102,8 +102,7 @@ class _Span(NamedTuple):
 class _Arrangement(NamedTuple):
     """Counts of a pair: boundary rings, their points, crossings, edge pairs decided exactly. is_clear: clearance.py
     proves that rounding preserves the topology. n_contacts: the scratch needed; if it exceeds what there is, the pair
-    failed.
-    """
+    failed."""
 
     n_boundary: int
     n_points: int
@@ -121,8 +120,7 @@ def _intersect_convex(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, stop: FlagArray
 ) -> tuple[int, int, float]:
     """Intersect two convex polygons of one ring each; return the number of points or GENERAL, the first index, the
-    displacement.
-    """
+    displacement."""
     first, second = span.first, span.second
     return intersect_convex(
         subjects.vertices[subjects.offsets[first] : subjects.offsets[first + 1]],
@@ -137,8 +135,7 @@ def _load_pair(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, selected: FlagArray,
     is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Load both polygons of a pair; return the numbers of vertices and rings, and whether no coordinate is too small.
-    """
+    """Load both polygons of a pair; return the numbers of vertices and rings, whether no coordinate is too small."""
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, is_in_range = load_rings(
@@ -192,8 +189,7 @@ def _arrange_chains(
     w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
 ) -> tuple[int, int]:
     """Trace the boundary rings of a noded pair by chains and faces; return the number of rings, or NO_ROOM, and of
-    points. If ``stop`` is set, the result is invalid.
-    """
+    points. If ``stop`` is set, the result is invalid."""
     n, n_rings, edges, n_crossings = loaded.n, loaded.n_rings, w.given.edges, contacts.n_crossings
     w.stars.node_of[: n + n_crossings] = -1
     n_nodes, n_chains, n_loose = build_chains(
@@ -229,8 +225,7 @@ def _arrange_chains(
 @merged
 def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tuple[float, bool]:
     """Round the points of the rings; return the largest displacement, or LOST, and whether the rounded rings are proven
-    valid.
-    """
+    valid."""
     rings, rounded, n_boundary, n_points = w.rings, w.rounded, arranged.n_boundary, arranged.n_points
     farthest = round_points(w.given.edges, w.events, rings.point, n, arranged.n_crossings, n_points, rounded, stop)
     if farthest <= 0.0:

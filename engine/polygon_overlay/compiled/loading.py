@@ -43,8 +43,7 @@ class RingArrays(NamedTuple):
 
 class Given(NamedTuple):
     """The rings of both polygons: edges; origins, by vertex its number in the input; tops and masks, by ring its last
-    vertex (x, then y) and the bits of its source.
-    """
+    vertex (x, then y) and the bits of its source."""
 
     edges: Edges
     origins: Any
@@ -53,8 +52,7 @@ class Given(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Numbers of vertices and rings, and of edges that replace several (runs); the largest magnitude of a coordinate.
-    """
+    """Numbers of vertices and rings, and of edges that replace several (runs); the largest |coordinate|."""
 
     n: int
     n_rings: int
@@ -71,8 +69,7 @@ def is_before(vertices: FloatArray, i: int, j: int) -> bool:
 @inline
 def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple[int, int]:
     """Close the ring of vertices ``start`` .. n - 1, dropped if it has fewer than three; return the numbers of vertices
-    and rings.
-    """
+    and rings."""
     edges = given.edges
     x, y = edges.x, edges.y
     while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
@@ -167,8 +164,7 @@ def is_empty(box: Box) -> bool:
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArray) -> float:
     """Fill ``tree.boxes`` with the box of each edge, enlarged by the margin, and ``tree.marks`` with its direction
     bits. Returns the least max(|dx|, |dy|) of an edge. BENT is set where the turn from the edge before, by the filter
-    of `turns`, proves that both share one vertex only.
-    """
+    of `turns`, proves that both share one vertex only."""
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
     first = 0

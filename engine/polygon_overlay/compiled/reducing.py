@@ -65,8 +65,7 @@ def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
 @inline
 def _low_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
     """Return the lexicographically smallest vertex (x, then y) of blocks begin .. end - 1, the end of the last
-    excluded.
-    """
+    excluded."""
     x_min = blocks.boxes[begin, 0]
     for i in range(begin + 1, end):
         x_min = min(x_min, blocks.boxes[i, 0])
@@ -85,8 +84,7 @@ def _load_run(
     n_runs: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append the vertices that a run first .. last retains: both ends, ``low`` and ``high``, and the neighbours of
-    each. Returns the numbers of vertices and runs, and whether all coordinates are in range.
-    """
+    each. Returns the numbers of vertices and runs, and whether all coordinates are in range."""
     x, y = given.edges.x, given.edges.y
     is_in_range = True
     k = first
@@ -113,8 +111,7 @@ def _load_ring(
     n: int, n_runs: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Append a ring of blocks begin .. end - 1: active blocks whole, others reduced by `_load_run`. Returns the numbers
-    of vertices and runs, and whether all coordinates are in range. runs: receives the edges that replace several.
-    """
+    of vertices and runs, and whether all coordinates are in range. runs: receives the edges that replace several."""
     x, y, origins = given.edges.x, given.edges.y, given.origins
     start = n
     is_in_range = True
@@ -153,8 +150,7 @@ def _load_polygon(
     runs: Int32Array, reduced: Loaded, stop: FlagArray,
 ) -> tuple[Loaded, bool]:  # fmt: skip
     """Append a polygon, its inactive blocks reduced to runs; return the counts, and whether all coordinates are in
-    range.
-    """
+    range."""
     n, n_rings, n_runs, largest = reduced
     vertices, is_in_range = rings.vertices, True
     for i_ring in range(ring, ring + rings.offsets.shape[0] - 1):
@@ -201,8 +197,7 @@ def reduce_pair(
 ) -> Loaded:
     """Load two polygons into the scratch of `overlay_pairs`, with stretches of edges that meet nothing reduced to runs.
     size: edges of a block. n_most: with more active edges than this reduction does not pay, and the result has no
-    vertices. There is scratch for at least a thousand contacts.
-    """
+    vertices. There is scratch for at least a thousand contacts."""
     w = workspace_at(addresses)
     n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
@@ -247,8 +242,7 @@ def _copy(
     vertices: FloatArray, source: int, base: int, step: int, n: int, made: FloatArray, made_sources: Int32Array, at: int
 ) -> None:
     """Write n consecutive input vertices, from number ``source`` on in direction ``step`` (1 or -1), and their sources.
-    base: number of the first of ``vertices``. at: where to write in ``made``.
-    """
+    base: number of the first of ``vertices``. at: where to write in ``made``."""
     part, numbers = made[at : at + n], made_sources[at : at + n]
     if step > 0:
         given = vertices[source - base : source - base + n]

@@ -49,8 +49,7 @@ _LANES: Final = 8
 _SUMS: Final = 3 * _LANES
 _BLOCK: Final = 32
 """Consecutive input vertices whose terms are summed in eight lanes. Joining the sums adds eight terms, within twice the
-bound of a block.
-"""
+bound of a block."""
 
 
 class _Place(NamedTuple):
@@ -65,8 +64,7 @@ class _Place(NamedTuple):
 
 class _Pair(NamedTuple):
     """Polygons, and a pair of them: its subject's first vertex and number of vertices, its clip's first vertex;
-    last_rings: by side, the ring that was located last.
-    """
+    last_rings: by side, the ring that was located last."""
 
     subjects: Any
     clips: Any
@@ -87,8 +85,7 @@ def _polygon_vertex(pair: _Pair, v: int) -> tuple[Any, int, int]:
 @merged
 def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, side: int) -> int:
     """Return the next vertex of v's ring that differs from v (v itself if there is none). last_rings[side]: a guess of
-    the ring, updated.
-    """
+    the ring, updated."""
     low, n = int(last_rings[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
         low = (v - offsets[0]) * n // (offsets[n] - offsets[0])  # where all rings are of one size
@@ -178,8 +175,7 @@ def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
 def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
     """Add the area terms of the `_BLOCK` inner ones of `_BLOCK` + 2 vertices to ``sums``; return whether all
     differences to ``ox`` are exact. sums: (3 * LANES,) totals, rounding errors, and magnitudes. sign: -1 if the ring
-    runs from the last to the first.
-    """
+    runs from the last to the first."""
     low, high = (min(0.5 * ox, 2.0 * ox), max(0.5 * ox, 2.0 * ox)) if ox != 0.0 else (-np.inf, np.inf)
     is_exact = True
     for row in range(1, _BLOCK, _LANES):
@@ -197,8 +193,7 @@ def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
 
 @inline
 def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tuple[float, float, float, float]:
-    """Return twice the area of a ring as a double-double, an error bound of its terms, and the sum of their magnitudes.
-    """
+    """Return twice the area of a ring as a double-double, an error bound, and the sum of its terms' magnitudes."""
     vertices, v, _ = _polygon_vertex(pair, sources[first, 0])
     ox, n = vertices[v, 0], (last - first) >> 2
     for k in range(first, last if n > _BLOCK else first, max(n, 1)):  # the others are likely to be like these
@@ -216,8 +211,7 @@ def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tupl
 def _twice_area_from(
     pair: _Pair, sources: Int32Array, first: int, last: int, ox: float, oy: float
 ) -> tuple[float, float, float, float]:
-    """Return as `_twice_area`, with coordinates relative to (ox, oy); an error bound below 0: call again with ``ox`` 0.
-    """
+    """Return as `_twice_area`, coordinates relative to (ox, oy); an error bound below 0: call again with ``ox`` 0."""
     before = _place(pair, sources, last - 1, ox, oy)
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
@@ -264,8 +258,7 @@ def sum_areas(
 ) -> int:  # fmt: skip
     """Fill ``areas``, (n,) float64, with the nearest doubles of summed ring areas, NaN where that is not proven.
     Returns the number of NaN. subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or
-    one for all. sources, offsets: of rings, as of overlay_pairs. groups: (n + 1,) int64 offsets into the rings.
-    """
+    one for all. sources, offsets: of rings, as of overlay_pairs. groups: (n + 1,) int64 offsets into the rings."""
     n_uncertified = 0
     last_rings = workspace(2)
     last_rings[0] = last_rings[1] = 0.0

@@ -47,8 +47,7 @@ Blocks = namedtuple("Blocks", "first last following boxes marks is_active firsts
 @inline
 def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int, stop: FlagArray) -> int:
     """Append the blocks, of up to ``size`` edges, of all rings, as blocks n .. and rings ``ring`` ..; return the end of
-    blocks.
-    """
+    blocks."""
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, boxes = blocks.first, blocks.last, blocks.boxes
     for i_ring in range(n_rings):
@@ -84,8 +83,7 @@ def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
 def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, stop: FlagArray) -> None:
     """Fill the marks and successors of all blocks of rings; activate blocks without a common direction or with a
     doubtful vertex. A vertex is doubtful if floats do not prove that the ring turns there, or that it differs from the
-    vertex before.
-    """
+    vertex before."""
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     for i_ring in range(n_rings):
         start, end = offsets[i_ring], offsets[i_ring + 1]
@@ -155,8 +153,7 @@ def count_active(blocks: Blocks, n: int) -> int:
 def activate_blocks_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: FlagArray) -> bool:
     """Activate each block whose box is within ``gap`` of another's; return False if this makes too many edges active.
     tree: built over the boxes of n blocks, with all mark bits on the last block of each ring. n_most: number of edges
-    that is too many.
-    """
+    that is too many."""
     nodes, stack = tree.nodes, tree.stack
     n_active = count_active(blocks, n)
     n_leaves, visits = leaves_of(n), _VISITS * n
@@ -189,8 +186,7 @@ def _head_together(mark: int, other: int) -> bool:
 @inline
 def _activate_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf: int, other: int) -> int:
     """Activate the near blocks of two leaves; return the number of edges in the blocks newly activated. Consecutive
-    blocks with a common direction are exempt.
-    """
+    blocks with a common direction are exempt."""
     first, last, boxes, marks, is_active = blocks.first, blocks.last, blocks.boxes, blocks.marks, blocks.is_active
     n_activated = 0
     low, high = LEAF * leaf, LEAF * other
@@ -236,6 +232,5 @@ def activate_blocks_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxT
 @merged
 def _is_above(boxes: FloatArray, i: int, x: float, y: float, ceiling: float) -> bool:
     """Return whether a box intersects the ray from (x, y) straight up, a step to the right, at or below height
-    ``ceiling``.
-    """
+    ``ceiling``."""
     return not (boxes[i, 0] > x or boxes[i, 1] <= x or boxes[i, 3] < y or boxes[i, 2] > ceiling)

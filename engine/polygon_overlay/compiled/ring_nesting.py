@@ -87,8 +87,7 @@ FloodFill = namedtuple("FloodFill", "sources place stamp link first entered ring
 def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFill, half: int, n_sources: int) -> int:
     """Toggle the sources that bound a half-chain, crossed from its left; return the number of sources around the face
     beyond. By PAIR and by the rules of winding numbers ``n_sources`` and the result are a label or a winding number
-    instead.
-    """
+    instead."""
     chain = half >> 1
     if nesting.rule == Rule.PAIR:
         return n_sources ^ chains.mask[chain]
@@ -113,8 +112,7 @@ def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFi
 @merged
 def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> int:
     """Return the part of the result that a face belongs to, 0 for none, by a rule other than AGAIN. n_sources: number
-    of sources, label or winding number of the face, as of `_cross_half_chain`.
-    """
+    of sources, label or winding number of the face, as of `_cross_half_chain`."""
     if rule == Rule.PAIR:
         return int(selected[n_sources])
     if rule == Rule.FIRST_ALONE:
@@ -125,8 +123,7 @@ def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> in
 @merged
 def _classify_face(nesting: Nesting, h: FloodFill, face: int, n_sources: int, n: int) -> tuple[bool, int]:
     """Return whether a face is inside by the rule AGAIN, and the number of evidence entries with those of the face, or
-    NO_ROOM. n: number of entries before; the face lies in the rings ``h.sources[:n_sources]``.
-    """
+    NO_ROOM. n: number of entries before; the face lies in the rings ``h.sources[:n_sources]``."""
     shells, sizes, room = nesting.shells, nesting.sizes, h.ring.shape[0]
     least = float("inf")
     for k in range(n_sources):
@@ -156,8 +153,7 @@ def propagate_labels(
 ) -> int:  # fmt: skip
     """Fill ``faces.inside`` by flood fill over half-chains, and append evidence entries; return their number, or
     NO_ROOM. selected: see `overlay_pairs`. sizes: numbers of chains and cycles. ``faces.joined`` joins the cycles of
-    one face.
-    """
+    one face."""
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
     for ring in range(nesting.shells.shape[0]):
@@ -204,8 +200,7 @@ def group_provenance_by_region(
     faces: Faces, h: FloodFill, n_entries: int, n_cycles: int, n_rings: int, stop: FlagArray
 ) -> None:
     """Link the n_entries evidence entries of faces into one list a region, each source ring once (``h.region``,
-    ``h.after``). ``faces.regions`` is filled.
-    """
+    ``h.after``). ``faces.regions`` is filled."""
     for i in range(n_cycles + 1):
         h.region[i] = h.entered[
             i
@@ -232,8 +227,7 @@ def group_provenance_by_region(
 
 @merged
 def record_adjacent_regions(faces: Faces, h: FloodFill, path: Int32Array, first: int, last: int, n_rings: int) -> None:
-    """Append to ``h.beyond`` the regions on the other side of ring n_rings, whose half-chains are ``path[first:last]``.
-    """
+    """Append to ``h.beyond`` the regions beyond ring n_rings, whose half-chains are ``path[first:last]``."""
     n = h.offset[n_rings]
     for k in range(first, last):
         region = root_of(faces.regions, faces.cycle[path[k] ^ 1])
@@ -249,8 +243,7 @@ def write_evidence(
 ) -> int:  # fmt: skip
     """Append a row (``name``, ``base`` + source) for each source ring of one result ring; return the number of rows, or
     NO_ROOM. The sources of a shell are those of its own region, the sources of a hole those of the regions on its other
-    side.
-    """
+    side."""
     for at in range(h.offset[ring] if is_hole else 0, h.offset[ring + 1] if is_hole else 1):
         k = h.region[h.beyond[at] if is_hole else region]
         while k >= 0:  # bound: the entries of the region

@@ -23,13 +23,11 @@ from engine.types import FlagArray, FloatArray, Int32Array, Point2
 
 Output = namedtuple("Output", "vertices sources rings pieces evidence")
 """Results, pair after pair: vertices (m, 2) float64; sources (m, 2) int32; offsets of rings into vertices and of pieces
-into rings, (n + 1,) int64; evidence (m, 2) int64, rows (ring, source ring).
-"""
+into rings, (n + 1,) int64; evidence (m, 2) int64, rows (ring, source ring)."""
 
 Ranking = namedtuple("Ranking", "start x y is_hole piece order spare")
 """By ring: start, x, y, index and coordinates of its first vertex; is_hole; piece, rank of its piece. order: the rings
-in canonical order; spare: scratch.
-"""
+in canonical order; spare: scratch."""
 
 
 @inline
@@ -58,10 +56,8 @@ def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int)
 
 @inline
 def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: FlagArray) -> None:
-    """Merge-sort the first n entries of ``ranking.order``, runs of doubling length.
-
-    is_by_piece: the rings belong to several pieces.
-    """
+    """Merge-sort the first n entries of ``ranking.order``, runs of doubling length. is_by_piece: the rings belong to
+    several pieces."""
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
     while width < n:  # bound: log n turns
@@ -94,8 +90,7 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: FloatArray) -> bool:
     """Fill ``ranking.is_hole`` for rings whose orientation rounding may have changed; return False if it is ambiguous.
     Rounding is monotone, so the rounded box of a shell contains those of its holes: the shell of a region is the only
-    ring whose box contains all others and equals none. widest: scratch by region. boxes: scratch by ring.
-    """
+    ring whose box contains all others and equals none. widest: scratch by region. boxes: scratch by ring."""
     x, y = rounded.x, rounded.y
     for ring in range(n_rings):
         x_min = y_min = np.inf
@@ -161,8 +156,7 @@ def rank_rings(
 
 @inline
 def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: FlagArray) -> int:
-    """Write the smallest vertex (x, then y) of a ring to ``ranking``; return the orientation sign there, 0 if stopped.
-    """
+    """Write the smallest vertex (x, then y) of a ring to ``ranking``; return the turn's sign there, 0 if stopped."""
     x, y = rounded.x, rounded.y
     first, last = rings.offset[ring], rings.offset[ring + 1]
     low = first

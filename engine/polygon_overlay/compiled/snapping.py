@@ -67,8 +67,7 @@ def scale(
     scaled: FloatArray,
 ) -> float:
     """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest magnitude before rounding.
-    A value within a relative ``near_integer`` of an integer becomes that integer; a value below ``least``, zero.
-    """
+    A value within a relative ``near_integer`` of an integer becomes that integer; a value below ``least``, zero."""
     largest = 0.0
     for k in range(values.shape[0]):
         for axis in range(2):
@@ -98,8 +97,7 @@ def _find_corners(
 ) -> int:
     """Fill ``corners`` with the vertices where snapped rings turn, and ``starts`` with the offsets of rings into them.
     Returns the number of corners, or FOLDS if a ring turns back, begins at another vertex than before, or is out of
-    order.
-    """
+    order."""
     piece = n = 0
     for ring in range(offsets.shape[0] - 1):
         first, last = offsets[ring], offsets[ring + 1]

@@ -52,8 +52,7 @@ _N_BUFFERS: Final = len(Buffers._fields)
 
 class Workspace(NamedTuple):
     """Scratch by name, one tuple for each step in the order of the data flow; its arrays are rows of those of
-    `Buffers`.
-    """
+    `Buffers`."""
 
     given: Given
     tree: BoxTree
@@ -73,16 +72,14 @@ class Workspace(NamedTuple):
 
 
 Outcomes = namedtuple("Outcomes", "status counts displacement")
-"""By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, exactly decided edge pairs;
-displacement (n,) float64: the largest distance by which rounding moved a vertex.
-"""
+"""By pair: status (n,) int8; counts (n, 4) int64: pieces, rings, vertices, exactly decided edge pairs; displacement
+(n,) float64: the largest distance by which rounding moved a vertex."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scratch:
     """Arrays that the kernel writes to, for pairs of at most n_vertices, n_rings and n_contacts. outcome: room for one
-    pair. addresses: sizes and addresses of buffers and output, for `workspace_at` and `output_at`.
-    """
+    pair. addresses: sizes and addresses of buffers and output, for `workspace_at` and `output_at`."""
 
     n_bytes: int
     n_vertices: int
@@ -97,8 +94,7 @@ class Scratch:
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
     """Return scratch of at least these sizes, from the pool or new; the caller returns it by `return_scratch`. The
     output has room for one pair of that size: every contact adds at most a vertex and a ring. Pages that are not
-    written to cost nothing; fresh pages cost more than the kernel does.
-    """
+    written to cost nothing; fresh pages cost more than the kernel does."""
     try:
         pooled: Scratch | None = _pool.pop()
     except IndexError:  # no check before: another thread may be quicker
@@ -210,8 +206,7 @@ def output_at(addresses: IntArray) -> Output:
 @merged
 def workspace_at(addresses: IntArray) -> Workspace:
     """Return the rows of the buffers of a `Scratch` by name, as views; rows that share memory are never in use
-    together.
-    """
+    together."""
     n, n_rings, k, m, n_nodes = addresses[0], addresses[1], addresses[2], addresses[3], addresses[4]
     at = addresses[_N_SIZES : _N_SIZES + _N_BUFFERS]
     vx, v = array_at(at[0], (_VERTEX_FLOATS, n), np.float64), array_at(at[1], (_VERTEX_INTEGERS, n), np.int32)

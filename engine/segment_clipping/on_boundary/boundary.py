@@ -80,8 +80,7 @@ def clip_chunk(
     segments: FloatArray, first: int, last: int, region: Bounded, locator: Locator | None, budget: Budget
 ) -> tuple[Pieces, IntArray]:
     """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, sorted, and the segments that took the exact
-    fallback. locator: of the region; None for a small batch, whose first ends are located on the fast path.
-    """
+    fallback. locator: of the region; None for a small batch, whose first ends are located on the fast path."""
     boundary, part = region.cached("clipping_boundary") or boundary_of(region), segments[first:last]
     points, locations = part[:, 0].copy(), np.zeros((last - first, 2), np.int8)
     at_once = locate_small_batch(points, region) if locator is None else None
@@ -148,8 +147,7 @@ def locate_before_contacts(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
     """Set locations[:, 1] to INSIDE_BEFORE or OUTSIDE_BEFORE for chords, both ends on the boundary, if the filter
-    decides.
-    """
+    decides."""
     if not boundary.are_safe:  # signs of the perturbed line are exact only then
         return
     chords = np.flatnonzero((locations == 0).all(axis=1))
@@ -182,8 +180,7 @@ def _crossing_parity(
 ) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
     """Return by segment whether it crosses the boundary an odd number of times before its end, and whether that is
     certain. Not certain if an edge runs along its end. Then the elements that contain a segment's end, and the segment
-    of each.
-    """
+    of each."""
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
     holds_end = kinds | Bit.CROSSES == _AT_END

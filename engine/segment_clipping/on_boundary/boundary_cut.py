@@ -46,15 +46,13 @@ UNSURE: Final = -1
 """Returned instead of a number or row if something is undecided."""
 Crossings = namedtuple("Crossings", "t points faces order codes met")
 """Crossings of one segment, by contact. t, points, faces: parameter, point, face; codes, met: kind of contact
-(contacts.py) and element; order: the contacts sorted by t.
-"""
+(contacts.py) and element; order: the contacts sorted by t."""
 
 
 @called
 def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> int:
     """Compute the contacts of segment ``item`` into `cuts`, sorted along it; return their number, UNSURE if one is
-    undecided.
-    """
+    undecided."""
     first, last, n = contacts.offsets[item], contacts.offsets[item + 1], 0
     if not is_item_safe(segments, item) or 2 * (last - first) > cuts.t.size:
         return UNSURE
@@ -98,8 +96,7 @@ def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: 
 @inline
 def _write_overlap(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
     """Write both ends of the overlap of a segment and a collinear edge as entries n and n + 1; return the next, or
-    UNSURE.
-    """
+    UNSURE."""
     k, element, face = axis_of(segments, item), cuts.met[n], cuts.faces[n]
     p, q = segments[item, 0, k], segments[item, 1, k]
     rises = q > p
@@ -132,8 +129,7 @@ class Before(IntEnum):
 @inline
 def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
     """Return the location of the perturbed line before the first of n contacts, see `Before`. of_p, of_q: locations of
-    the ends, as `ends` of `emit_touching`.
-    """
+    the ends, as `ends` of `emit_touching`."""
     begin, turns = 0, False
     for place in range(n):
         i, first = cuts.order[place], cuts.order[begin]
@@ -276,8 +272,7 @@ def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
 @inline
 def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
     """Compute the proper crossings of segment ``item``, sorted; return False if one is uncertain or two parameters are
-    equal.
-    """
+    equal."""
     first, last = contacts.offsets[item], contacts.offsets[item + 1]
     if first < last and not is_item_safe(segments, item):
         return False
@@ -299,8 +294,7 @@ def cut_group(
     stop: FlagArray, out: Pieces, row: int, state: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
     """Cut the segments of a group at their contacts; return the next segment and the next row. first: index of the
-    group's first segment. Stops early if `out` is full or `stop` is set. See `cut_on_outline`.
-    """
+    group's first segment. Stops early if `out` is full or `stop` is set. See `cut_on_outline`."""
     for item in range(segments.shape[0]):
         begin, end, place = contacts.offsets[item], contacts.offsets[item + 1], first + item
         state[place] = OPEN

@@ -69,8 +69,7 @@ CROSSED: Final = 2 * Place.WITHIN + 5
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
 """In place of the location of a second end on the boundary: the location of the perturbed line before the first
-contact.
-"""
+contact."""
 GROUP: Final = 2048
 """Most segments of a group."""
 NO_ROOM: Final = -1
@@ -148,8 +147,7 @@ def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> 
 @inline
 def are_same_point(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
     """Return whether two contacts of one segment are one point: its end, or a common corner or side of the elements.
-    first, second: elements; code, other: their codes.
-    """
+    first, second: elements; code, other: their codes."""
     n, m = decode_place(code), decode_place(other)
     if n >= Place.START or m >= Place.START:
         return n == m and n <= Place.END
@@ -230,8 +228,7 @@ def may_meet(segment: FloatArray, box: FloatArray) -> bool:
 @inline
 def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contacts: int) -> int:
     """Append the contacts of a segment (2, 2) with edges to the n_contacts present; return their new number, or
-    NO_ROOM.
-    """
+    NO_ROOM."""
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -258,8 +255,7 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contac
 @called
 def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
     """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 2); return their number.
-    Zero-length segments have none. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set.
-    """
+    Zero-length segments have none. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -277,8 +273,7 @@ def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int,
 def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
     """Return the number of contacts of segments (n, 2, 2) float64 with the edges of a polygon, and arrays of them.
     Arrays: elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of segments. NO_ROOM if there are
-    more than `room`. stop: one uint8, polled.
-    """
+    more than `room`. stop: one uint8, polled."""
     contacts = allocate_contacts(segments.shape[0], room, edge_stack())
     n_met = gather_edges(contacts, outline, segments, segments.shape[0], stop)
     return n_met, contacts.met, contacts.kinds, contacts.offsets

@@ -89,8 +89,7 @@ def dot(n: Normal, w: Vector) -> Triple:
 
 @merged
 def line_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d of edge ``element`` (k, 2, 2) and segment ``item``, each a double-double and its error bound.
-    """
+    """Return s(p) and d of edge ``element`` (k, 2, 2) and segment ``item``, each a double-double with error bound."""
     ax, ay = elements[element, 0, 0], elements[element, 0, 1]
     px, py = segments[item, 0, 0], segments[item, 0, 1]
     u, u_low = two_diff(elements[element, 1, 0], ax)
@@ -109,8 +108,7 @@ def line_values(elements: FloatArray, element: int, segments: FloatArray, item: 
 @merged
 def plane_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
     """Return s(p) and d of triangle ``element`` (k, 3, 3) and segment ``item``, each a double-double and its error
-    bound.
-    """
+    bound."""
     a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
     normal = normal_of(a, b, c)
@@ -122,8 +120,7 @@ def plane_values(elements: FloatArray, element: int, segments: FloatArray, item:
 @merged
 def is_item_safe(items: FloatArray, item: int) -> bool:
     """Return whether all coordinates of ``items[item]`` are zero or in the range in which double-doubles have their
-    bounds.
-    """
+    bounds."""
     safe = True
     for place in range(items.shape[1]):
         for k in range(items.shape[2]):
@@ -136,8 +133,7 @@ def cut_at(
     segments: FloatArray, item: int, elements: FloatArray, element: int, points: FloatArray, row: int
 ) -> tuple[float, bool]:
     """Set points[row] to the crossing of a segment and an element; return t, and whether all are proven nearest
-    doubles.
-    """
+    doubles."""
     if segments.shape[2] == 2:
         at_p, along = line_values(elements, element, segments, item)
     else:
@@ -166,8 +162,7 @@ def cut_at(
 @called
 def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
     """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of a segment; return its length. Triangle a b c: sum over k
-    of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b - a) x (x - a).
-    """
+    of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b - a) x (x - a)."""
     m, n, is_flat = workspace(16), 0, segments.shape[2] == 2
     for k in range(2 if is_flat else 0, 3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -189,8 +184,7 @@ def cross_exactly(
 ) -> tuple[float, bool]:
     """Set `point` to the crossing of a segment and an element from exact values; return t, and whether all is proven.
     The ends lie on different sides, or one of them on the element's line or plane. Coordinates are zero or of sizes
-    within 2^-120 .. 2^120, so differences are multiples of 2^-172 and values of 2^-516, below 2^366.
-    """
+    within 2^-120 .. 2^120, so differences are multiples of 2^-172 and values of 2^-516, below 2^366."""
     wp, wq, e = workspace(192), workspace(192), workspace(2304)
     n_wp = _size_at(elements, element, segments, item, 0, wp)
     n_wq = _size_at(elements, element, segments, item, 1, wq)

@@ -76,16 +76,14 @@ LIMIT: Final = 4.0
 _MOST: Final = np.float32(2.0**100)
 Way = namedtuple("Way", "middle half inverse slack is_near")
 """A segment in tree coordinates, float32: middle +- half, and its slack. inverse: 1 / half, at most 2^100, where halves
-are far below every slack; is_near: whether it comes near the tree.
-"""
+are far below every slack; is_near: whether it comes near the tree."""
 
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
     """Return kind or code of the contact of segment p q and triangle a b c, by exact signs. If an end is off the plane
     and the triangle has an area, the line meets the plane in one point, on the segment unless both ends are on one
-    side. That point is outside of the triangle only if the signs of two edges differ.
-    """
+    side. That point is outside of the triangle only if the signs of two edges differ."""
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return Kind.APART
@@ -114,8 +112,7 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 @called
 def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
     """Return the side of edge a b on which the line p q passes, perturbed by eps along one axis and eps^2 along the
-    next. k: the longest axis of p q. UNDECIDED if they are parallel.
-    """
+    next. k: the longest axis of p q. UNDECIDED if they are parallel."""
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
     if side == 0:
         side = -_slope(a, b, p, q, AXES_BEFORE[k], k)
@@ -125,8 +122,7 @@ def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> 
 @inline
 def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
     """Return the exact sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j), or UNDECIDED. Filter: six roundings
-    and a sum, twice that is 2^-50; then exact if sizes satisfy `is_safe`.
-    """
+    and a sum, twice that is 2^-50; then exact if sizes satisfy `is_safe`."""
     x, y = (a[j] - b[j]) * (q[k] - p[k]), (a[k] - b[k]) * (q[j] - p[j])
     gap, bound = x - y, 2.0**-50 * (abs(x) + abs(y)) + UNDERFLOW
     if abs(gap) > bound:
@@ -137,8 +133,7 @@ def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
 @merged
 def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: float) -> int:
     """Return APART or PROPER if the filter proves it for segment p q and triangle a b c, else UNDECIDED. blur: error of
-    each coordinate of p and q.
-    """
+    each coordinate of p and q."""
     ex, ey, ez = q.x - p.x, q.y - p.y, q.z - p.z
     ax, ay, az = a.x - p.x, a.y - p.y, a.z - p.z
     bx, by, bz = b.x - p.x, b.y - p.y, b.z - p.z
@@ -173,8 +168,7 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 @merged
 def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, blur: float) -> int:
     """Return kind or code of the contact of segment p q with triangle ``element`` (k, 3, 3). blur: error of each
-    coordinate of p and q; if above 0, UNDECIDED where the filter does not decide.
-    """
+    coordinate of p and q; if above 0, UNDECIDED where the filter does not decide."""
     a, b, c = triangle_at(elements, element)
     kind = contact_filter(a, b, c, p, q, blur)
     return kind if kind != UNDECIDED or blur > 0.0 else exact_contact(a, b, c, p, q)
@@ -285,8 +279,7 @@ def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
     """Append the contacts of a segment with the triangles of the first n queued leaf blocks; as of `append_contacts`.
-    ends: p, q, blur. shear: `shear_of` the segment.
-    """
+    ends: p, q, blur. shear: `shear_of` the segment."""
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
@@ -383,8 +376,7 @@ _EACH: Final = 8
 def contacts_with(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[IntArray, FlagArray, IntArray]:
-    """Return, by segment (n <= GROUP, 2, dim), the elements that it may meet, the kind of each, and offsets (n + 1,).
-    """
+    """Return, by segment (n <= GROUP, 2, dim), the elements that it may meet, their kinds, and offsets (n + 1,)."""
     kernel: Any = find_contacts_3d if isinstance(boundary, Mesh) else find_contacts_2d
     room, n_contacts = _LEAST_CONTACTS + _EACH * len(segments), NO_ROOM
     met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)

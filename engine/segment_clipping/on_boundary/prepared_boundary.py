@@ -87,8 +87,7 @@ def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outl
 
 def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tuple[IntArray, FloatArray]:
     """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each; offsets: of their rings.
-    Result: (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i.
-    """
+    Result: (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i."""
     n, dimension = low.shape
     order = _order(low, high, offsets)
     n_leaves = 1
@@ -157,8 +156,7 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
     """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates. Unused
-    lanes lie far from everything.
-    """
+    lanes lie far from everything."""
     child = tree.child[n_inner:]
     is_item = child != EMPTY
     block, lane = np.nonzero(is_item)
