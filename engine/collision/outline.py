@@ -153,8 +153,8 @@ def single_points(outline: Outline) -> list[int]:
 
 
 def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
-    """Return as `relate_placed`; UNSETTLED for large bodies, and for intersecting bodies with boundaries that are not
-    simple."""
+    """Return the relation of two outlines with contact details by the compiled kernel, see `relate_placed`. UNSETTLED
+    for large bodies, and for intersecting bodies with boundaries that are not simple."""
     one, other = batch.outline_arrays(first), batch.outline_arrays(second)
     if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
         return UNSETTLED, 0, -1, -1, batch.APART

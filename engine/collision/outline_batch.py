@@ -334,7 +334,8 @@ def relate_two(
     vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
     theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return as `relate_placed` for two bodies, each under a rotation and a translation."""
+    """Return the relation of two outlines, each under a rotation and a translation, with contact details: see
+    `relate_placed`."""
     placed, others, boxes = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
     error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
     box_blocks(others, theirs, boxes)

@@ -247,8 +247,8 @@ def nearest_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, points: FloatArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Return distance and faces as `gap_of_forms`, and fill points (2, d) with nearest points; faces -1: points not
-    proven."""
+    """Return distance and faces of two posed boxes or balls, see `gap_of_forms`, and fill points (2, d) with nearest
+    points. Faces -1: the points are not proven."""
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:

@@ -213,9 +213,13 @@ def gaps_of_pairs(
     forms: FloatArray, pool: ConvexArrays, bodies: IntArray, kinds: IntArray, poses: PoseArrays, places: IntArray,
     gap: float, is_measured: bool, distances: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill distances (n,) of disjoint pairs as of `gap_of_convex`, NaN if unproven; returns early when the flag is set.
+    """Fill distances (n,) of disjoint pairs: infinity if at least `gap`, NaN if unproven; returns early when the flag
+    is set.
+
     kinds (n, 2): the solids of each pair; forms (n_solids, 8): their boxes or balls, NaN for other solids; bodies
-    (n_solids,): their index in the pool, or -1; places (n, 2): rows of the poses, 0 for none."""
+    (n_solids,): their index in the pool, or -1; places (n, 2): rows of the poses, 0 for none. is_measured: if False,
+    0.0 for a distance below `gap`.
+    """
     w = workspace(30)
     for item in range(places.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:

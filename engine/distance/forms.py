@@ -93,7 +93,8 @@ def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None
 
 
 def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return as `between_forms` for a box or ball and an unposed half-space, in either order; None if unproven."""
+    """Return the clearance of a box or ball and an unposed half-space, in either order; with `least`, whether it is at
+    least that. None if unproven."""
     is_second = isinstance(second, HalfSpace)
     plane, body = (second, first) if is_second else (first, second)
     form = form_of(body)

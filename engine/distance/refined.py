@@ -181,7 +181,8 @@ def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, fl
 
 @called
 def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
-    """Return the closest points of a feature of s and one of t, margin and amplification as `_closest_on_feature`."""
+    """Return the closest points of a feature (vertex, edge, FACE) of s and one of t, with margin and error
+    amplification. Margin and amplification: see `_closest_on_feature`."""
     if second < 3:
         q = corner(t, second)
         p, inside, steepness = _closest_on_feature(q, s, first)
@@ -305,8 +306,9 @@ def _write_offset_point(
 def certify(
     s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int, points: FloatArray
 ) -> bool:
-    """Fill points (2, d) with the nearest points of two bodies, and move their candidate to row 0, ties by the lowest
-    faces. Returns False if the n candidates do not prove the points. Other arguments as of `refine`."""
+    """Fill points (2, d) with the nearest points of two bodies; False if the n candidates do not prove them. The
+    candidate of these points moves to row 0; ties are decided by the lowest faces. start, other: translations of both
+    bodies (3,). radii: of the balls about their triangles."""
     pairs, best = s.room.candidates.pairs, 0
     faces, their_faces = s.a.mesh.faces, s.b.mesh.faces
     here, there = named(s.a, pairs[0, 0], pairs[0, 2]), named(s.b, pairs[0, 1], pairs[0, 3])

@@ -192,7 +192,7 @@ def _around(target: Fraction) -> tuple[float, float]:
 
 
 def spread_pair(first: Solid, second: Solid, poses: Poses, budget: Budget) -> SpreadPair:
-    """Return the pair of two bodies, each under one pose or None."""
+    """Return two bodies as a `SpreadPair`, the input of distance kernels; poses: one `Pose` or None for each body."""
     own, their = (STILL if at is None else in_space(at.rotation[None], at.translation[None]) for at in poses)
     return SpreadPair(first, second, own, their, budget)
 

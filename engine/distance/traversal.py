@@ -84,7 +84,7 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
 @merged
 def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatArray) -> tuple[int, int]:
     """Append the candidate pairs of triangles of leaf blocks i and j; return the outcome and the number of candidates.
-    limits: as of the module; the first falls to the least upper bound."""
+    limits: see the module; the first is lowered to the least upper bound."""
     frames, work, candidates, per_size = s.room.frames, s.room.work, s.room.candidates, _ABOVE_ONE / size_of(s.a)
     place_triangles(s.b.mesh.blocks, j, frames, work)
     for k in range(LANES):
@@ -193,7 +193,7 @@ def _half_of(view: View, at: int) -> float:
 
 @inline
 def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
-    """Fill the candidates by a best-first search; return the outcome and their number. limits: as of the module."""
+    """Fill the candidates by a best-first search; return the outcome and their number. limits: see the module."""
     first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
     n, n_candidates = 1, 0
     s.room.heap.bounds[0], s.room.heap.lanes[0, 0], s.room.heap.lanes[0, 1] = 0.0, ROOT, ROOT

@@ -239,7 +239,8 @@ def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: 
 
 @merged
 def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n: int) -> tuple[int, int]:
-    """Set the signs of n vertices at an oblique plane; return as `classify_across`. None is proven to be on it."""
+    """Set the signs of n vertices at an oblique plane by float values; return (number of vertices inside, 0). (DOUBT,
+    0) if a value is within `near` of zero: no vertex is proven to be on the plane."""
     row, n_in = row_of(s, plane), 0
     for i in range(n):
         value = value_at(s, row, ring[i])

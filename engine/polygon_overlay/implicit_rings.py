@@ -91,8 +91,9 @@ class ImplicitRings(NamedTuple):
         return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
     def nearest_areas(self, groups: IntArray) -> FloatArray:
-        """Return the areas of `certified_areas`, those not certified by exact sums. Raises `NotRepresentableError` for
-        an area beyond the largest double."""
+        """Return (n,) float64: for each k the double nearest to the area of rings groups[k] .. groups[k + 1] - 1. By
+        exact sums where `certified_areas` does not prove one. Raises `NotRepresentableError` beyond the largest double.
+        """
         areas, n_uncertified = self.certified_areas(groups)
         for k in np.flatnonzero(np.isnan(areas)).tolist() if n_uncertified else ():
             areas[k] = self.some(range(groups[k], groups[k + 1])).nearest_area()

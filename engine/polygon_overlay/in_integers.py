@@ -67,9 +67,8 @@ def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tupl
 def _label_arrangement(
     subject: RingArrays, clip: RingArrays, selected: Sequence[int], budget: Budget, nesting: Nesting = UNNAMED
 ) -> tuple[Subdivision, list[int]]:
-    """Return the subdivision of checked rings, and by face the part of the result that it belongs to, or 0. selected:
-    by label 0 .. 3, as of `overlay_pairs`.
-    """
+    """Return the subdivision of checked rings, and for each face the part of the result that it belongs to, or 0.
+    selected: the part for each label 0 .. 3 (bit 0: in the subject, bit 1: in the clip)."""
     vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
     arrangement = arrange_rings(vertices, offsets, None, budget)

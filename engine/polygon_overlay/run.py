@@ -72,9 +72,9 @@ _FEW_CONTACTS: Final = 1024
 def run_kernel(
     subjects: PolygonArrays, clips: PolygonArrays, selected: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
 ) -> PairResults:
-    """Overlay polygons pair by pair; raises as `Budget.check`. selected: as of `overlay_pairs`, one of
-    `SELECTED_ARRAYS`, or `EACH_PART`. nesting: of the rings of subjects, each a source of its own, as of
-    `overlay_pairs`."""
+    """Overlay polygons pair by pair by the compiled kernel; raises as `Budget.check`. selected: the part of the result
+    for each label 0 .. 3, one of `SELECTED_ARRAYS` or `EACH_PART`. nesting: fill rule for the rings of subjects, each a
+    source of its own."""
     n_vertices, n_rings = map(sum, zip(subjects.largest_counts(), clips.largest_counts(), strict=True))
     is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and selected[3] < 2
     if is_plain and n_vertices >= max(_MANY, _MANY_IN_RING * n_rings):
@@ -259,7 +259,7 @@ def overlay_few(subject: Polygon, clip: Polygon, selected: FlagArray) -> Overlay
 def _fields(
     subject: RingArrays, clip: RingArrays, vertices: bytes, sources: bytes, rings: tuple[bytes, bytes] | None
 ) -> dict[str, Any]:
-    """Return the fields of an `Overlay` computed on first access, from the kernel's output as bytes."""
+    """Return, as a dict, the fields of an `Overlay` from the kernel's output arrays, given as bytes."""
     places = np.frombuffer(vertices).reshape(-1, 2)
     ring_offsets, piece_offsets = one_polygon(len(places)), one_polygon(1)
     if rings is not None:

@@ -94,7 +94,7 @@ def orient2d(a: Point2, b: Point2, c: Point2) -> int:
 
 @merged
 def rounded_determinant(u: Point3, v: Point3, w: Point3) -> tuple[float, float]:
-    """Return the determinant of three differences in floats, positive as of `orient3d`, and its permanent."""
+    """Return the determinant of three differences in floats, with the sign of orient3d, and its permanent."""
     vx_wy, wx_vy = v.x * w.y, w.x * v.y
     wx_uy, ux_wy = w.x * u.y, u.x * w.y
     ux_vy, vx_uy = u.x * v.y, v.x * u.y

@@ -121,7 +121,8 @@ def orient3d_posed(
 
 @called
 def orient3d_posed_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
-    """Return orient3d of four points under their poses by an expansion, or UNDECIDED; arguments: `orient3d_posed`."""
+    """Return the exact sign of orient3d of four points under their poses by an expansion, or UNDECIDED. poses (n, 12)
+    float64: R by rows, then t; caller guarantees det R > 0 and entries of R of at most 1.01."""
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
         return orient3d_exact(
             Point3(a.x, a.y, a.z), Point3(b.x, b.y, b.z), Point3(c.x, c.y, c.z), Point3(d.x, d.y, d.z)

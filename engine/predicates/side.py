@@ -72,7 +72,7 @@ def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, 
 
 @called
 def _side_exact(h: HalfSpace3, p: Point3) -> int:
-    """Return as `side_of_plane`, by an expansion."""
+    """Return 1 if p is inside the half-space h, 0 on its plane, -1 outside, or UNDECIDED, by an expansion."""
     e = workspace(8)
     if (
         is_exact_product(h.a, p.x)

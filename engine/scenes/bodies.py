@@ -157,8 +157,8 @@ class Bodies(Preparing):
         return self.prepared("table", lambda: Table(self.solids, self.poses, like), budget.check)
 
     def words(self, budget: Budget) -> tuple[list[int], Any]:
-        """Return the integers from which segment kernels read all bodies, and the arrays that their addresses refer to.
-        As of `words_of`."""
+        """Return a row of integers that encodes the `BodyTree` of all bodies for segment kernels, and the arrays whose
+        addresses it has."""
         return self.prepared(
             "words", lambda: words_of(self.tree(budget), NOBODY, self.table(budget).rows), budget.check
         )

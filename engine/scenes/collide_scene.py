@@ -378,7 +378,8 @@ def distances_below(
 def _distances_of_group(
     bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
 ) -> FloatArray:
-    """Return as `distances_below` for pairs of the same two solids; places (n, 2): the rows of their poses."""
+    """Return distances (n,) of disjoint pairs of the same two solids, infinite for those not nearer than the gap;
+    exact. places (n, 2): the rows of their poses. is_measured: if False, pairs nearer than the gap get 0.0."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
     distances = np.full(len(pairs), np.nan)
     if has_plane(first, second):

@@ -182,7 +182,8 @@ def locate_all(
 def _locate_small_batch(
     points: FloatArray, scene: Placements, budget: Budget, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
-    """Locate a small batch of points body by body, without a tree over the bodies; returns as `locate_all`."""
+    """Return the bodies that contain each of a few points, and the accuracy report; body by body, without a tree over
+    bodies."""
     n, located, counts = len(points), np.empty((len(scene.base.solids), len(points)), np.int8), [0, 0]
     scene.base.check_located(budget)
     for body in range(len(located)):

@@ -124,8 +124,8 @@ def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
 
 @inline
 def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return 1, -1 or UNDECIDED as `_planes_cut` for the half-spaces of a body; and, unless `is_any`, both ends of the
-    piece. Ends as `put_piece` takes them."""
+    """Return 1 if a segment meets a body bounded by planes, -1 if not, or UNDECIDED, and both ends of the piece.
+    is_any: the ends are not computed. Ends are those that `put_piece` takes."""
     frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
     own, blur, along, along_blur = frame
     meets, entered, left = _planes_cut(rows, frame)
@@ -144,8 +144,8 @@ def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool
 
 @inline
 def in_ball(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return as `between_planes` for a ball with centre c: d = q - p, and f = p - c, off by the rounding of the posed
-    c."""
+    """Return 1 if a segment meets a posed ball, -1 if not, or UNDECIDED, and both ends of the piece (not if is_any). d
+    = q - p, and f = p - c for the centre c, off by the rounding of the posed c."""
     c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     along = difference(p, q)

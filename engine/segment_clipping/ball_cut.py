@@ -126,7 +126,8 @@ def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Qua
 
 @inline
 def _meets(e: _Quadratic) -> tuple[int, int, int]:
-    """Return as `meets_ball`, from a quadratic and its bounds."""
+    """Return whether a segment meets a ball (1, -1 or UNDECIDED), and the same for p and q outside, from a quadratic
+    with bounds. See `meets_ball`."""
     a, b, gap = e.a[0], e.b[0], e.gap[0]
     past = e.a_bound + e.b_bound + 2.0**-50 * (a + abs(b))
     of_p, of_q = sign_of(e.c, e.c_bound), sign_of(e.at_q, e.q_bound)
@@ -138,7 +139,7 @@ def _meets(e: _Quadratic) -> tuple[int, int, int]:
 
 @called
 def _meets_in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
-    """Return as `meets_ball`, computed in double-doubles."""
+    """Return what `meets_ball` does, by double-doubles: meets, p outside, q outside, each 1, -1 or UNDECIDED."""
     return _meets(_in_double_doubles(d, f, blur, radius))
 
 
@@ -161,9 +162,8 @@ def meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, i
 
 @inline
 def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, of_q: int) -> tuple[int, End, End]:
-    """Return 1 and both ends of the piece of a segment in a ball, as `put_piece` takes them; or UNDECIDED. of_p, of_q:
-    1 if that end is outside, so that a root replaces it.
-    """
+    """Return 1 and both ends, for `put_piece`, of the piece of a segment in a ball; or UNDECIDED. of_p, of_q: 1 if that
+    end is outside, so that a root replaces it."""
     first, last = OWN_START, OWN_END
     if of_p < 0 and of_q < 0:
         return 1, first, last

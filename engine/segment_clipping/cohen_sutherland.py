@@ -143,7 +143,8 @@ def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple
 
 @merged
 def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Return as `decide_in_doubles`, proven in double-doubles."""
+    """Return state, plane entered and plane left (-1.0: none) of segment p q in a box low .. high, proven in
+    double-doubles. State: 0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN."""
     a, d, is_x = slab_crossings(p[0], q[0], low[0], high[0], 0.0)
     b, e, is_y = slab_crossings(p[1], q[1], low[1], high[1], 1.0)
     c, f, is_z = slab_crossings(p[2], q[2], low[2], high[2], 2.0)

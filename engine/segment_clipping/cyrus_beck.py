@@ -199,8 +199,8 @@ def coordinate_limit(columns: FloatArray) -> float:
 def decide_alone(
     segments: FloatArray, item: int, columns: FloatArray, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
-    """Decide segment ``item``; return as `decide_by_rows`, with planes as indices of rows. limit: `coordinate_limit`.
-    numbers (3, m), chosen (m,): scratch."""
+    """Decide segment ``item``; return state, plane entered, plane left (-1: none), and 1 if beyond the filter. Planes
+    are indices of rows. limit: `coordinate_limit`. numbers (3, m), chosen (m,): scratch."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]

@@ -89,7 +89,7 @@ class Plan(NamedTuple):
 def clip_on_convex(
     segments: FloatArray, region: Solid, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the pieces of segments in a convex region, at most one a segment; as of `Plan.cut`."""
+    """Return the pieces of segments in a convex region, at most one a segment, and the accuracy report."""
     method = plan.method
     assert method is not None
     if len(segments) <= FEW and (few := _clip_few(segments, method)) is not None:

@@ -65,8 +65,8 @@ def _orient_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float,
     work: Int8Array,
 ) -> int:  # fmt: skip
-    """Return the orientation sign of three points of one plane; if it is undecided, return 0 and set ``work[_BAD]``.
-    off, axis: as of `turn_in_plane`."""
+    """Return the sign of the turn a, b, c within their common plane: 1, 0, -1; if undecided, set ``work[_BAD]`` and
+    return 0. axis >= 0: in the projection along it; else seen from the point ``off``, which is not in the plane."""
     turn = turn_in_plane(poses, a, b, c, off, axis, error)
     if turn == UNDECIDED:
         work[_BAD], turn = 1, 0

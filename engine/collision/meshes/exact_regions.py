@@ -61,8 +61,8 @@ def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
 
 
 def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
-    """Return as `sides_at` for a point q of `plane`; None if a face through q, not parallel to that plane, makes it
-    ambiguous. plane None: that is not tested."""
+    """Return whether `body` is inside just above, just below and at a point q of `plane`; None if that is ambiguous.
+    Ambiguous: a face through q is not parallel to the plane. plane None: this is not tested."""
     if not body.mesh.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
@@ -89,8 +89,8 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
-    """Return 1 if the body lies on the side of a clean face to which its normal points, -1 if on the other; 0 if
-    undecided. Cached in the mesh."""
+    """Return 1 if the body lies on the side of a face to which its normal points, -1 if on the other; 0 if undecided.
+    face: STATE_CLEAN, not crossed or covered by others. Cached in the mesh."""
     cached, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
     if cached[face] not in (1, -1):
         for q in points_within(body.corners(face)):

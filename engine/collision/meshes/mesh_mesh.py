@@ -147,8 +147,8 @@ def _relation(pair: MeshPair) -> Collision:
 
 
 def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collision:
-    """Return OVERLAPPING or TOUCHING for a pair that meets without a crossing that proves OVERLAPPING. patches: by
-    body, its patches inside the other body."""
+    """Return OVERLAPPING or TOUCHING for a pair that meets; no crossing proves OVERLAPPING. patches: by body, sets of
+    its faces without contact, connected through vertices, that lie inside the other body."""
     contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
     both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):

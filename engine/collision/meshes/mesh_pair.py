@@ -52,9 +52,9 @@ def relate(
     first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: dual.Contacts | None = None,
     n_named: int | None = None,
 ) -> tuple[list[int], dual.Contacts]:  # fmt: skip
-    """Return the row that `relate_poses` writes for a pair, and its contacts, valid until the thread's next call.
-    known: the contacts and their classes, if computed already. n_named: as of `relate_poses`; None: as `work` requests.
-    """
+    """Return the relation row (N_COLUMNS,) int64 of two posed meshes, and their contacts, valid until the thread's next
+    call. known: the contacts and their classes, if computed already. n_named: number of contacts from which the witness
+    is chosen; None: as `work` requests."""
     contacts, n_known = (SPACE.contacts, 0) if known is None else (known, len(known.kinds))
     n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
     room = len(contacts.kinds)

@@ -135,7 +135,8 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
 
 @allocating
 def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> int:
-    """Return as `locate_point`, by the ray along one axis; face ``left_out`` is not counted (-1: all are)."""
+    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED by the ray along one axis; face ``left_out`` is not counted
+    (-1: all are)."""
     q, error = own.point, own.error
     local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
@@ -168,7 +169,8 @@ def locate_vertices(
     source: MeshArrays, source_pose: PoseArrays, vertices: IntArray, mesh: MeshArrays, pose: PoseArrays,
     locations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill locations (n,) int8 of vertices (n,) of `source` in `mesh`, both bodies posed, as of `locate_point`."""
+    """Fill locations (n,) int8 with INSIDE, OUTSIDE, 0 or UNDECIDED for vertices (n,) of `source` in `mesh`, both
+    posed."""
     a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
     defect = defect_of(b)
     for item in range(vertices.shape[0]):
@@ -333,7 +335,7 @@ def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
 @allocating
 def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return 1 if the body lies on the side of a face to which its normal points, -1 if on the other, or SIDE_UNKNOWN;
-    cached. poses: as of `state_of`."""
+    cached. poses: any (n, 12) array, unused values."""
     if mesh.inner[face] == 0:
         mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else SIDE_UNKNOWN
     return int(mesh.inner[face])
@@ -341,7 +343,8 @@ def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @allocating
 def _side_of_clean(mesh: MeshArrays, face: int) -> int:
-    """Compute `inner_side` of a clean face by ray parity from points inside it."""
+    """Compute `inner_side` of a STATE_CLEAN face (not crossed or covered by others) by ray parity from points inside
+    it."""
     axis, t = int(mesh.axis[face]), triangle_of(mesh, face)
     turn = orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
     for item in range(3):

@@ -98,7 +98,7 @@ def classify_in_detail(s: dual.Search, n: int) -> None:
     | detail | meaning |
     |---|---|
     | NO_SHARED_AREA + bits | the open faces that it may cut (`classify_contact`) |
-    | SAME_SIDE, OPPOSITE | clean faces that share an area, bodies on the same or on opposite sides |
+    | SAME_SIDE, OPPOSITE | STATE_CLEAN faces that share an area, bodies on the same or on opposite sides |
     """
     pairs, kinds, _ = s.contacts
     for item in range(n):

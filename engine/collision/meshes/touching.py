@@ -72,8 +72,8 @@ def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
 
 @called
 def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
-    """Return the closed side (1, -1) of a plane that contains n_samples vertices, 0 if all lie on it; UNDECIDED
-    otherwise."""
+    """Return 1 or -1 if all n_samples vertices of a body lie on that closed side of a plane, 0 if all lie in it, else
+    UNDECIDED."""
     common_side, n = 0, v.points.shape[0]
     for vertex in range(0, n, max(1, n // n_samples)):
         side = sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error)
@@ -198,7 +198,8 @@ def decide_contact(s: Search, item: int) -> tuple[int, bool]:
 
 @allocating
 def relate_clean(s: Search, n: int) -> int:
-    """Return OVERLAPPING or TOUCHING if clean faces decide it from n contacts, none a crossing; else UNSETTLED."""
+    """Return OVERLAPPING or TOUCHING from n contacts, none a crossing, if their faces are STATE_CLEAN; else UNSETTLED.
+    """
     shares = np.zeros(n, np.bool_)
     for item in range(n):
         how, shares[item] = decide_contact(s, item)
@@ -243,7 +244,8 @@ def hash_slot(known: IntArray, vertex: int) -> int:
 
 @allocating
 def may_be_corner(own: parity.OwnPoint, mesh: MeshArrays) -> bool:
-    """Return whether a point may be a vertex of a mesh; not all faces that meet there need be listed as contacts."""
+    """Return whether a point coincides, within its error, with a vertex of a mesh; faces without a contact are tested
+    too."""
     local, slack, stack = in_tree(mesh, own.point), parity.SLACK + own.error / mesh.scale, np.empty(STACK, np.int32)
     box = parity.box_between(local, local, slack)
     stack[0] = 0

@@ -102,8 +102,8 @@ def rotate_vertices(t: Facet, lone: int) -> Facet:
 
 @inline
 def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
-    """Return two triangles, each with its lone vertex first and turned so that this vertex lies above the other's
-    plane. sides: of t1's vertices at the plane of t2; their_sides: of t2's vertices at the plane of t1."""
+    """Return two triangles, each rotated so that its first vertex is alone on its side of the other's plane, and above
+    it. sides: of t1's vertices at the plane of t2; their_sides: of t2's vertices at the plane of t1."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
     a, b = rotate_vertices(t1, lone1), rotate_vertices(t2, lone2)
@@ -189,7 +189,7 @@ def sign_of_four(
 
 @called
 def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
-    """Return the signs of the three corners of u at the plane of t, each as of `sign_of_four`."""
+    """Return the exact signs of the three corners of u at the plane of t: 1, 0, -1 or UNDECIDED each."""
     a = posed_point(poses, t.p)
     v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
     p, q, r = minus(posed_point(poses, u.p), a), minus(posed_point(poses, u.q), a), minus(posed_point(poses, u.r), a)
@@ -205,7 +205,8 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
 @called
 def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return the class of two triangles with area by exact signs; UNDECIDED only if exponents are out of range. poses
-    (n, 12), error: as of `orient3d_posed`. axis: along it t1, before its pose, has an area."""
+    (n, 12): R by rows, then t. error: the largest `posed_error` of the corners. axis: along it the projection of t1,
+    before its pose, has an area."""
     p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):
         return APART
@@ -330,7 +331,7 @@ def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, ax
 @inline
 def separation(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return 1 if two coplanar triangles with area are disjoint, 0 if only their borders meet, -1 if their interiors
-    do. UNDECIDED if a sign is. axis: as of `classify`."""
+    do. UNDECIDED if a sign is. axis: along it the projection of t1, before its pose, has an area."""
     off = off_plane_point(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):
         return UNDECIDED

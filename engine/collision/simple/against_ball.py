@@ -296,14 +296,14 @@ def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
 
 
 def _any_part_enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
-    """Return whether some live part of these faces has a squared distance below `limit` from the centre."""
+    """Return whether a part of these faces that bounds the interior is nearer to the centre than sqrt(limit); exact."""
     return len(faces) > 0 and boundary.has_live(faces, lambda corners: simplex_distance(center, corners) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
-    """Return whether a ball into which no live part reaches, only walls that cancel, lies inside the body. Off those
-    walls the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve (t, t^2,
-    t^3) from the centre, which meets a plane at most three times: one of them is on no wall."""
+    """Return whether an open ball lies inside the body; no face enters it but parts that cancel (even-odd). Off such
+    parts the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve (t, t^2,
+    t^3) from the centre, which meets a plane at most three times: one of them is on no face."""
     location = rational_location(center, body, pose, work.budget.check)
     if location != Location.BOUNDARY:
         return location == Location.INSIDE
@@ -335,8 +335,8 @@ def _all_vertices_within(boundary: Boundary, center: Vector, limit: Fraction, wo
 @np.errstate(over="ignore", invalid="ignore")
 def body_sphere_parts(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Parts:
     """Return which of a body (first) and a ball (second) that overlap has a part outside the other. The ball has one
-    exactly if a live part of the body's boundary enters the open ball: else the ball is all inside. The body has one
-    exactly if some point of its live boundary, and then a vertex, is outside the ball."""
+    exactly if a part of a face that bounds the body's interior enters the open ball: else the ball is all inside. The
+    body has one exactly if some point of such a part, and then a vertex, is outside the ball."""
     center, limit = image_point(ball.center, poses[1]), Fraction(ball.radius) ** 2
     boundary = boundary_of(body, poses[0], work)
     nearest, farthest = boundary.face_bounds(center)

@@ -64,7 +64,7 @@ class Boundary:
     | exact | position of a vertex |
     | number, number_at | the caller's number of a face, and of one at a vertex |
     | signs | side of each vertex at a plane |
-    | live | live parts of faces, as corners of triangles; as ends of edges, maybe with others |
+    | live | parts of faces with interior on one side only: corners of triangles; ends of edges, maybe with others |
     | is_inside | whether a point on no face is inside |
     | has_inside | False for surfaces and flat boxes |
     """
@@ -93,7 +93,8 @@ class Boundary:
         return self.bounds(center, reduce(np.minimum, corners), reduce(np.maximum, corners))
 
     def bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return bounds as `box_distance_bounds` for boxes low, high of rounded posed coordinates."""
+        """Return lower and upper bounds on the squared distance of `center` from boxes low, high (n, d) of rounded
+        posed coordinates."""
         around = np.array([rounded(value) for value in center])
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
@@ -103,7 +104,8 @@ class Boundary:
         return np.flatnonzero(reduce(np.logical_or, is_chosen[self.ends.T]))
 
     def has_live(self, faces: IntArray, condition: Callable[[tuple[Vector, ...]], bool]) -> bool:
-        """Return whether the condition holds for the corners of some live part of these faces."""
+        """Return whether the condition holds for the corners of some part of these faces that has interior on one side
+        only."""
         return any(map(condition, self.live(faces.tolist())))
 
 

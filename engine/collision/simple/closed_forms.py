@@ -224,9 +224,9 @@ def _by_scan(
 
 @inline
 def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
-    """Return 1 or -1 if the side of a vertex at a plane is proven, else 0; plane: as of `scan_sides`. Each weight may
-    be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three products and a number
-    by 2^-50 of the sum of magnitudes more."""
+    """Return 1 or -1 if a vertex is proven to be beyond or before a plane, else 0. plane: (3, 3), see `scan_sides`.
+    Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three
+    products and a number by 2^-50 of the sum of magnitudes more."""
     p = as_point3(mesh.vertices, vertex)
     around = Point3(abs(p.x), abs(p.y), abs(p.z))
     value = dot(as_point3(plane, 0), p) + plane[2, 0]
@@ -304,7 +304,8 @@ def _side_of_box(function: _Function, body: Solid) -> int:
 
 
 def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
-    """Return whether some live part of these faces has a point on side 1 or -1 of a plane; exact."""
+    """Return whether some part of these faces that bounds the interior has a point on side 1 or -1 of a plane; exact.
+    """
     return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 

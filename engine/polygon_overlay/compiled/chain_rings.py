@@ -158,8 +158,8 @@ def _emit_ring(
     edges: Edges, chains: Chains, points: Int32Array, state: FlagArray, marks: FlagArray, path: Int32Array, first: int,
     last: int, rings: Rings, n_points: int, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Append the points of the ring of half-chains ``path[first:last]`` where it turns; return the number of points
-    then. sizes: as of `walk_rings`."""
+    """Append the points where the ring of half-chains ``path[first:last]`` turns; return the number of points after
+    that. sizes: the numbers of chains, nodes, vertices and simple nodes."""
     _, _, n, n_simple = sizes
     edge = leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):

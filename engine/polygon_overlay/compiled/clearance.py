@@ -181,8 +181,8 @@ def leading(e: Any, n: int) -> tuple[float, float]:
 
 @merged
 def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
-    """Return the double nearest to one coordinate of a crossing, and its error bound; as of `round_crossing`. axis: 0
-    for x, 1 for y. p, q: that coordinate of the ends of edge e."""
+    """Return the double nearest to one coordinate of the crossing of edges e and f, and a bound on its rounding error.
+    Bound 0: the coordinate is that double. axis: 0 for x, 1 for y. p, q: that coordinate of the ends of edge e."""
     rh, rl = dd_scale(cut.bh, cut.bl, p)
     sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)
@@ -195,7 +195,8 @@ def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple
 
 @called
 def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
-    """Return as `_coordinate`, decided by exact signs; h: a double near the coordinate, bound: of the difference."""
+    """Return the double nearest to one coordinate of the crossing of edges e and f, and its error bound, by exact
+    signs. axis: 0 for x, 1 for y. h: a double near the coordinate; bound: on |h - coordinate|."""
     if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
         h = _from_expansions(edges, e, f, axis)
     side = crossing_against(edges, e, f, axis, h, 0.0)
@@ -316,8 +317,9 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: F
 
 @merged
 def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Return whether edges ab and cd, which are rounded, are proven neither to touch nor to fold while their ends move.
-    points: equal numbers are one point. square: the margin, squared."""
+    """Return whether edges ab and cd are proven not to meet, even if their ends move by less than the margin. a, b, c,
+    d: point numbers; an equal number is a shared end, where the edges must not fold onto each other. square: the
+    margin, squared."""
     if points[a] == points[d]:
         c, d = d, c
     elif points[b] == points[c]:

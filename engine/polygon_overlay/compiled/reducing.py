@@ -263,9 +263,9 @@ def expand_rings(
 ) -> None:  # fmt: skip
     """Copy rings to ``made`` (m, 2) float64 and ``made_sources`` (m, 2) int32, with their omitted vertices inserted.
 
-    vertices, sources, offsets: as of overlay_pairs. subjects, clips: (n, 2) float64 vertices. made_offsets: (rings +
-    1,) int64, filled with the offsets of rings into ``made``. Omitted vertices are consecutive in the input, either way
-    round.
+    vertices, sources, offsets: rings from `overlay_pairs`. subjects, clips: (n, 2) float64 vertices of the input.
+    made_offsets: (rings + 1,) int64, filled with the offsets of rings into ``made``. Omitted vertices are consecutive
+    in the input, either way round.
     """
     n_subject = subjects.shape[0]
     at = made_offsets[0] = 0

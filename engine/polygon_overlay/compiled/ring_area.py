@@ -211,7 +211,8 @@ def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tupl
 def _twice_area_from(
     pair: _Pair, sources: Int32Array, first: int, last: int, ox: float, oy: float
 ) -> tuple[float, float, float, float]:
-    """Return as `_twice_area`, coordinates relative to (ox, oy); an error bound below 0: call again with ``ox`` 0."""
+    """Return twice the area of a ring as a double-double, an error bound, and the sum of its terms' magnitudes.
+    Coordinates are taken relative to (ox, oy). An error bound below 0: they must be taken relative to ``ox`` = 0."""
     before = _place(pair, sources, last - 1, ox, oy)
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
@@ -256,9 +257,12 @@ def sum_areas(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, sources: Int32Array,
     offsets: IntArray, groups: IntArray, stop: FlagArray, areas: FloatArray,
 ) -> int:  # fmt: skip
-    """Fill ``areas``, (n,) float64, with the nearest doubles of summed ring areas, NaN where that is not proven.
-    Returns the number of NaN. subjects, subject_items, clips, clip_items: as of overlay_pairs, a pair for each area, or
-    one for all. sources, offsets: of rings, as of overlay_pairs. groups: (n + 1,) int64 offsets into the rings."""
+    """Fill ``areas``, (n,) float64, with the double nearest to the area of each group of rings, NaN if not proven.
+
+    Returns the number of NaN. subject_items, clip_items: offsets of polygons into the rings of subjects and clips, a
+    pair for each area, or one for all. sources, offsets: source of each vertex, offsets of rings. groups: (n + 1,)
+    int64 offsets into the rings.
+    """
     n_uncertified = 0
     last_rings = workspace(2)
     last_rings[0] = last_rings[1] = 0.0

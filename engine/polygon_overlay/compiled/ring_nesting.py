@@ -111,8 +111,8 @@ def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFi
 
 @merged
 def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> int:
-    """Return the part of the result that a face belongs to, 0 for none, by a rule other than AGAIN. n_sources: number
-    of sources, label or winding number of the face, as of `_cross_half_chain`."""
+    """Return the part of the result that a face belongs to, 0 for none, by any fill rule but AGAIN. n_sources: number
+    of sources around the face; by PAIR its label, by the rules of winding numbers that number."""
     if rule == Rule.PAIR:
         return int(selected[n_sources])
     if rule == Rule.FIRST_ALONE:

@@ -104,7 +104,8 @@ def clip_chunk(
 def _locate_second_ends(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set locations[:, 1] of segments whose first end is on the boundary; of chords as `locate_before_contacts`."""
+    """Set locations[:, 1] of segments whose first end is on the boundary: the location of the second end. For chords
+    (both ends on the boundary) INSIDE_BEFORE or OUTSIDE_BEFORE, if the filter decides."""
     chords = np.flatnonzero(locations[:, 0] == 0)
     locator.fill(segments[chords, 1], second := np.empty(len(chords), np.int8), budget)
     locations[chords, 1] = second

@@ -128,8 +128,8 @@ class Before(IntEnum):
 
 @inline
 def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
-    """Return the location of the perturbed line before the first of n contacts, see `Before`. of_p, of_q: locations of
-    the ends, as `ends` of `emit_touching`."""
+    """Return the location (`Before`) of the perturbed line before the first of n contacts; of_p, of_q: locations of the
+    ends."""
     begin, turns = 0, False
     for place in range(n):
         i, first = cuts.order[place], cuts.order[begin]
@@ -348,7 +348,7 @@ def cut_on_outline(
 def cut_on_mesh(
     segments: FloatArray, locations: Int8Array, mesh: Mesh, stop: FlagArray, out: Pieces, state: FlagArray, n: IntArray
 ) -> None:
-    """Clip segments (m, 2, 3) float64 to a polyhedron: arguments as of `cut_on_outline`."""
+    """Clip segments (m, 2, 3) float64 to a polyhedron; arguments and results as in `cut_on_outline`, its table."""
     size = group_size(locations.shape[0] - n[0])
     contacts, cuts, last = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(2 * n[2], 3), n[0]
     n[1], n_contacts = 0, 0

@@ -65,7 +65,7 @@ def product(n: Triple, w: float, w_low: float) -> Triple:
 
 @merged
 def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
-    """Return the normal (b - a) x (c - a), each component as of `minor`."""
+    """Return (b - a) x (c - a): each component a sum of two doubles, and the sum of the magnitudes of its products."""
     ux, uy, uz = two_diff(b.x, a.x), two_diff(b.y, a.y), two_diff(b.z, a.z)
     vx, vy, vz = two_diff(c.x, a.x), two_diff(c.y, a.y), two_diff(c.z, a.z)
     return (

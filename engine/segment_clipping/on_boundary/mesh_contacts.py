@@ -257,7 +257,8 @@ def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
 def _append_triangles(
     mesh: Any, ends: Any, is_any: bool, triangles: IntArray, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts of a segment with n queued triangles; as of `append_contacts`. ends: p, q, blur."""
+    """Append the contacts of a segment with n queued triangles to met and kinds; return their new number, or NO_ROOM.
+    ends: p, q, blur. is_any: one contact is enough."""
     p, q, blur = ends
     for place in range(n):
         element = triangles[place]
@@ -278,8 +279,8 @@ def _append_triangles(
 def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts of a segment with the triangles of the first n queued leaf blocks; as of `append_contacts`.
-    ends: p, q, blur. shear: `shear_of` the segment."""
+    """Append to met and kinds the contacts of a segment with the triangles of n queued leaf blocks; return their new
+    number, or NO_ROOM. ends: p, q, blur. shear: `shear_of` the segment. is_any: one contact is enough."""
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
@@ -345,7 +346,8 @@ def append_contacts(
 
 @called
 def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 3): as of `gather_edges`."""
+    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 3) with triangles; return their
+    number. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -362,7 +364,9 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
 
 @allocating_kernel
 def find_contacts_3d(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return the contacts of at most GROUP segments (n, 2, 3) float64 with triangles: as of `find_contacts_2d`."""
+    """Return the number of contacts of at most GROUP segments (n, 2, 3) float64 with triangles, and arrays of the
+    contacts. Arrays: elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of segments. NO_ROOM if
+    there are more than `room`."""
     contacts = allocate_contacts(segments.shape[0], room, traversal_buffers())
     n_met = gather_triangles(contacts, mesh, segments, segments.shape[0], stop)
     return n_met, contacts.met, contacts.kinds, contacts.offsets
