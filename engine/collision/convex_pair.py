@@ -2,28 +2,21 @@
 inside.
 
 Everything is float64 with a proven margin; pairs that no margin proves, contacts above all, stay UNSETTLED for the
-exact path.
+exact path. e = e_a + e_b is the sum of the errors of both bodies (`PlacedBody`), a bound on the error of a coordinate
+of a - b.
 
-**Inside.** The first lies in the open interior of the second if every vertex is strictly below each face of the second.
-With n the unit normal of a face as computed, and p one of its corners, n . (a - p) differs from the value for the exact
-image of the face by the error of the posed coordinates and by the error of the normal times |a - p|: its `slack`, and
-3e-12 because a pose turns normals by the inverse transposed, of which a rotation of floats is off by
-`engine.solids.pose.TOLERANCE`; 1e-11 covers both and the rounding.
+**Inside.** The first lies in the open interior of the second if every vertex is strictly below each face of the second
+(`_classify_in_hull`).
 
 **Meeting or apart** is proposed in float64 and accepted only if proven. The bodies have a common point exactly if the
 set of differences M = {a - b} contains the origin, and common interior points exactly if the origin is in the open
 interior of M. From a point of M a triangle of points farthest in some direction, the portal, moves outward to the
 origin.
 
-**Apart** is proven by a direction d in which all of M is below 0: largest d . a < least d . b. The values are those of
-all vertices, with d turned into each body's own coordinates: turning d is off by 3u |d|_1 an entry (u = 2^-53, entries
-of R at most 1.01), the product with a vertex by 3u more, d . t by 3u |d|_1 |t|, the sums by 3u of the whole: below 16 u
-|d|_1 (3.1 reach + |t|) for each body, which is less than 1.1 |d|_1 `error`.
+**Apart** is proven by a direction d in which all of M is below 0: largest d . a < least d . b (`is_separating_axis`).
 
-**Meeting** is proven by four points of M with the origin strictly inside of their tetrahedron. Each is the difference
-of two rounded posed points, of which a coordinate is off by at most `error` = e together, so a determinant |p q r| by
-less than e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3 where no coordinate exceeds m, and by 2^-50 of six
-products at most m^3 for rounding. Bodies with an interior then share an interior point.
+**Meeting** is proven by four points of M with the origin strictly inside of their tetrahedron
+(`tetrahedron_contains_origin`). Bodies with an interior then share an interior point.
 
 Exponents: caller guarantees coordinates below 2^300 (`LARGEST_ERROR`), so no product of four lengths overflows; a
 direction or a determinant of at most 2^-900 proves nothing, so what underflow loses is below the margins.
@@ -133,8 +126,15 @@ def exceeds_distance(square: float, distance: float, error: float) -> bool:
 @inline
 def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
     """Return whether body `inner` lies in the open interior of body `outer`: _WITHIN, _OUT (some point does not) or
-    UNDECIDED. By face, n . a - n . p against slack = (e_n + 1e-11) extent + 8 (e_a + e_b), see the module; square: of
-    the distance between an interior point of each."""
+    UNDECIDED.
+
+    For each face, with its unit normal n (off by e_n) and a corner p; square: squared distance between an interior
+    point of each body:
+
+        height = max n . a - n . p,    |a - p| <= extent = sqrt(square) + both radii
+        |height - exact| <= (e_n + 3e-12) |a - p| + 1.75 (e_a + e_b) + rounding     3e-12: |R - R^-T| <= 3 TOLERANCE
+                         <  slack = (e_n + 1e-11) extent + 8 (e_a + e_b)
+    """
     error = 8.0 * (a.place.error + b.place.error)
     first, stop = pool.firsts[1, outer], pool.firsts[1, outer + 1]
     if first == stop:
@@ -256,14 +256,29 @@ def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
 
 @inline
 def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
-    """Return whether max d . a < min d . b is proven, with d times vertices off by 1.1 |d|_1 error for either body."""
+    """Return whether largest d . a < least d . b is proven: the first body lies below the second one along d.
+
+    u = 2^-53, |.|_1 the sum of |components|, `reach` and t of one body. Off by, over |d|_1:
+
+        R'd  3 u an entry, entries <= 1.01     9.1 u reach        d . t      3 u |t|
+        (R'd) . vertex                         5.3 u reach        last sum   u (1.75 reach + |t|)
+        together 16.2 u reach + 4 u |t|  <  1.1 * 16 u (3 reach + |t|) = 1.1 error
+        gap > 2.25 (e_a + e_b) |d|_1 proves the sign, with room for its own rounding
+    """
     size, gap = abs(d.x) + abs(d.y) + abs(d.z), -(support_value(points, a, d) + support_value(points, b, negative(d)))
     return size > _GUARD and gap > 2.25 * (a.place.error + b.place.error) * size + _GUARD
 
 
 @inline
 def tetrahedron_contains_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
-    """Return whether the origin is strictly inside the tetrahedron abcd for all corners within `error` of these."""
+    """Return whether the origin is strictly inside the tetrahedron abcd for all corners within `error` = e of these.
+
+    A determinant |p q r| of corners with coordinates of at most m (that of a face must exceed its limit):
+
+        |det - exact| <= e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3     corners off by e
+                         + 2^-50 * 6 m^3 = 48 u m^3                                   rounding
+        limit = 1.001 e (same sum) + 20 e^2 (m + e) + 2^-47 m^3 + 2^-900              2^-47 = 64 u
+    """
     m = max(largest_of(a), largest_of(b), largest_of(c), largest_of(d))
     bc, ad = cross(b, c), cross(a, d)
     size_ab, size_ac, size_ad = _size(cross(a, b)), _size(cross(a, c)), _size(ad)

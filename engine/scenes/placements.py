@@ -257,7 +257,8 @@ def list_pairs(
 
 @inline
 def _outward(value: float, reach: float, side: int) -> float:
-    """Return a bound of a box moved outward (side 0: down, 1: up) by more than a pose may stretch `reach`
-    (bounding/aabb.py)."""
+    """Return a bound of a box moved outward (side 0: down, 1: up) by `reach`, stretched as by a pose. R'R = I + E with
+    |E_ij| <= 1e-12: |R v|^2 <= (1 + 3e-12) |v|^2, so |R v| < 1.001 |v|; `nextafter` covers the rounding.
+    """
     far = 1.001 * reach
     return np.nextafter(value - far, -np.inf) if side == 0 else np.nextafter(value + far, np.inf)

@@ -1,14 +1,18 @@
 """Exact fallback where contacts alone prove nothing: the status of both bodies on either side of each region of a face.
 
 The faces of both bodies cut a face T into regions. Within a region, each body is inside or outside just above T, and
-just below. One point per region, with rational coordinates, and the line through it along the axis of T's largest
-normal component decide both: crossings strictly above the point give the status above T; faces that contain the point
-lie in T's plane there, and each flips the status.
+just below. One point q per region, with rational coordinates (x, y, z, w), and the line through q along the axis k of
+T's largest normal component decide both. A face with plane F(q) = a x + b y + c z + d w, F_k its coefficient on axis k,
+that the line passes through:
 
-Regions are sampled by slabs: between neighbouring abscissas of end points and crossings of the traces no two traces
-cross, so one point between neighbours on the middle of every slab reaches every region with an interior. The line is
-moved by (eps, eps^2) across itself (orientation.py), so that it meets no edge; its plane decides whether a face
-contains the point.
+    F(q) F_k < 0     the face is above q: above := not above
+    F(q) = 0         q is on the face: below differs from above by one more flip
+    F(q) F_k > 0     the face is below q: nothing
+
+Regions are sampled by slabs: the traces of other faces on T are segments; an edge P Q of another face, with values f, g
+at the plane of T, ends its trace in (f Q - g P) / (f - g). Between neighbouring abscissas of ends and crossings of
+traces no two traces cross, so one point between neighbours on the middle of every slab reaches every region with an
+interior. The line is moved by (eps, eps^2) across itself (orientation.py), so that it meets no edge.
 """
 
 from __future__ import annotations

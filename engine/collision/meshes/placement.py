@@ -6,21 +6,21 @@ coordinate; a sign that this error could change is settled by expansions of the 
 moved back by the first translation, so that the error depends on their distance, not their position. A pose that turns
 a lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so does a body without a pose.
 
-**error.** Four rounded terms of a coordinate, and the rounded difference of two translations: |rounded - exact| <= g4
-(|R| |p| + |t|) + u |t| + 4h with u = 2^-53, g4 = 4u / (1 - 4u), h = 2^-1075. With |R| <= 1 + 1e-12 and |p| <= reach
-that is below 2^-50 (3 reach + max |t|) + 2^-1060, with room for the rounding of the bound itself.
+**error.** Of a coordinate x' = ((r x + s y) + q z) + t, (r, s, q) a row of R, with u = 2^-53, g4 = 4 u / (1 - 4 u), h =
+2^-1075, `reach` the largest |x|, |y|, |z|; u |t| for the rounded difference of two translations:
+
+    |x' - exact| <= g4 ((|r| + |s| + |q|) reach + |t|) + u |t| + 4 h,   |r| + |s| + |q| <= sqrt(3) (1 + 1e-12) < 1.75
+                 <= 7.1 u reach + 5.1 u |t| + 4 h
+                 <  error = 2^-50 (3 reach + max |t|) + 2^-1060
 
 **Frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with their
 margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of two
 bodies give
 
-    a = M b + T,    M = (s_b / s_a) R_a' R_b,    T = (R_a' (R_b o_b + t_b - t_a) - o_a) / s_a
+    a = M b + T,    M = (s_b / s_a) R_a^-1 R_b,    T = (R_a^-1 (R_b o_b + t_b - t_a) - o_a) / s_a
 
-where R_a' stands for the inverse of R_a. **margin.** The transpose is used instead: with `defect` the largest entry of
-|R' R - I|, it is off by 3.1 defect relative to the vector it turns. Float64 rounding is below 2^-46 of the same
-magnitudes, rounding to float32 and the sums of `meeting` below 2^-19 of the numbers there, which are at most 2 + 3.5
-s_b / s_a + |T|; six products of denormal numbers round to less than 2^-1071 in all. Where scales differ by more than
-2^60 the axes of the smaller body are left out: nothing is apart on them; so are those of a map that is not finite.
+R_a' is used for R_a^-1; `set_frame` has the margin. Where scales differ by more than 2^60 the axes of the smaller body
+are left out: nothing is apart on them; so are those of a map that is not finite.
 """
 
 from __future__ import annotations
@@ -190,8 +190,17 @@ def set_frame(
     frame: Float32Array, a: Placement, a_origin: FloatArray, a_scale: float, b: Placement, b_origin: FloatArray,
     b_scale: float, defect: float,
 ) -> bool:  # fmt: skip
-    """Fill frame (22, 8) float32 with the map from tree b to tree a and its margin; return whether the trees are proven
-    apart."""
+    """Fill frame (22, 8) float32 with the map a = M b + T from tree b to tree a and its margin, see the module.
+
+    Returns whether the trees are proven apart. |.| of vectors is the largest component; tree coordinates are at most 2:
+
+        size   = (|o_a| + |o_b| + |t_b - t_a|) / s_a + 2 + 2 s_b / s_a
+        margin = 2^-19 (2 + 3.5 s_b / s_a + |T|)      float32: M, T, sums of `meeting`: < 32 roundings
+               + 32 defect size                       R_a^-1 = (I + E)^-1 R_a', |E_ij| <= defect:
+                                                      |R_a^-1 v - R_a' v| <= 3.1 defect sqrt(3) |v| < 5.4 defect |v|
+               + 2^-46 size                           float64, < 128 roundings
+               + 2^-1071 / s_a                        six products that may underflow
+    """
     ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
     there = rotate(b, origin)
     v = rotate_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))
