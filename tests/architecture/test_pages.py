@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -66,3 +67,25 @@ def test_links_lead_somewhere_and_commands_exist(page: Path) -> None:
     for kind, names in (("benchmarks", set(NAMES)), ("engine", COMMANDS)):
         named = set(re.findall(rf"python3? -m {kind} ([a-z_]+)", text))
         assert named <= names, named - names
+
+
+def test_the_page_on_calls_lists_every_path_with_its_methods() -> None:
+    paths = json.loads((ROOT / "tests/contract/openapi.json").read_text("utf-8"))["paths"]
+    wanted = {f"{', '.join(method.upper() for method in methods)} {path}" for path, methods in paths.items()}
+    listed = re.findall(r"^\| `([A-Z, ]+ /\S+)` \|", (ROOT / "docs/calling.md").read_text("utf-8"), re.MULTILINE)
+    assert sorted(listed) == sorted(wanted)
+
+
+def test_the_counts_of_wrong_answers_are_those_of_the_stored_run() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    (path,) = re.findall(r"\(([\w/-]+/audit_igl_bunny\.json)\)", text)
+    run = json.loads((ROOT / path).read_text("utf-8"))
+    pattern = (
+        r"its (\S+) face centroids.* Embree is wrong (\S+) times, libigl (\S+), Open3D (\S+), CGAL and this library"
+    )
+    counts = re.search(pattern, " ".join(text.split()))
+    assert counts
+    wrong = run["wrong"]
+    peers = [wrong[name] for name in ("trimesh + embreex", "libigl winding number", "Open3D occupancy")]
+    assert counts.groups() == tuple(f"{count:,}" for count in (run["items"], *peers))
+    assert wrong["CGAL side of mesh"] == wrong["ours"] == 0

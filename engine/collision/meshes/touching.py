@@ -198,8 +198,7 @@ def decide_contact(s: Search, item: int) -> tuple[int, bool]:
 
 @allocating
 def relate_clean(s: Search, n: int) -> int:
-    """Return OVERLAPPING or TOUCHING from n contacts, none a crossing, if their faces are STATE_CLEAN; else UNSETTLED.
-    """
+    """Return OVERLAPPING or TOUCHING from n contacts, no crossing, if their faces are STATE_CLEAN; else UNSETTLED."""
     shares = np.zeros(n, np.bool_)
     for item in range(n):
         how, shares[item] = decide_contact(s, item)

@@ -304,8 +304,7 @@ def _side_of_box(function: _Function, body: Solid) -> int:
 
 
 def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: int) -> bool:
-    """Return whether some part of these faces that bounds the interior has a point on side 1 or -1 of a plane; exact.
-    """
+    """Return whether a part of these faces that bounds the interior has a point on side 1 or -1 of a plane, exactly."""
     return boundary.has_live(faces, lambda corners: any(side * value_at(plane, p) > 0 for p in corners))
 
 
