@@ -61,7 +61,7 @@ def _transforms(crowd: Crowd) -> list[fcl.Transform]:
 def _crowd(crowd: Crowd, threads: int) -> Prepared:
     """The dynamic tree of boxes; each pair it finds calls back into Python, which asks for that pair and notes it.
 
-    Asked as the crowd stands; where frames are given, every body gets a new pose before, and the tree is updated.
+    One question about the crowd as it stands; with frames every body first gets a new pose, and the tree is updated.
     """
     shapes = list(map(_convex, crowd.meshes))
     objects = [fcl.CollisionObject(shapes[kind], pose) for kind, pose in zip(crowd.kinds, _transforms(crowd))]

@@ -1,6 +1,6 @@
 """Open3D: `RaycastingScene.compute_occupancy` (Embree): float32, one ray a point, parity of the hits; meshes that meet.
 
-For a scene of bodies it is given one raycasting scene a body, each asked about the points in the body's box. The boxes
+For a scene of bodies it is given one raycasting scene a body, each for the points in the body's box. The boxes
 are found as a careful user would: points sorted along x once, a binary search for each body, then y and z.
 """
 

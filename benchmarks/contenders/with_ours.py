@@ -126,7 +126,7 @@ def _bodies_of(pair: Couple) -> list[Any]:
 
 
 def _pair(pair: Couple, threads: int) -> Prepared:
-    """Yes or no, as the peers are asked."""
+    """Yes or no, the question that the peers answer."""
     first, second = _bodies_of(pair)
     return Prepared(lambda _: engine.collide(first, second, boolean=True).relation != engine.Relation.DISJOINT)
 
@@ -138,7 +138,7 @@ def _relation(pair: Couple, threads: int) -> Prepared:
 
 
 def _poses(pair: Pair, threads: int, **options: bool) -> Prepared:
-    """Yes or no, as the peers are asked, unless options say otherwise."""
+    """Yes or no, the question that the peers answer, unless options say otherwise."""
     first, second = pair.solids()
     options = options or {"boolean": True}
     return Prepared(
@@ -163,7 +163,7 @@ def _tree(mesh: Mesh, threads: int) -> Prepared:
 
 
 def _crowd(crowd: Crowd, threads: int) -> Prepared:
-    """Every question starts from a list of solids and poses: nothing is kept but what a solid keeps of itself."""
+    """Every question starts from a list of solids and poses: nothing is cached but what a solid caches."""
     solids, still = crowd.solids(), crowd.poses()
 
     def ask(frames: list[list[engine.Pose]]) -> engine.ScenePairs:
@@ -223,7 +223,7 @@ def _simple(body: Mesh) -> engine.Solid:
 
 
 def _through(keep: Any) -> Callable[[Bodies, int], Prepared]:
-    """Return the maker of a kept scene that is asked about segments, its boxes and balls as such."""
+    """Return the maker of a stored scene for questions about segments, its boxes and balls as such."""
 
     def make(bodies: Bodies, threads: int) -> Prepared:
         n = len(bodies.bodies)

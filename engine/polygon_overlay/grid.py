@@ -155,9 +155,9 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
 
 
 def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | None = None) -> PairResults:
-    """Return valid rings of one pair snapped to integer points: DONE, or MAY_CROSS if they must be arranged again.
-    Displacement is 0 if no vertex moved. Each row of sources is twice the vertex whose edge continues there. known: the
-    result of `snap_vertices` for these rings."""
+    """Return the valid rings of one pair, snapped to integer points, as kernel output with status DONE or MAY_CROSS.
+    MAY_CROSS: the rings must be arranged again. Displacement is 0 if no vertex moved. Each row of sources is twice the
+    vertex whose edge continues there. known: the result of `snap_vertices` for these rings."""
     vertices, offsets = rings.vertices, rings.ring_offsets
     on_grid = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
     edges = np.arange(len(vertices)) if on_grid.edges is None else on_grid.edges.astype(np.int64)

@@ -58,7 +58,7 @@ MADE: dict[str, Callable[[], Any]] = {
 
 @cache
 def solid(name: str) -> Any:
-    """Return what is asked about, made once."""
+    """Return the solid of the requests, made once."""
     return MADE[name]()
 
 

@@ -1,6 +1,6 @@
 """The OpenAPI document is a stored file, so that a change shows up in review, and keeps the rules of generators.
 
-Written anew by ``python -m tests.contract.test_openapi``, and so are the examples of answers: what the service answers
+Written again by ``python -m tests.contract.test_openapi``, and so are the examples of answers: what the service answers
 to the examples of its questions. Every property of every model has a description and an example. A new question needs
 its ``with_example``, a new property its ``Field(description=...)``; one that no example of a question or an answer
 shows, ``examples=[...]`` too.

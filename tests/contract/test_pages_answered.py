@@ -1,4 +1,4 @@
-"""Every request that the pages of speed against error and of filed cases show, asked of a service: the answer shown."""
+"""Every request on the pages of speed against error and of filed cases, sent to a service: the answer shown."""
 
 from __future__ import annotations
 

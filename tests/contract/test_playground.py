@@ -128,7 +128,7 @@ def choose(page: Any, question: str, dimension: int) -> str:
 
 
 def verdict(page: Any) -> str:
-    """Return the verdict when nothing is asked any more and it has not changed for a while."""
+    """Return the verdict when no request is under way and it has not changed for a while."""
     last, since, end = None, time.monotonic(), time.monotonic() + 180
     while time.monotonic() < end:
         text = page.inner_text("#verdict")

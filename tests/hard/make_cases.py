@@ -421,7 +421,7 @@ ALL = {
 
 
 def main() -> None:
-    """Write every file; marks of known failures that stand in the files are kept."""
+    """Write every file; marks of known failures in the files remain."""
     for operation, families in ALL.items():
         for family, cases in families.items():
             path = FOLDER / operation / f"{family}.json"

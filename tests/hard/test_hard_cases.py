@@ -47,7 +47,7 @@ def answer_or_error(operation: str, data: dict[str, Any]) -> Any:
 
 
 def expect_failure(request: pytest.FixtureRequest, case: dict[str, Any]) -> None:
-    """A known failure is kept as a case marked with its present error; it must fail until it is repaired."""
+    """A known failure is stored as a case marked with its present error; it must fail until it is repaired."""
     if "known_failure" in case:
         request.applymarker(pytest.mark.xfail(reason=case["known_failure"], strict=True))
 

@@ -104,7 +104,7 @@ def test_progress_counts_every_item(call: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("name", [name for name in CALLS if CALLS[name][0] in ("locate", "contains", "clip_segments")])
 def test_chunks_and_order_do_not_matter(name: str) -> None:
-    """Asked at once, in pieces, and backward: the same answers, item by item."""
+    """All items at once, in parts, and backward: the same answers, item by item."""
     function, (items, solid) = CALLS[name]
     ask = getattr(engine, function)
     if function == "clip_segments":

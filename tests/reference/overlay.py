@@ -1,7 +1,7 @@
 """Area and structure of a Boolean operation on two even-odd polygons, by exact vertical trapezoids.
 
 Slabs lie between neighbouring x of end points and crossings; within a slab edges do not cross, so the parity of both
-polygons is counted upward. Pieces are components of the kept trapezoids over shared sides of positive length, holes
+polygons is counted upward. Pieces are components of the chosen trapezoids over shared sides of positive length, holes
 of a piece are the bounded components of what it leaves.
 """
 

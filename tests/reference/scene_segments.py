@@ -1,6 +1,6 @@
 """What of a segment lies within each body of a scene: every parameter at which anything may change, then locations.
 
-Roots of spheres are held to 6,000 bits: parameters of small numbers that agree so far are equal.
+Roots of spheres are computed to 6,000 bits: parameters of small numbers that agree so far are equal.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ class Piece(NamedTuple):
 
 
 def clip_segment(segment: Any, region: Solid) -> list[Piece]:
-    """Return the pieces of a segment in order of t; a segment of no length that is kept has t = (0, 1)."""
+    """Return the pieces of a segment in order of t; a zero-length segment in the region has t = (0, 1)."""
     p, r = vector(segment[0]), vector(segment[1])
     if p == r:
         kept = _keeps(p, region)
@@ -140,7 +140,7 @@ def _runs_along(direction: Vector, face: tuple[Vector, ...]) -> bool:
 
 
 def _clip_on_sphere(p: Vector, r: Vector, region: Solid) -> list[Piece]:
-    """Cut [0, 1] by the roots of |p - c + t u|^2 = radius^2, kept as numbers with one square root."""
+    """Cut [0, 1] by the roots of |p - c + t u|^2 = radius^2, represented as numbers with one square root."""
     center, u = vector(region["center"]), sub(r, p)
     a, half_b, c = square(u), dot(u, sub(p, center)), square(sub(p, center)) - q(region["radius"]) ** 2
     radicand = half_b * half_b - a * c

@@ -244,8 +244,8 @@ class _OverlappingPair(MeshPair):
                     return
 
     def _record_region(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
-        """Record who sticks out, by the statuses of body `own` (ours) and of the other (theirs) on both sides of a
-        region."""
+        """Record which body has a part outside the other, by the `Sides` of body `own` (ours) and the other (theirs) at
+        a region."""
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
                 self._sticks_out[own] = True
@@ -253,7 +253,8 @@ class _OverlappingPair(MeshPair):
                 self._sticks_out[1 - own] = True
 
     def _record_face(self, own: int, face: int, kinds: set[int]) -> None:
-        """Record who sticks out near a face of body `own`; kinds: details of its contacts (`classify_in_detail`)."""
+        """Record which body has a part outside the other near a face of body `own`; kinds: details of the face's
+        contacts."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:

@@ -198,8 +198,8 @@ class MeshPair:
         return [free_faces[roots == vertex] for vertex in vertices[locations == place]]
 
     def patch_sides(self, own: int, patch: IntArray) -> Iterator[Sides]:
-        """Yield whether body `own` is inside above, below and at each region of a patch. One result suffices, and is
-        all, if a face has the status change across it."""
+        """Yield, for each region of a patch (set of faces), whether body `own` is inside just above, just below and at
+        it. Only one result is yielded, which suffices, if some face separates inside from outside throughout."""
         body = self.exact[own]
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):

@@ -149,8 +149,8 @@ def _load_polygon(
     rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: IntArray,
     runs: Int32Array, reduced: Loaded, stop: FlagArray,
 ) -> tuple[Loaded, bool]:  # fmt: skip
-    """Append a polygon, its inactive blocks reduced to runs; return the counts, and whether all coordinates are in
-    range."""
+    """Append a polygon to `reduced`, its inactive blocks replaced by runs; return the new counts, and whether all
+    coordinates are in range."""
     n, n_rings, n_runs, largest = reduced
     vertices, is_in_range = rings.vertices, True
     for i_ring in range(ring, ring + rings.offsets.shape[0] - 1):

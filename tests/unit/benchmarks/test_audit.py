@@ -1,4 +1,4 @@
-"""The audit of somebody's own files: every contender is asked, the wrong ones are named with their items."""
+"""The audit of somebody's own files: every contender answers, the wrong ones are named with their items."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def test_a_command_says_what_is_wrong(
 
 
 class Died:
-    """A process that ends as soon as it asks the package it was told to die of, as one that crashed does."""
+    """A process that ends as soon as it asks the package named for its death, as one that crashed does."""
 
     def __init__(self, words: list[str], tried: list[list[str]]) -> None:
         tried.append(words)

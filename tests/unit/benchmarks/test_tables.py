@@ -41,7 +41,7 @@ def test_answers_that_differ_are_settled() -> None:
 def test_a_contender_is_one_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It takes part by being there and named; a package that is not installed is told, not raised."""
+    """It takes part by being there and named; a package that is not installed is reported, not raised."""
     for name, line in (("mine", ""), ("absent", "import a_package_of_nobody\n")):
         text = f"{line}from benchmarks.contenders import Prepared\n"
         text += f'PACKAGE = "nobodys"\nNAMES = {{"points": "my {name}"}}\n'

@@ -141,7 +141,7 @@ SHOWN = """kept => kept.map(request => { const made = document.createElement("di
 
 @pytest.mark.parametrize("name", ["speed_and_error", "museum"])
 def test_every_command_shown_asks_what_the_page_holds(browser: Any, name: str) -> None:
-    """The same requests are asked of a service in tests/contract/test_pages_answered.py."""
+    """The same requests are sent to a service in tests/contract/test_pages_answered.py."""
     page = browser.new_page()
     page.goto((DOCS / f"{name}.html").as_uri())
     rows = "Object.values(data.contests).flatMap(one => one.rows).map(row => row.worst.request)"

@@ -95,7 +95,7 @@ def have_common_point(first: Polyhedron, second: Polyhedron, turn: Array, move: 
 
 
 def are_parted(triangles: Array, others: Array, slack: float) -> npt.NDArray[np.bool_]:
-    """Tell for pairs of triangles (n, 3, 3) whether a normal or a product of edges surely has them apart."""
+    """Return for pairs of triangles (n, 3, 3) whether a normal or a product of edges certainly separates them."""
     sides, their_sides = (np.roll(corners, -1, axis=1) - corners for corners in (triangles, others))
     axes = [np.cross(edges[:, 0], edges[:, 1]) for edges in (sides, their_sides)]
     axes += [np.cross(sides[:, i], their_sides[:, k]) for i in range(3) for k in range(3)]

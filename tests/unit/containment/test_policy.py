@@ -1,4 +1,4 @@
-"""Which structure a batch is worth: the cheapest pass first, then what the points asked so far would have paid for."""
+"""Which structure a batch is worth: the cheapest pass first, then what the points so far would have paid for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small bodies of the plane: what is told at once is what rationals say, and ties fall to the least edges."""
+"""Small bodies of the plane: what doubles decide is what rationals decide, and ties fall to the least edges."""
 
 from __future__ import annotations
 

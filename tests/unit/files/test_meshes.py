@@ -81,7 +81,7 @@ def test_a_triangle_that_names_a_vertex_twice_is_refused_as_it_was() -> None:
 
 
 def test_relative_indices_count_from_the_last_vertex_before_the_face() -> None:
-    """trimesh counts from the end of the file: both shells became the second, twice, and held nothing."""
+    """trimesh counts from the end of the file: both shells became the second, twice, and contained nothing."""
     shells = [[[x + dx, y, z] for x, y, z in ([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1])] for dx in (0, 10)]
     faces = "f -4 -2//-1 -3\nf -4 -3 \\\n -1\n  f -4/1/-2 -1 -2 # f 0\nf -3 -2 -1\n"
     text = "".join("".join(f"v {x} {y} {z}\n" for x, y, z in shell) + faces for shell in shells)

@@ -133,7 +133,7 @@ def test_a_plane_through_three_points_is_zero_at_them_and_positive_behind() -> N
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_planes_through_vertices_need_no_rational_arithmetic(dimension: int) -> None:
-    """Every plane passes through a vertex of every ring, so doubles decide none; edges along planes are cut anew."""
+    """Every plane passes through a vertex of every ring, so doubles decide none; edges along planes are cut again."""
     rng = np.random.default_rng(dimension)
     rows = np.c_[rng.integers(-2, 3, (6, dimension)) + 0.25, np.zeros(6)]
     contours = rng.integers(-8, 9, (40, 6, dimension)) / 4

@@ -28,7 +28,7 @@ def pose_of(rng: Random, dimension: int, grid: float = 0.0, span: float = 3.0) -
 
 
 def solids_of(dimension: int, *, for_pairs: bool = False) -> list[Solid]:
-    """Return one solid of each type: those that pairs are asked of, or those that hold points."""
+    """Return one solid of each type: those that take part in pairs, or those that contain points."""
     origin = [0.0] * dimension
     ball, box = Sphere(origin, 1.0), Aabb([-1.0] * dimension, [0.5] * dimension)
     half = HalfSpace([1.0] + [0.0] * (dimension - 1), -2.0)

@@ -161,7 +161,7 @@ def test_nothing_and_errors() -> None:
 
 
 def test_a_scene_asked_often_answers_alike() -> None:
-    """Polyhedra are asked by rays first, then by the sides of cells: same answers, walls and vertices included."""
+    """Points in polyhedra are located by rays, then by sides of cells: same answers, also on walls and vertices."""
     random = np.random.default_rng(3)
     shifts = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 1], [1e6, 0, 0]])
     meshes = [merged(box_mesh([0, 0, 0], [4, 4, 4]), box_mesh([1, 1, 1], [2, 3, 5])) for _ in shifts]
@@ -195,7 +195,7 @@ def test_instances_by_cells_equal_the_reference() -> None:
 
 @pytest.mark.parametrize("shift", [0.0, 1e6, 2.0**52])
 def test_many_polygons_with_walls_in_common(shift: float) -> None:
-    """Squares on a lattice, some with a hole, asked at their vertices, on their edges and an ulp beside them."""
+    """Squares on a lattice, some with a hole; points at their vertices, on their edges and an ulp beside them."""
     squares = []
     for i in range(6):
         for j in range(6):

@@ -58,7 +58,7 @@ def test_pairs_are_those_whose_boxes_meet(dimension: int, reach: float) -> None:
 
 @pytest.mark.parametrize("unit", [5e-324, 2.0**-1040, 2.0**-1020, 1e300])
 def test_new_pairs_of_bodies_so_small_that_the_scale_of_their_tree_has_no_inverse(unit: float) -> None:
-    """A box beside another was told to be infinitely far away."""
+    """A box beside another was reported infinitely far away."""
     rng = np.random.default_rng(3)
     lows = rng.integers(-6, 7, (30, 2)) * unit
     scene = Scene([Aabb(low, low + rng.integers(1, 4, 2) * unit) for low in lows])

@@ -143,7 +143,7 @@ def test_a_ball_is_entered_and_left_on_its_surface() -> None:
 
 
 def test_thousands_of_crossings_are_sorted() -> None:
-    """Teeth of a comb, crossed along it; asked whether to stop meanwhile."""
+    """Teeth of a comb, crossed along it; the deadline is polled meanwhile."""
     n = 3000
     teeth = [[[x, -1.0], [x, 1.0], [x + 1.0, 1.0], [x + 1.0, -1.0]] for x in map(float, range(1, n, 2))]
     with Budget(None, Cancel()) as budget:

@@ -1,7 +1,7 @@
 """Hundreds of thousands of generated cases for each kind of region: every decision and every double is the exact one.
 
 A few scenes of each kind by default; with --full at least 100,000 segments and 100,000 polygons for each kind. All of
-them are held against tests/reference/fast_clipping.py: which pieces there are, their faces, and every coordinate and
+them are compared with tests/reference/fast_clipping.py: which pieces there are, their faces, and every coordinate and
 parameter to the bit, so the largest error is 0.5 ulp.
 """
 

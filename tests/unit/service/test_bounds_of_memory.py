@@ -83,7 +83,7 @@ class Ledger(engine.Cancel):
 
 
 def peak_of(ask: Callable[[Ledger], object]) -> tuple[int, int]:
-    """Return how many bytes a call held at most, and how many it counted."""
+    """Return how many bytes a call used at most, and how many it counted."""
     ask(Ledger())  # compiled, prepared
     ledger = Ledger()
     tracemalloc.start()

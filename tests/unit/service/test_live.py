@@ -237,7 +237,7 @@ def test_a_length_of_many_digits_is_a_number(service: Service) -> None:
 
 
 def test_a_client_that_does_not_read_is_dropped() -> None:
-    """And what its answer held is given back."""
+    """And the memory of its answer is released."""
     service = Service(write_seconds=PATIENCE)
     try:
         service.wait_until_ready()

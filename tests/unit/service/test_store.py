@@ -124,7 +124,7 @@ def test_many_threads_agree() -> None:
 
 
 def test_a_tree_of_shared_solids_takes_time_and_room_by_its_distinct_nodes(tmp_path: Path) -> None:
-    """A million leaves that are one: named, kept and read again as four solids."""
+    """A million leaves that are one: named, stored and read again as four solids."""
     solid: engine.Solid = sphere(1)
     for _ in range(3):
         solid = engine.Csg("union", [solid] * 100)
@@ -268,7 +268,7 @@ def write_on(folder: Path, seed: int, told: Connection) -> None:
 
 
 def kill_writers(folder: Path, times: int) -> None:
-    """Kill processes that write to `folder` at random moments; all files must be whole, all that was told there."""
+    """Kill processes that write to `folder` at random moments; all files must be whole, all reported ones there."""
     source, told = random.Random(6), set()
     context = mesh_reader.context()  # a process has one server of forks: another's would lack what its readers need
     for turn in range(times):

@@ -1,4 +1,4 @@
-"""A store folder that is full, gone, or holds something else in a file's place is told as what it is, at once."""
+"""A store folder that is full, missing, or has something else in a file's place is reported as such, at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""POST /mcp, asked by the client of the protocol's own library."""
+"""POST /mcp, called by the client of the protocol's own library."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""W3C trace context is taken and passed on; with OpenTelemetry asked for, requests are spans in it."""
+"""W3C trace context is taken and passed on; with OpenTelemetry enabled, requests are spans in it."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def cut(points: object) -> list[tuple[int, int, int]]:
 
 
 def rotated_to_first(triangles: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
-    """Return each triangle from its smallest index on, orientation kept."""
+    """Return each triangle from its smallest index on, orientation preserved."""
     turned = []
     for triangle in triangles:
         start = triangle.index(min(triangle))

@@ -1,4 +1,4 @@
-"""Faces told to share a corner and nothing else do; where many meet in a point, the answer is that of all pairs."""
+"""Faces reported to share a corner and nothing else do; where many meet in a point, the answer is that of all pairs."""
 
 from __future__ import annotations
 

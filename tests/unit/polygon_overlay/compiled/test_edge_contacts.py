@@ -1,4 +1,4 @@
-"""Contacts of edges, kind by kind, against the integers, in all four operations; and which are told to be far apart."""
+"""Contacts of edges, kind by kind, against the integers, in all four operations; and which are reported far apart."""
 
 from __future__ import annotations
 

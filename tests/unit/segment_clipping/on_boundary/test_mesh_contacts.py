@@ -1,4 +1,4 @@
-"""Which triangles the segments of a group meet: those of all triangles asked one by one. Segments in the coordinates of
+"""Which triangles the segments of a group meet: those of all triangles, one by one. Segments in the coordinates of
 a tree: within their slack of where they are, however far they reach.
 """
 
