@@ -55,7 +55,8 @@ def overlay_exactly(
 
 
 def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[PairResults, IntArray]:
-    """Return as the kernel with `EACH_PART`, and by vertex the number of its exact point."""
+    """Return the faces of two polygons grouped by label, in the kernel's form for `EACH_PART`, and by vertex the number
+    of its exact point."""
     subdivision, inside = _label_arrangement(subject, clip, range(4), budget)
     pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside])
     result = round_pieces(subdivision.arrangement, pieces)
@@ -133,7 +134,8 @@ def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResul
 
 
 def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
-    """Arrange the rounded rings of one pair, exactly, by the rule AGAIN, and trace the pieces."""
+    """Arrange the rounded rings of one pair exactly and trace the pieces: a face is inside if it is inside a shell and
+    in none of that shell's holes (rule AGAIN)."""
     ends = rings.piece_offsets.tolist()
     holes_of = {shell: frozenset(range(shell + 1, end)) for shell, end in itertools.pairwise(ends)}
     sizes = np.repeat(ring_sizes(rings)[rings.piece_offsets[:-1]], np.diff(rings.piece_offsets)).tolist()

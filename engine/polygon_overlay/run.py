@@ -200,7 +200,8 @@ def overlay_compiled(
 
 
 def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
-    """Arrange the rounded rings of each pair by the rule AGAIN, each ring a source of its own."""
+    """Arrange the rounded rings of each pair: a face is inside if it is inside a shell and in none of its holes (rule
+    AGAIN). Each ring is a source of its own."""
     n_rings = rings.counts[:, 1]
     items = summed(n_rings)
     shells = np.repeat(rings.piece_offsets[:-1], np.diff(rings.piece_offsets))

@@ -100,8 +100,8 @@ def _term_exponent(powers: IntArray, coefficients: FloatArray, points: FloatArra
 
 @called
 def sign_of_polynomial_exact(powers: IntArray, coefficients: FloatArray, points: FloatArray, row: int) -> int:
-    """Return the sign of a polynomial at a point by an expansion, or UNDECIDED; arguments as of
-    `sign_of_polynomial_filter`."""
+    """Return the sign of a polynomial at points[row] by an expansion, or UNDECIDED. powers (t, dim) int64, coefficients
+    (t,) float64."""
     top = NO_TERM
     for i_term in range(coefficients.shape[0]):
         top = max(top, _term_exponent(powers, coefficients, points, row, i_term))

@@ -201,7 +201,8 @@ def decide_on_sphere(
     segments: FloatArray, center: FloatArray, radius: float, first: int, last: int, stop: FlagArray, items: Int32Array,
     planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide which ``segments[first:last]`` ((n, 2, dim) float64) meet the closed ball: see `decide_on_boxes`."""
+    """Decide which ``segments[first:last]`` ((n, 2, dim) float64) meet the closed ball; outputs: table of
+    `decide_on_boxes`."""
     n_accepted, n_open = 0, 0
     for i in range(first, last):
         if stop[0]:
@@ -222,7 +223,7 @@ def fill_on_sphere(
     segments: FloatArray, center: FloatArray, radius: float, items: Int32Array, planes: Int32Array, begin: int,
     size: int, stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Write the pieces of ``segments`` ((n, 2, dim) float64) in the ball: see `fill_on_boxes`."""
+    """Write the pieces of ``segments`` ((n, 2, dim) float64) in the ball; arguments: table of `fill_on_boxes`."""
     n_open = 0
     for place in range(size):
         if stop[0]:

@@ -56,11 +56,9 @@ that of the high parts is exact within a factor of two, and elsewhere does not m
 
 
 class PlaneCrossing(NamedTuple):
-    """The crossing of a segment with a plane of a slab.
-
-    t, t_low: parameter, a double-double. n, d: as above, rounded. is_exact: both differences are exact. plane: 0.0 ..
-    5.0, or -1.0 for none, with a t outside of [0, 1] that equals no other.
-    """
+    """The crossing of a segment with a plane of a slab. t, t_low: parameter, a double-double. n, d: at - p and q - p on
+    the plane's axis, rounded; t = n / d. is_exact: both differences are exact. plane: 0.0 .. 5.0, or -1.0 for none,
+    with a t outside of [0, 1] that equals no other."""
 
     t: float
     t_low: float

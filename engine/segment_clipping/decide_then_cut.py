@@ -89,7 +89,8 @@ class Plan(NamedTuple):
 def clip_on_convex(
     segments: FloatArray, region: Solid, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the pieces of segments in a convex region, at most one a segment, and the accuracy report."""
+    """Return the pieces of segments in a convex region, at most one each, number beyond the filter, and number in
+    rationals."""
     method = plan.method
     assert method is not None
     if len(segments) <= FEW and (few := _clip_few(segments, method)) is not None:

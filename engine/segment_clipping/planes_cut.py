@@ -57,7 +57,7 @@ def fill_on_rows(
     segments: FloatArray, columns: FloatArray, items: Int32Array, planes: Int32Array, begin: int, size: int,
     stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Write the pieces of ``segments`` ((n, 2, dim) float64) in a convex region: see `fill_on_boxes`."""
+    """Write the pieces of ``segments`` (n, 2, dim) float64 in a convex region; arguments: table of `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
@@ -126,7 +126,8 @@ def cut_end(
 def recompute_ends(
     segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, row: int, unsure: int, pieces: Pieces
 ) -> bool:  # fmt: skip
-    """Recompute by expansions the ends of a piece whose bits are set in `unsure`; return whether all is proven."""
+    """Recompute by expansions the ends (bit 0: first, bit 1: last) of a piece set in `unsure`; return whether all is
+    proven. row: of the piece in `pieces`. columns: of the box's plane rows."""
     all_sure = True
     for end in range(2):
         if unsure >> end & 1 == 1:

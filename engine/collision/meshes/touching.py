@@ -335,8 +335,8 @@ def has_interior_beside(s: Search, source: MeshArrays, face: int) -> bool:
 
 @allocating
 def relate_by_locations(s: Search, n: int, shares: BoolArray) -> int:
-    """Return OVERLAPPING or TOUCHING if the locations of the faces in contact decide it, else UNSETTLED. shares: as of
-    `where_faces_are`."""
+    """Return OVERLAPPING or TOUCHING if the locations of the faces in contact decide it, else UNSETTLED. shares: (n,)
+    whether two faces share an area, or empty."""
     n_places = 16
     while n_places < 6 * n:
         n_places *= 2

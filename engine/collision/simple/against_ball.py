@@ -43,8 +43,8 @@ _SPREAD = 64
 
 @inline
 def _box_distance(t: Facet, center: Point3, slack: float) -> float:
-    """Return a lower bound on the squared distance of a triangle's box from the centre. slack: error of coordinates; as
-    of `box_distance_bounds`."""
+    """Return a lower bound on the squared distance of a triangle's box from the centre; slack: error of coordinates.
+    Widened as in `box_distance_bounds`."""
     square = 0.0
     for c, p, q, r in (
         (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),

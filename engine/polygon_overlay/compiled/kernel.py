@@ -84,7 +84,7 @@ NEEDS_OUTPUT: Final = 2
 
 
 class PairStatus(IntEnum):
-    """The outcome of a pair that is not OPEN."""
+    """Outcome of a pair that is not OPEN: DONE, or MAY_CROSS where its rounded rings may cross."""
 
     DONE = 0
     MAY_CROSS = 1
@@ -239,7 +239,8 @@ def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tup
 
 @merged
 def _progress(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
-    """Return the tuple that `overlay_pairs` returns: see there."""
+    """Return (pair, needs, number of vertices, of rings, of pieces, of evidence rows, of vertices left out), for
+    `overlay_pairs`."""
     n_vertices, n_rings, n_pieces, n_evidence = filled
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 

@@ -111,8 +111,8 @@ def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFi
 
 @merged
 def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> int:
-    """Return the part of the result that a face belongs to, 0 for none, by any fill rule but AGAIN. n_sources: number
-    of sources around the face; by PAIR its label, by the rules of winding numbers that number."""
+    """Return the part of the result that a face belongs to, 0 for none, by any fill rule but AGAIN (see `Rule`).
+    n_sources: number of sources around the face; by PAIR its label, by the rules of winding numbers that number."""
     if rule == Rule.PAIR:
         return int(selected[n_sources])
     if rule == Rule.FIRST_ALONE:
@@ -122,8 +122,9 @@ def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> in
 
 @merged
 def _classify_face(nesting: Nesting, h: FloodFill, face: int, n_sources: int, n: int) -> tuple[bool, int]:
-    """Return whether a face is inside by the rule AGAIN, and the number of evidence entries with those of the face, or
-    NO_ROOM. n: number of entries before; the face lies in the rings ``h.sources[:n_sources]``."""
+    """Return whether a face is inside a shell and in none of its holes (rule AGAIN), and the new number of evidence
+    entries, or NO_ROOM. n: number of entries before. The face lies in the rings ``h.sources[:n_sources]``; its evidence
+    are those shells, or the innermost holes if it is outside."""
     shells, sizes, room = nesting.shells, nesting.sizes, h.ring.shape[0]
     least = float("inf")
     for k in range(n_sources):

@@ -57,7 +57,8 @@ def on_boundary(region: Polygon | Polyhedron) -> Plan:
 def clip_on_boundary(
     segments: FloatArray, region: Bounded, _: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the pieces of segments: see `Plan.cut`."""
+    """Return the pieces of segments in a polygon or polyhedron, number beyond the filter, and number decided in
+    rationals."""
     if len(segments) > _MOST_FEW or not np.isfinite(segments).all():
         check_finite(segments, ("segments",))
     if budget is UNLIMITED or not len(segments):

@@ -39,7 +39,8 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2
 
 
 class Kind(IntEnum):
-    """Kind of a contact, where there is no code of `code_of`."""
+    """How a segment and an element meet, where that is no contact at a place (`code_of`): not, properly, undecided,
+    along a line."""
 
     APART = 0
     PROPER = 1
@@ -48,7 +49,8 @@ class Kind(IntEnum):
 
 
 class Place(IntEnum):
-    """Place of a contact other than a corner (0 .. 2) or a side (3 .. 5, from corner place - 3 on)."""
+    """Where on a triangle or edge a contact lies: 0 .. 2 a corner, 3 .. 5 the side from corner place - 3 on, or one of
+    these."""
 
     START = 6
     END = 7
@@ -56,7 +58,7 @@ class Place(IntEnum):
 
 
 class Bit(IntEnum):
-    """Bits of a contact's code other than place + 2, which begins at bit 1."""
+    """Bits of a contact's code 2 (place + 2) + CROSSES, with ALONG, BEGINS or CEASES added for a collinear edge."""
 
     CROSSES = 1
     ALONG = Kind.ALONG
@@ -114,7 +116,8 @@ def edge_stack() -> IntArray:
 
 @merged
 def code_of(place: int, is_crossed: bool) -> int:
-    """Return the code of a contact at a place (corner, side, START, END, WITHIN)."""
+    """Return the code of a contact at a place (corner, side, START, END, WITHIN): 2 (place + 2) + (1 if the line
+    crosses there)."""
     return 2 * place + (5 if is_crossed else 4)
 
 
