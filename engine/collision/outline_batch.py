@@ -379,8 +379,9 @@ def _sectors_intersect(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) ->
 
 @inline
 def _sector_bits(p: Point2, before: Point2, after: Point2, side: int, c: Point2, d: Point2, their_side: int) -> int:
-    """Return the bits IN_BOTH, ... at a point p of two boundaries. before, after: neighbours of p on one boundary; c,
-    d: on the other. side: 1 if the interior is on the left."""
+    """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that two boundaries through a point p prove near p. before,
+    after: neighbours of p on one boundary; c, d: on the other. side, their_side: 1 if the interior is on the left, -1
+    if on the right."""
     s, e = (after, before) if side > 0 else (before, after)
     t, f = (d, c) if their_side > 0 else (c, d)
     bits = IN_BOTH if _sectors_intersect(p, s, e, t, f) else 0
@@ -393,7 +394,8 @@ def contact_bits(
     points: FloatArray, following: IntArray, edge: int, side: int, vertices: FloatArray, theirs: IntArray, other: int,
     their_side: int,
 ) -> int:  # fmt: skip
-    """Return the bits IN_BOTH, ... at the points where two edges meet, without those at the start of either edge."""
+    """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that two edges prove where they meet, not at the start of
+    either."""
     a, b = as_point2(points, edge), as_point2(points, following[edge])
     c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
     bits = 0

@@ -110,14 +110,15 @@ def relation_of_triangles(t: Facet, u: Facet) -> int:
 
 @kernel
 def relate_triangles_2d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
-    """Fill relations (n,) int8 for rows i of two arrays (n, 3, 2) float64."""
+    """Fill relations (n,) int8 (`Relation` codes, or UNSETTLED) for rows i of two arrays (n, 3, 2) float64."""
     for item in range(relations.shape[0]):
         relations[item] = relation_of_triangles(as_facet2(first[item]), as_facet2(second[item]))
 
 
 @allocating_kernel
 def relate_triangles_3d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
-    """Fill relations (n,) int8 for rows i of two arrays (n, 3, 3) float64; UNSETTLED for triangles without area."""
+    """Fill relations (n,) int8 (`Relation` codes) for rows i of two arrays (n, 3, 3) float64; UNSETTLED for triangles
+    without area."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
         t, u = facet_at(first[item], 0, 1, 2), facet_at(second[item], 0, 1, 2)

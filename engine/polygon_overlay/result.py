@@ -278,7 +278,8 @@ class Overlay(ByValue):
 
     @property
     def area_exact(self) -> Fraction:
-        """The exact area of the exact result; as long as all its crossings together, so costly for thousands."""
+        """The exact area of the exact result, a fraction whose length grows with all its crossings: costly for
+        thousands."""
         return self.exact.exact_rings().area()
 
     @property

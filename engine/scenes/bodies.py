@@ -143,7 +143,8 @@ class Bodies(Preparing):
         return self.prepared("is_exact", find)
 
     def batches(self, budget: Budget) -> SceneBatches:
-        """Return the batches that relate pairs of bodies. Raises: as `collide_scene` for an unsupported body."""
+        """Return the `SceneBatches` that relate pairs of bodies by kernels. Raises: as `collide_scene` for an
+        unsupported body."""
 
         def build() -> SceneBatches:
             check_collidable(self.solids)

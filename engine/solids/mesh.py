@@ -217,7 +217,9 @@ def _place(offsets: IntArray | None, position: int) -> tuple[int, int]:
 
 
 def first_equal(points: FloatArray) -> IntArray | None:
-    """Return for each point the first index with equal coordinates; None if all differ. points: as from `frozen`."""
+    """Return for each point the first index with equal coordinates; None if all differ. points: (n, 3) float64 without
+    -0.0.
+    """
     n = len(points)
     every, first = np.arange(n), np.empty(n, np.int64)
     one_face, no_flag = np.array([0, n]), np.zeros(1, np.uint8)
