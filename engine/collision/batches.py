@@ -38,7 +38,8 @@ _FEW: Final = 64
 
 
 class PairBatches:
-    """Distinct solids of one dimension, prepared for the batch kernels at first use."""
+    """Batch kernels for pairs of bodies, each one of the solids `distinct` (all of one dimension) under a pose; the
+    arrays that they read are built at first use."""
 
     def __init__(self, distinct: Sequence[Solid]) -> None:
         self.distinct, self.is_planar = distinct, len(distinct) > 0 and distinct[0].dimension == 2
@@ -46,8 +47,9 @@ class PairBatches:
         self.cached_pool: tuple[Any, IntArray] | None = None
 
     def pool(self, budget: Budget) -> tuple[Any, IntArray]:
-        """Return the outlines or convex bodies in one pool, and the index of each solid in it, -1 for a solid not in
-        it."""
+        """Return (pool, places): the solids of `distinct` that the batch kernels take, in one set of arrays, and by
+        solid its index there, -1 for a solid that they do not take. In the plane `OutlineArrays` of outlines with
+        simple boundaries, in space `ConvexArrays` of convex bodies. Cached."""
         if self.cached_pool is None:
             self.cached_pool = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
         return self.cached_pool
@@ -56,8 +58,10 @@ class PairBatches:
         self, kinds: IntArray, poses: PoseArrays, pairs: IntArray, relations: Int8Array, boolean: bool, detail: bool,
         budget: Budget,
     ) -> Callable[[int, int], None]:  # fmt: skip
-        """Return a task that fills relations[start:stop] for pairs (n, 2) of rows, UNSETTLED where a kernel cannot
-        decide. kinds: the solid of each row. poses: the pose of each row; row 0 is the identity, of any kind."""
+        """Return a function (start, stop) that fills the UNSETTLED entries of relations[start:stop] with relation codes
+        of pairs[start:stop]; they stay UNSETTLED where the kernel cannot decide. A row is a solid under a pose: kinds
+        (n_rows,), its index in `distinct`; poses, one a row, row 0 the identity. pairs (n, 2): two rows each. boolean: an overlap may be given where one body contains the other. detail: an overlap that is
+        not proven to be PO stays UNSETTLED."""
         (pool, places), flag = self.pool(budget), budget.flag
         kernel = entry_of(relate_outline_pairs if self.is_planar else relate_convex_pairs)
         bodies, options = places[kinds], (detail,) if self.is_planar else (boolean, not detail)
@@ -70,7 +74,7 @@ class PairBatches:
 
 
 def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray]:
-    """Return the convex bodies among some solids in one pool, and the index of each solid in it, -1 for others."""
+    """Return the solids that are provably convex in one pool, and by solid its index there, -1 for a solid that is not."""
     places, convex = np.full(len(solids), -1, np.int64), list[ConvexBody]()
     for kind, solid in enumerate(solids):
         budget.check()
@@ -82,7 +86,7 @@ def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray
 
 
 class SceneBatches:
-    """Bodies of a scene with the arrays that batch kernels read."""
+    """Batch kernels for pairs of bodies of one scene. bodies: the scene; pairs: its distinct solids, prepared."""
 
     __slots__ = ("_is_box", "bodies", "pairs")
 
@@ -91,14 +95,17 @@ class SceneBatches:
         self._is_box = self.pairs.are_boxes[bodies.kinds] & ~bodies.is_posed
 
     def under(self, names: IntArray, poses: list[Pose | None]) -> SceneBatches:
-        """Return the batches of bodies `names` under other, checked poses."""
+        """Return the batches of the bodies with indices `names` under other, checked poses, one for each name. They
+        share the prepared solids, unless preparing all of these would cost more than preparing those of `names`."""
         bodies = self.bodies
         if len(bodies.distinct) > _FEW and self.pairs.cached_pool is None:
             return SceneBatches(scene_bodies([bodies.solids[body] for body in names.tolist()], poses))
         return SceneBatches(bodies.under(names, poses), self.pairs)
 
     def relations(self, pairs: IntArray, boolean: bool, detail: bool, budget: Budget, workers: int | None) -> Int8Array:
-        """Return the relations ``(n,)`` of pairs ``(n, 2)`` of bodies, UNSETTLED where no kernel decides."""
+        """Return the relation codes (n,) of pairs (n, 2) of body indices, UNSETTLED where no kernel decides. boolean:
+        an overlap may be given where one body contains the other. detail: an overlap that is not proven to be PO stays
+        UNSETTLED."""
         result, bodies = np.full(len(pairs), UNSETTLED, np.int8), self.bodies
         relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, result)
         if (result == UNSETTLED).any():
@@ -110,7 +117,9 @@ class SceneBatches:
     def related(
         self, kinds: IntArray, rotations: FloatArray, translations: FloatArray, n: int, boolean: bool, budget: Budget
     ) -> Int8Array:
-        """Return the relations of n pairs of consecutive rows, the first being rows 1 and 2; UNSETTLED where open."""
+        """Return the relation codes (n,) of n pairs of placed solids, rows 1 and 2, rows 3 and 4, ...; UNSETTLED where
+        open. kinds: index in the distinct solids by row; rotations, translations: pose by row, row 0 the identity. All
+        are UNSETTLED if the scene has too many distinct solids to prepare them for few pairs."""
         relations = np.full(n, UNSETTLED, np.int8)
         if n and (self.pairs.cached_pool is not None or len(self.bodies.distinct) <= _FEW):
             pairs, poses = np.arange(1, 2 * n + 1).reshape(n, 2), PoseArrays(rotations, translations, True)
@@ -118,7 +127,8 @@ class SceneBatches:
         return relations
 
     def details(self, pairs: IntArray, relations: Int8Array) -> Int8Array:
-        """Return the `Rcc8` codes of pairs of bodies with interiors; NO_DETAIL where relations are UNSETTLED."""
+        """Return the `Rcc8` codes (n,) of pairs (n, 2) of body indices from their relations (n,); NO_DETAIL where a
+        relation is UNSETTLED. Caller guarantees that all bodies have interiors."""
         codes = details_where_proven(relations)
         boxes = np.flatnonzero(self._is_box[pairs].all(axis=1) & (relations != UNSETTLED))
         codes[boxes] = details_of_boxes(self.bodies.low, self.bodies.high, pairs[boxes], relations[boxes])
@@ -128,8 +138,9 @@ class SceneBatches:
 def posed_batch(
     first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, boolean: bool, detail: bool, budget: Budget
 ) -> Callable[[int, int], None] | None:
-    """Return a task that fills relations[start:stop] for these poses, UNSETTLED where open; None if it would be no
-    faster."""
+    """Return a task that fills relations[start:stop] for these poses of the second solid, the first unposed; UNSETTLED
+    where the kernel cannot decide. None if a batch would be no faster, or a solid of space is not provably convex.
+    boolean, detail: as in `PairBatches.task`."""
     n, table = len(relations), PairBatches([first, second])
     if n < _LEAST_POSES or (not table.is_planar and None in (convex_body_of(first), convex_body_of(second))):
         return None
@@ -177,7 +188,9 @@ class SceneBodies:
 
 
 class OwnBoxes(NamedTuple):
-    """Unposed boxes (n, 2, d) of distinct solids, reaches and radii, as `place_boxes` takes them."""
+    """Unposed boxes of n distinct solids, the input of `place_boxes`. boxes (n, 2, d): low and high corner, of a ball
+    its centre twice; reaches (n,): largest distance of a point of the solid from the middle of its box; radii (n,): of
+    balls, 0.0 for other solids."""
 
     boxes: FloatArray
     reaches: FloatArray
@@ -185,7 +198,8 @@ class OwnBoxes(NamedTuple):
 
 
 def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> SceneBodies:
-    """Return checked bodies as arrays. Raises with the index of the wrong body."""
+    """Check the bodies of a scene and return them as arrays; poses: one or None for each solid, or None for no poses.
+    Raises an error that names the index of the wrong body."""
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):
             raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))
@@ -205,8 +219,8 @@ def bodies_of(
     solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: list[Solid], kinds: IntArray,
     check: Callable[[], object] | None = None,
 ) -> SceneBodies:  # fmt: skip
-    """Return bodies of any type as arrays; kinds: index of each body's solid in distinct; check: as for
-    `Solid.prepared`."""
+    """Return bodies of any type as arrays. solids, poses: of each body; distinct: each solid object once; kinds: index
+    in `distinct` of each body's solid; check: called while a box takes long to compute, may raise."""
     own = [own_box(solid, check) for solid in distinct]
     boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
@@ -216,7 +230,8 @@ def bodies_of(
 def _place_bodies(
     solids: Sequence[Solid], poses: Sequence[Pose | None], distinct: Sequence[Solid], kinds: IntArray, own: OwnBoxes
 ) -> SceneBodies:
-    """Return the bodies as arrays, with boxes around them under their poses; own: boxes of the distinct solids."""
+    """Return the bodies as arrays, with their boxes under their poses. kinds: index in `distinct` of each body's solid;
+    own: unposed boxes of `distinct`."""
     n, dimension = len(kinds), own.boxes.shape[2]
     try:
         rotations, translations = motions_of([None, *poses], dimension)
@@ -232,8 +247,8 @@ def _place_bodies(
 
 
 def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
-    """Return the distinct solids and the index of each body's solid; raise unless `collide` takes all, in one
-    dimension."""
+    """Return the distinct solids, and by body the index of its solid among them. Raises unless `collide` accepts every
+    solid and all have one dimension."""
     distinct, kinds = distinct_of(bodies)
     for body in distinct:
         try:

@@ -67,7 +67,9 @@ _BY_TYPE: dict[tuple[int, str, int, str], tuple[result.PairFunction, result.Part
 
 
 def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, result.PartsFunction, bool]:
-    """Return the functions of a pair and whether to call them with the two bodies swapped."""
+    """Look up a pair of solids in the table `PAIRS`. Returns the function that decides their relation, the one that
+    decides which has a part outside the other, and whether to call both with the two bodies swapped. Raises
+    UnsupportedSolidError, WrongDimensionError or UnsupportedPairError if the pair is not in the table."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:
@@ -97,7 +99,8 @@ def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, res
 
 
 def posed(given: object, solid: Solid, *where: str | int) -> Pose | None:
-    """Return a pose of the solid's dimension, or None; a matrix or a pair (rotation, translation) is read."""
+    """Return a given pose, which may be a matrix or a pair (rotation, translation), as a `Pose`; None for None. Raises
+    unless it has the solid's dimension; where: path of the argument in the call, for the message."""
     if given is None:
         return None
     pose = given if type(given) is Pose else as_pose(given, solid.dimension, *where)
@@ -270,9 +273,11 @@ class Answers:
 
     | field | meaning |
     |---|---|
-    | relations | (n,) int8, UNSETTLED where still to be decided |
-    | witnesses, details | if requested, else None; details: (n,) int8, NO_DETAIL where still to be decided |
-    | works | counts of the pairs settled one by one |
+    | budget, boolean | deadline; whether only disjoint or not is wanted |
+    | relations | (n,) int8 codes, UNSETTLED where still to be decided |
+    | witnesses | list of n, None where disjoint or still to be chosen; None in its place if not requested |
+    | details | (n,) int8 `Rcc8` codes, NO_DETAIL where still to be decided; None if not requested |
+    | works | counts of the pairs settled one by one, one entry for each call of `settle` |
     """
 
     budget: Budget
@@ -283,7 +288,8 @@ class Answers:
     works: list[result.Work] = field(default_factory=list)
 
     def left(self, start: int = 0, stop: int | None = None) -> IntArray:
-        """Return the pairs of a range still to be settled: undecided ones, or ones that lack a requested witness."""
+        """Return the indices of the pairs start .. stop - 1 still to be settled: undecided ones, or ones that lack a
+        requested witness."""
         relations = self.relations[start:stop]
         is_left = relations == UNSETTLED
         if self.witnesses is not None:
@@ -292,7 +298,8 @@ class Answers:
         return left
 
     def settle(self, items: IntArray, pair_of: Callable[[int], PlacedPair]) -> None:
-        """Fill the answers of pairs `items` by `collide_pair`; threads may settle different pairs."""
+        """Decide the pairs with indices `items` one by one and fill their answers; pair_of(item): the two solids and
+        their poses. Threads may settle different pairs."""
         work = result.Work(self.budget, witness=self.witnesses is not None, boolean=self.boolean)
         self.works.append(work)
         for item in items.tolist():
@@ -308,7 +315,8 @@ class Answers:
 
 
 def accuracy_of(n_pairs: int, n_open: int, works: list[result.Work], method: str) -> Accuracy:
-    """Return the accuracy report of many pairs; n_open: the number that the batches left, all beyond a filter."""
+    """Return the accuracy report of many pairs. n_open: number of pairs that batch kernels left open, all beyond a
+    filter; works: counts of the pairs settled one by one."""
     beyond, rational = sum(work.n_beyond_filter for work in works), sum(work.n_rational for work in works)
     return Accuracy("exact", None, n_pairs, max(beyond, n_open), rational, method)
 
@@ -326,7 +334,8 @@ _WHERE_PROVEN = np.array([UNLESS_OVERLAPPING.get(relation, Rcc8.PO) for relation
 
 
 def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boolean: bool) -> None:
-    """Raise if a body, given with its path in the call, has a type without interior, or if `boolean` is set."""
+    """Raise if RCC-8 relations cannot be decided: a solid is a surface, which has no interior, or `boolean` is set.
+    named: solids with their paths in the call."""
     if boolean:
         raise InvalidInputError("detail needs the relation, which boolean leaves open; ask for one", ("detail",))
     for where, solid in named:
@@ -339,13 +348,13 @@ def check_has_detail(named: Iterable[tuple[tuple[str | int, ...], Solid]], boole
 
 
 def details_where_proven(relations: Int8Array) -> Int8Array:
-    """Return the `Rcc8` codes for relations that a batch decided; overlapping is PO, by a crossing or points outside
-    both."""
+    """Return the `Rcc8` codes of relations (n,) that a batch decided, NO_DETAIL for UNSETTLED. OVERLAPPING becomes PO:
+    caller guarantees that a crossing, or points of each body outside the other, proved it."""
     return np.where(relations == UNSETTLED, np.int8(NO_DETAIL), _WHERE_PROVEN[relations])
 
 
 def details_of_boxes(low: FloatArray, high: FloatArray, pairs: IntArray, relations: Int8Array) -> Int8Array:
-    """Return the `Rcc8` codes for pairs (n, 2) of boxes (n_boxes, d) with interiors, given their relations."""
+    """Return the `Rcc8` codes (n,) of pairs (n, 2) of boxes (n_boxes, d) with interiors, given their relations (n,)."""
     i, j = pairs.T
     i_sticks_out = ((low[i] < low[j]) | (high[j] < high[i])).any(axis=1)
     j_sticks_out = ((low[j] < low[i]) | (high[i] < high[j])).any(axis=1)

@@ -152,7 +152,8 @@ _ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
 
 
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
-    """Return the relation under one pose. Two meshes need no `Pose`, whose constructor takes as long as deciding."""
+    """Return the relation of the first solid and the second under the only pose in `poses`. Closed forms and the mesh
+    kernel read the arrays; a `Pose`, whose constructor takes as long as a decision, is made for other pairs alone."""
     if first.type == "aabb" or first.type == second.type == "sphere":
         motion = poses.rotations[0], poses.translations[0]
         closed_form = relation_closed_form(first, second, motion_of(None, first.dimension), motion, work)
@@ -167,7 +168,8 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
 
 
 def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Return checked rotations (n, d, d) and translations (n, d), read-only."""
+    """Return checked rotations (n, d, d) and translations (n, d), read-only. translations None: `rotations` are `Pose`
+    objects or matrices (n, d + 1, d + 1)."""
     if translations is None:
         rotations, translations = as_pose_arrays(rotations, dimension)
     turn: Any = rotations
@@ -200,7 +202,8 @@ _BALL_AND_MESH = ({"sphere", "polyhedron"}, {"sphere", "surface"})
 def batch_of(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None] | None:
-    """Return a task by which kernels fill answers[start:stop], UNSETTLED where they cannot; None if no batch is."""
+    """Return a task by which kernels fill the relations, and requested witnesses, of answers[start:stop], one entry a
+    pose of the second solid; UNSETTLED where they cannot decide. None if no kernel takes the pair."""
     if {first.type, second.type} in _BALL_AND_MESH:
         return _ball_batch(first, second, poses, answers)
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
@@ -247,7 +250,8 @@ _SWAPPED = np.array([*(SWAPPED_RELATION.get(relation, relation) for relation in 
 def _ball_batch(
     first: Solid, second: Solid, poses: PoseArrays, answers: one_pair.Answers
 ) -> Callable[[int, int], None]:
-    """Return the kernel task for a ball and a mesh under a range of poses; UNSETTLED where floats prove nothing."""
+    """Return a task that fills answers[start:stop] for a ball and a mesh, in either order, under these poses of the
+    second; UNSETTLED where floats prove nothing."""
     is_swapped = isinstance(first, Sphere)
     body, ball = (second, first) if is_swapped else (first, second)
     assert isinstance(ball, Sphere)

@@ -60,7 +60,9 @@ ConvexArrays = namedtuple("ConvexArrays", "points normals anchors firsts numbers
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvexBody:
-    """One convex body, its vertices numbered from 0; fields as in `ConvexArrays`."""
+    """One convex body of space, its vertices numbered from 0. points (3, n): vertices; normals (4, n_faces): outward,
+    about unit, row 3 a bound on their error; anchors (n_faces,): a vertex of each face; numbers (N_NUMBERS,): columns
+    above."""
 
     points: FloatArray
     normals: FloatArray
@@ -103,7 +105,8 @@ def _ball(ball: Sphere) -> ConvexBody:
 
 
 def _hull(vertices: FloatArray, triangles: IntArray, center: FloatArray) -> ConvexBody:
-    """Build the body of a convex hull; caller guarantees that every vertex is used and triangles face outward."""
+    """Build the body of a convex hull. vertices (n, 3): all used; triangles (m, 3): caller guarantees that they face
+    outward; center: an interior point."""
     normals, numbers = np.empty((4, len(triangles))), np.zeros(N_NUMBERS)
     numbers[CENTER:ASIDE] = center
     points, triangles = np.ascontiguousarray(vertices.T), np.ascontiguousarray(triangles)
@@ -120,7 +123,8 @@ def point_of(points: FloatArray, point: int) -> Point3:
 
 @kernel
 def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, numbers: FloatArray) -> None:
-    """Fill normals, and all numbers but CENTER, of a hull.
+    """Fill normals (4, n_faces) and numbers (N_NUMBERS,) of a hull; CENTER, an interior point, is given. points (3, n):
+    vertices; triangles (n_faces, 3). A face that is too thin gets a zero normal with an infinite error.
 
     error of a normal: rounded differences and products are off by less than 14 u |v| |w| for the edges v, w; 2^-48 |v|
     |w| also covers the scaling to unit length, as long as it is small against the length.
@@ -162,7 +166,7 @@ def _fill_arrays(points: FloatArray, triangles: IntArray, normals: FloatArray, n
 
 
 def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
-    """Concatenate bodies into the arrays that kernels take."""
+    """Concatenate bodies into the arrays that kernels take; body k of the pool is bodies[k]."""
     first_point = _offsets([body.points.shape[1] for body in bodies])
     first_face = _offsets([len(body.anchors) for body in bodies])
     return ConvexArrays(
@@ -175,5 +179,5 @@ def pool_bodies(bodies: Sequence[ConvexBody]) -> ConvexArrays:
 
 
 def _offsets(counts: list[int]) -> IntArray:
-    """Return the offsets of parts with the given sizes, the end last."""
+    """Return the offsets (n + 1,) of n consecutive parts of the given sizes; the last one is the total."""
     return np.append(np.int64(0), np.cumsum(np.array(counts, np.int64)))

@@ -48,13 +48,12 @@ LARGEST_ERROR = 2.0**250
 def relate_convex(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, is_boolean: bool, may_be_equal: bool
 ) -> int:
-    """Return the relation code of two placed convex bodies where floats prove it, else UNSETTLED (always for a
-    contact).
+    """Return the relation code of two placed convex bodies if floats prove it, else UNSETTLED (always for a contact).
+    first, second: their indices in the pool; a, b: the same bodies, placed.
 
     is_boolean: common interior points give OVERLAPPING, even if a body contains the other (but for two balls).
-    may_be_equal: the caller need not tell equal bodies apart, so two overlapping balls of one radius are OVERLAPPING,
-    whatever their centres.
-    """
+    may_be_equal: equal bodies need not be distinguished from others that overlap, so two overlapping balls of one
+    radius are OVERLAPPING, whatever their centres."""
     error = a.place.error + b.place.error
     if not error < LARGEST_ERROR:
         return UNSETTLED
@@ -77,8 +76,9 @@ def relate_convex(
 def relation_of_intersecting(
     pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, square: float
 ) -> int:
-    """Return the relation code of two bodies whose open interiors intersect, or UNSETTLED. square: squared distance
-    between an interior point of the first and one of the second."""
+    """Return the relation code of two placed bodies whose open interiors intersect: one inside the other, OVERLAPPING,
+    or UNSETTLED if unproven. first, second: indices in the pool; square: squared distance between an interior point of
+    the first and one of the second."""
     error = a.place.error + b.place.error
     first_lies = second_lies = _OUT
     if not exceeds_distance(square, pool.numbers[second, RADIUS], error):
@@ -94,8 +94,12 @@ def relation_of_intersecting(
 
 @inline
 def _relate_balls(distance: float, first_radius: float, second_radius: float, error: float, may_be_equal: bool) -> int:
-    """Return the relation code of two balls by the distance of their centres, or UNSETTLED. The distance is off by
-    sqrt(3) e and some u of itself: slack = 2^-40 (distance + radii) + 8 e + 2^-400."""
+    """Return the relation code of two balls from the computed distance of their centres; UNSETTLED if `slack` may
+    change it. error: bound e on a coordinate of the difference of the centres; the distance is then off by sqrt(3) e
+    and a few u of itself. may_be_equal: balls of one radius that overlap are OVERLAPPING, even if they may be equal.
+
+        slack = 2^-40 (distance + radii) + 8 e + 2^-400
+    """
     both = first_radius + second_radius
     slack = 2.0**-40 * (distance + both) + 8.0 * error + 2.0**-400
     if distance > both + slack:
@@ -111,25 +115,26 @@ def _relate_balls(distance: float, first_radius: float, second_radius: float, er
 
 @merged
 def interior_point(numbers: FloatArray, body: int, f: PlacedBody, which: int) -> Point3:
-    """Return the image of an interior point of a body; which: CENTER, or ASIDE (off its symmetries)."""
+    """Return an interior point of body `body` of the pool under its placement f, rounded. which: CENTER, or ASIDE (off
+    the body's symmetries), the first of its three columns in `numbers`."""
     return placed(Point3(numbers[body, which], numbers[body, which + 1], numbers[body, which + 2]), f.place)
 
 
 @merged
 def exceeds_distance(square: float, distance: float, error: float) -> bool:
-    """Return whether |p - q|^2 = `square` of placed points proves |p - q| > `distance` of a body not placed. A pose
-    stretches lengths by up to 1 + 1.5e-12 < 1 + 2^-30; error: of a coordinate of p - q."""
+    """Return whether two placed points p, q are proven to be farther apart than `distance`, a length of a body before
+    its pose. square: |p - q|^2 as computed; error: bound on a coordinate of p - q. A pose stretches lengths by up to 1
+    + 1.5e-12 < 1 + 2^-30."""
     limit = distance * (1.0 + 2.0**-30) + 8.0 * error
     return square > limit * limit + 2.0**-900
 
 
 @inline
 def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody, b: PlacedBody, square: float) -> int:
-    """Return whether body `inner` lies in the open interior of body `outer`: _WITHIN, _OUT (some point does not) or
-    UNDECIDED.
+    """Return whether body `inner` of the pool, placed by a, lies in the open interior of body `outer`, placed by b:
+    _WITHIN, _OUT (some point does not) or UNDECIDED. square: squared distance between an interior point of each.
 
-    For each face, with its unit normal n (off by e_n) and a corner p; square: squared distance between an interior
-    point of each body:
+    For each face of `outer`, with its unit normal n (off by e_n) and a corner p:
 
         height = max n . a - n . p,    |a - p| <= extent = sqrt(square) + both radii
         |height - exact| <= (e_n + 3e-12) |a - p| + 1.75 (e_a + e_b) + rounding     3e-12: |R - R^-T| <= 3 TOLERANCE
@@ -153,7 +158,8 @@ def _classify_in_hull(pool: ConvexArrays, inner: int, outer: int, a: PlacedBody,
 
 @inline
 def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius: float, error: float) -> int:
-    """Return whether body `a` lies in a ball, by its point farthest from the centre: _WITHIN, _OUT or UNDECIDED."""
+    """Return whether placed body `a` lies in an open ball, by its point farthest from the centre: _WITHIN, _OUT or
+    UNDECIDED. error: bound on the error of a distance from the centre."""
     most = 0.0
     for point in range(a.first, a.stop):
         v = minus(placed(point_of(points, point), a.place), center)
@@ -165,7 +171,7 @@ def _classify_in_ball(points: FloatArray, a: PlacedBody, center: Point3, radius:
 
 @merged
 def _has_equal_pose(rotations: FloatArray, translations: FloatArray, i: int, j: int) -> bool:
-    """Return whether rows i and j are the same pose: the relation is then that of the bodies not moved."""
+    """Return whether poses i and j are equal; the relation is then that of the two unposed bodies."""
     for k in range(3):
         for m in range(3):
             if translations[i, k] != translations[j, k] or rotations[i, k, m] != rotations[j, k, m]:
@@ -178,9 +184,10 @@ def relate_convex_pairs(
     pool: ConvexArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, is_boolean: bool, may_be_equal: bool,
     relations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Replace the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows, where floats prove a relation.
-    bodies: index in the pool of each row's body, or -1. poses: of each row; row 0 is the identity. Returns early when
-    the flag is set."""
+    """Replace the UNSETTLED entries of relations (n,) int8 by the relation codes of pairs (n, 2) of rows where floats
+    prove one. A row is a body under a pose: bodies (n_rows,), its index in the pool, -1 if it has none there; poses,
+    one a row, row 0 the identity. is_boolean: OVERLAPPING may be given where one body contains the other; may_be_equal:
+    and for equal bodies. Returns early when the flag is set."""
     for item in range(pairs.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:
             return
@@ -230,8 +237,8 @@ def placed_body(pool: ConvexArrays, body: int, poses: PoseArrays, item: int) -> 
 
 @merged
 def support_vertex(points: FloatArray, f: PlacedBody, local: Point3) -> int:
-    """Return the index of a vertex farthest, up to rounding, along a direction in the body's coordinates (support
-    mapping)."""
+    """Return the index in the pool of a vertex of body f farthest, up to rounding, along `local`, a direction in the
+    body's own coordinates (support mapping)."""
     best, support = -np.inf, f.first
     for point in range(f.first, f.stop):
         value = dot(point_of(points, point), local)
@@ -242,7 +249,7 @@ def support_vertex(points: FloatArray, f: PlacedBody, local: Point3) -> int:
 
 @inline
 def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
-    """Return max d . p over all points p of a placed body."""
+    """Return max d . p over all points p of a placed body, its radius included, rounded (support function)."""
     local = rotate_back(f.place, d)
     best, other = -np.inf, -np.inf
     for point in range(f.first, f.stop - 1, 2):  # two chains: a maximum waits for the one before
@@ -256,9 +263,11 @@ def support_value(points: FloatArray, f: PlacedBody, d: Point3) -> float:
 
 @inline
 def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Point3) -> bool:
-    """Return whether largest d . a < least d . b is proven: the first body lies below the second one along d.
+    """Return whether largest d . a < least d . b is proven: placed body a lies below b along direction d (separating
+    axis).
 
-    u = 2^-53, |.|_1 the sum of |components|, `reach` and t of one body. Off by, over |d|_1:
+    u = 2^-53, |.|_1 the sum of |components|, `reach` the largest coordinate and t the translation of one body. Errors
+    of its support value, each divided by |d|_1:
 
         R'd  3 u an entry, entries <= 1.01     9.1 u reach        d . t      3 u |t|
         (R'd) . vertex                         5.3 u reach        last sum   u (1.75 reach + |t|)
@@ -271,9 +280,10 @@ def is_separating_axis(points: FloatArray, a: PlacedBody, b: PlacedBody, d: Poin
 
 @inline
 def tetrahedron_contains_origin(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> bool:
-    """Return whether the origin is strictly inside the tetrahedron abcd for all corners within `error` = e of these.
+    """Return whether the origin is proven strictly inside the tetrahedron abcd, whose corners are known to +- e =
+    `error` in each coordinate.
 
-    A determinant |p q r| of corners with coordinates of at most m (that of a face must exceed its limit):
+    The determinant |p q r| of the corners of each face must exceed its limit; m: the largest coordinate:
 
         |det - exact| <= e (|p x q|_1 + |p x r|_1 + |q x r|_1) + 18 e^2 m + 6 e^3     corners off by e
                          + 2^-50 * 6 m^3 = 48 u m^3                                   rounding
@@ -294,15 +304,17 @@ def tetrahedron_contains_origin(a: Point3, b: Point3, c: Point3, d: Point3, erro
 
 @merged
 def _size(a: Point3) -> float:
-    """Return the 1-norm of a."""
+    """Return the 1-norm |a.x| + |a.y| + |a.z|."""
     return abs(a.x) + abs(a.y) + abs(a.z)
 
 
 @inline
 def refine_portal(points: FloatArray, a: PlacedBody, b: PlacedBody, v0: Point3) -> int:
-    """Minkowski portal refinement: return APART, MEETING (the open interiors intersect) or UNSETTLED. v0: a point a - b
-    of the Minkowski difference, off its symmetries. Stages 0 and 1 choose two corners of the portal, 2 a third so that
-    the ray from v0 through the origin passes between them, 3 moves the portal outward."""
+    """Minkowski portal refinement (XenoCollide): return APART (proven disjoint), MEETING (proven: the open interiors
+    intersect) or UNSETTLED, for bodies placed by a and b. v0: a point of the interior of the Minkowski difference {a -
+    b}, off its symmetries. The portal is a triangle v1 v2 v3 of points of the difference that the ray from v0 through
+    the origin passes: stages 0 and 1 choose two of its corners, 2 a third, 3 moves the portal outward until the origin
+    is behind it or provably beyond the difference."""
     error, rounding = a.place.error + b.place.error, a.round + b.round
     d, v1, v2, v3 = negative(v0), v0, v0, v0
     stage = 0

@@ -42,12 +42,13 @@ def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage
 
 
 def value_at(half_space: HalfSpaceImage, point: Vector) -> Fraction:
-    """Return n . p + d for a half-space: positive inside."""
+    """Return n . p + d for the half-space (n, d) and a point p: positive inside, 0 on the plane."""
     return dot(half_space[0], point) + half_space[1]
 
 
 def rounded(value: Fraction) -> float:
-    """Return the nearest double, an infinity beyond the largest: monotone, so it serves for boxes."""
+    """Return the double nearest to a rational, an infinity beyond the largest double. Rounding is monotone, so rounded
+    corners bound rounded points."""
     return rounded_quotient(value.numerator, value.denominator)
 
 

@@ -37,13 +37,13 @@ _CHECK_EVERY = 64
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """Exact edges of one planar body under its pose.
+    """Exact edges of one planar body under its pose; edge k starts at vertex k.
 
     | field | shape | meaning |
     |---|---|---|
     | points | n_vertices | exact positions of the vertices |
-    | ends | (n, 2) | the vertices of each edge |
-    | low, high | (n, 2) | boxes of the edges, by correctly rounded, so monotone, coordinates |
+    | ends | (n, 2) | start and end vertex of each edge |
+    | low, high | (n, 2) | boxes of the edges, from correctly rounded coordinates: rounding is monotone |
     | floats | (n_vertices, 2) | rounded positions |
     | is_posed | | False if floats are the positions as given |
     """
@@ -84,7 +84,8 @@ def outline_of(body: Solid, pose: Pose | None, budget: Budget) -> Outline:
 
 
 def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangement, list[list[int]]]:
-    """Return the arrangement of all edges (bit k of a mask: outline k), and by outline the node of each vertex."""
+    """Return the arrangement of all edges, bit k of an edge's mask being set if outline k has it, and numbers:
+    numbers[k][v] is the node of vertex v of outline k."""
     nodes, numbers = _nodes_of(outlines, budget)
     segments: list[tuple[int, int]] = []
     masks: list[int] = []
@@ -95,7 +96,8 @@ def arrange_outlines(outlines: list[Outline], budget: Budget) -> tuple[Arrangeme
 
 
 def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[list[int]]]:
-    """Return the table of distinct points of all outlines, and by outline the node of each vertex."""
+    """Return the table of distinct points of all outlines, and numbers: numbers[k][v] is the node of vertex v of
+    outline k."""
     if any(outline.is_posed for outline in outlines):
         points, down = [point for outline in outlines for point in outline.points], _scale_divisor(outlines)
         nodes, flat = rational_nodes(points if down == 1 else [(x / down, y / down) for x, y in points], budget)
@@ -109,12 +111,14 @@ def _nodes_of(outlines: list[Outline], budget: Budget) -> tuple[NodeTable, list[
 
 
 def _scale_divisor(outlines: list[Outline]) -> int:
-    """Return 4 if a posed coordinate exceeds the range of doubles, else 1: divided by it, all are in range."""
+    """Return the number by which all coordinates are divided for the arrangement: 4 if a posed coordinate exceeds the
+    largest double, else 1."""
     return 1 if all(np.isfinite(outline.floats).all() for outline in outlines) else 4
 
 
 def live_edges(outline: Outline, budget: Budget) -> list[tuple[Point, Point]]:
-    """Return the exact ends of the parts of edges that even-odd does not cancel: the interior is on one side only."""
+    """Return the parts of edges that even-odd does not cancel, each as its exact ends: the interior is on one side of
+    them only."""
     arrangement, _ = arrange_outlines([outline], budget)
     live, down = [edge for edge, mask in enumerate(arrangement.masks) if mask], _scale_divisor([outline])
 
@@ -153,8 +157,10 @@ def single_points(outline: Outline) -> list[int]:
 
 
 def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
-    """Return the relation of two outlines with contact details by the compiled kernel, see `relate_placed`. UNSETTLED
-    for large bodies, and for intersecting bodies with boundaries that are not simple."""
+    """Return (relation, bits, edge, other edge, class) of two planar solids under poses, by the compiled kernel. bits:
+    IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST; edges: the first two that meet, -1 for none; class: of these two edges, APART
+    for none. The relation is UNSETTLED for large bodies, and for intersecting bodies with boundaries that are not
+    simple."""
     one, other = batch.outline_arrays(first), batch.outline_arrays(second)
     if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
         return UNSETTLED, 0, -1, -1, batch.APART
@@ -180,7 +186,8 @@ def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: res
 
 
 def outline_parts(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return which of two overlapping planar bodies has a part outside the other."""
+    """Return which of two overlapping planar bodies has a part outside the other, by the kernel or, where that is
+    undecided, by the exact arrangement."""
     relation, bits, _, _, kind = _related(first, second, poses)
     if relation == UNSETTLED:
         return parts_by_arrangement(first, second, poses, work)
@@ -214,8 +221,9 @@ def collide_outline_outline(first: Solid, second: Solid, poses: result.Poses, wo
 
 
 class _MutualLocations(NamedTuple):
-    """Labels of faces (FIRST | SECOND); whether boundaries meet; for each body, by edge and isolated point, whether it
-    lies in the other's open interior."""
+    """Locations of two planar bodies in each other. labels: by face of their arrangement, bits FIRST and SECOND of the
+    bodies that contain it; meet: whether the boundaries have a common point; first, second: by part of an edge that
+    only this body has, then by isolated point, whether it lies in the other's open interior."""
 
     labels: list[int]
     meet: bool
@@ -260,7 +268,8 @@ def _boundaries_meet(arrangement: Arrangement) -> bool:
 
 
 def _witness(a: Outline, b: Outline, pierces: bool, containing: str, budget: Budget) -> result.Witness:
-    """Return the first two edges that meet, by number, as witness; containment if no edges meet."""
+    """Return the first two edges that meet, by number, as witness; if none meet, a containment in the body that
+    `containing` names. pierces: the value of `Witness.piercing`."""
     for i in range(a.n_edges):
         budget.check()
         near = (b.low <= a.high[i]).all(axis=1) & (b.high >= a.low[i]).all(axis=1)

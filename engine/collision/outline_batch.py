@@ -63,7 +63,8 @@ OutlineArrays = namedtuple("OutlineArrays", "vertices following sides firsts")
 
 
 def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
-    """Return bodies as arrays, and the index of each there, -1 for a body that the batch kernels do not take."""
+    """Return bodies in one set of arrays, and by body its index there, -1 for a body that the batch kernels do not
+    take: without edges, with more than MOST_EDGES, or with a boundary that is not simple."""
     outlines = [outline_arrays(body) if has_faces(body) else _NONE for body in bodies]
     firsts = np.append(np.int64(0), np.cumsum([len(vertices) for vertices, _, _ in outlines]))
     vertices, following, sides = map(np.concatenate, zip(_NONE, *outlines))
@@ -75,7 +76,7 @@ def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
 
 
 def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
-    """Return vertices (n, 2) and ring offsets of a polygon, triangle or box of the plane."""
+    """Return vertices (n, 2) and ring offsets (n_rings + 1,) of a polygon, triangle or box of the plane."""
     if isinstance(body, Polygon):
         body.check_not_empty()
     if isinstance(body, Aabb):
@@ -85,7 +86,8 @@ def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
 
 
 def outline_arrays(solid: Solid) -> tuple[FloatArray, IntArray, Int8Array]:
-    """Return of a polygon, triangle or box its vertices (n, 2), by edge the vertex at its end, and its side; cached."""
+    """Return vertices (n, 2), following (n,) and sides (n,) of a polygon, triangle or box of the plane: edge k runs
+    from vertex k to vertex following[k], with the interior on its left (1), its right (-1), or unknown (0). Cached."""
     return solid.prepared("outline", lambda: _arrays(*rings_of(solid)))
 
 
@@ -131,8 +133,8 @@ def find_sides(vertices: FloatArray, following: IntArray, sides: Int8Array) -> N
 
 @inline
 def _classify_edges(a: Point2, b: Point2, c: Point2, d: Point2, error: float) -> int:
-    """Return CROSSING if open edges ab and cd provably cross in one point, APART, the kind of contact, or UNSURE.
-    error: of each coordinate."""
+    """Return the class of edges ab and cd: CROSSING if they provably cross in one point inside both, APART,
+    _VERTEX_EDGE or _VERTEX_VERTEX for a contact, or UNSURE. error: bound on each coordinate."""
     slack = 2.0 * error
     if max(a.x, b.x) + slack < min(c.x, d.x) or max(c.x, d.x) + slack < min(a.x, b.x):
         return APART
@@ -176,7 +178,8 @@ def has_simple_edges(vertices: FloatArray, following: IntArray) -> bool:
 
 @inline
 def _place(vertices: FloatArray, turn: FloatArray, move: FloatArray, placed: FloatArray) -> float:
-    """Write the posed vertices of a body, rounded, to `placed`; return a bound on their error (`placement.py`)."""
+    """Write the vertices of a body under rotation `turn` (2, 2) and translation `move` (2,), rounded, to `placed`;
+    return a bound on the error of a coordinate, 0.0 if nothing was rounded (`placement.py`)."""
     reach, is_exact = 0.0, True
     for axis in range(2):  # a turn by the lattice
         x, y = turn[axis, 0], turn[axis, 1]
@@ -213,7 +216,7 @@ def box_blocks(points: FloatArray, following: IntArray, boxes: FloatArray) -> No
 
 @inline
 def _is_clear_of_block(boxes: FloatArray, block: int, a: Point2, b: Point2, slack: float) -> bool:
-    """Return whether edge ab is more than `slack` from the box of a block, along an axis."""
+    """Return whether edge ab is more than `slack` away from the box of block `block`, along x or y."""
     if max(a.x, b.x) + slack < boxes[block, 0] or boxes[block, 2] + slack < min(a.x, b.x):
         return True
     return max(a.y, b.y) + slack < boxes[block, 1] or boxes[block, 3] + slack < min(a.y, b.y)
@@ -221,7 +224,8 @@ def _is_clear_of_block(boxes: FloatArray, block: int, a: Point2, b: Point2, slac
 
 @inline
 def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -> int:
-    """Return 1 if p is inside the rings (even-odd), 0 outside, ON_EDGE, or UNSURE. error: of each coordinate."""
+    """Return 1 if p is inside the rings of a body (even-odd), 0 outside, ON_EDGE, or UNSURE. Edge k runs from vertex k
+    to following[k]. error: bound on each coordinate."""
     is_inside = 0
     for edge in range(len(following)):
         a, b = as_point2(vertices, edge), as_point2(vertices, following[edge])
@@ -243,8 +247,8 @@ def inside(p: Point2, vertices: FloatArray, following: IntArray, error: float) -
 
 @inline
 def _rings_inside(points: FloatArray, following: IntArray, vertices: FloatArray, theirs: IntArray, error: float) -> int:
-    """Return the locations of one body's rings in another body as bits _IN, _OUT, _MAYBE. Rings that meet an edge of
-    the other body add no bit."""
+    """Return where the rings of one body (points, following) lie in another (vertices, theirs), by one vertex of each,
+    as bits: _IN some inside, _OUT some outside, _MAYBE some undecided. A vertex on an edge of the other adds no bit."""
     bits = 0
     for vertex in range(len(following)):
         if following[vertex] > vertex:  # not the last of its ring
@@ -260,9 +264,17 @@ def relate_placed(
     points: FloatArray, following: IntArray, sides: Any, vertices: FloatArray, theirs: IntArray, their_sides: Any,
     boxes: FloatArray, error: float,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return the relation of two placed bodies, or UNSETTLED; bits of interiors; the first edges that meet, or -1; and
-    their class. For bodies that are not simple the relation only says whether they meet. sides: empty if that suffices.
-    boxes: of the second body's blocks. error: of each coordinate."""
+    """Relate two placed bodies, (points, following, sides) and (vertices, theirs, their_sides). boxes: of the second
+    body's blocks of edges; error: bound on each coordinate. sides: as `find_sides` has them; empty: contacts give
+    UNSETTLED.
+
+    | result | meaning |
+    |---|---|
+    | 0 | the relation, or UNSETTLED; if a boundary is not simple it only says whether the bodies meet |
+    | 1 | the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that are proven |
+    | 2, 3 | the first edges of either body that meet, -1 for none, or if an undecided pair comes before |
+    | 4 | the class of these two edges, APART for none |
+    """
     is_unsure, bits, first, second, kind = False, 0, -1, -1, APART
     for edge in range(len(following)):
         a, b = as_point2(points, edge), as_point2(points, following[edge])
@@ -307,8 +319,9 @@ def relate_outline_pairs(
     pool: OutlineArrays, bodies: IntArray, poses: PoseArrays, pairs: IntArray, has_detail: bool, relations: Int8Array,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill the UNSETTLED entries of relations (n,) int8 for pairs (n, 2) of rows; returns early when the flag is set.
-    bodies: body of each row, or -1. has_detail: overlaps other than PO stay UNSETTLED."""
+    """Replace the UNSETTLED entries of relations (n,) int8 by the relation codes of pairs (n, 2) of rows where floats
+    prove one. A row is a body under a pose: bodies (n_rows,), its index in the pool or -1; poses, one a row.
+    has_detail: overlaps other than PO stay UNSETTLED. Returns early when the flag is set."""
     placed, others = np.empty((MOST_EDGES, 2)), np.empty((MOST_EDGES, 2))
     boxes = np.empty((n_blocks(MOST_EDGES), 4))
     r, t = poses.rotations, poses.translations
@@ -334,8 +347,8 @@ def relate_two(
     vertices: FloatArray, following: IntArray, sides: Int8Array, turn: FloatArray, move: FloatArray, other: FloatArray,
     theirs: IntArray, their_sides: Int8Array, their_turn: FloatArray, their_move: FloatArray,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Return the relation of two outlines, each under a rotation and a translation, with contact details: see
-    `relate_placed`."""
+    """Relate two outlines, each under a rotation (2, 2) and a translation (2,); the five results are those of
+    `relate_placed`: relation, bits, two edges that meet, and their class."""
     placed, others, boxes = np.empty((len(vertices), 2)), np.empty((len(other), 2)), np.empty((n_blocks(len(other)), 4))
     error = max(_place(vertices, turn, move, placed), _place(other, their_turn, their_move, others))
     box_blocks(others, theirs, boxes)
@@ -360,8 +373,8 @@ def is_in_box(p: Point2, a: Point2, b: Point2) -> bool:
 
 @inline
 def _is_in_sector(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
-    """Return whether the direction from p to x lies in the half-open sector from s (included) counter-clockwise to e
-    (excluded)."""
+    """Return whether the direction from p to x lies in the half-open sector at p that runs from the direction of s
+    (included) counter-clockwise to that of e (excluded)."""
     by_s, by_e, turn = orient2d(p, s, x), orient2d(p, x, e), orient2d(p, s, e)
     if by_s == 0 and (s.x > p.x) == (x.x > p.x) and (s.x < p.x) == (x.x < p.x):
         if (s.y > p.y) == (x.y > p.y) and (s.y < p.y) == (x.y < p.y):
@@ -373,7 +386,8 @@ def _is_in_sector(p: Point2, s: Point2, e: Point2, x: Point2) -> bool:
 
 @called
 def _sectors_intersect(p: Point2, s: Point2, e: Point2, t: Point2, f: Point2) -> bool:
-    """Return whether two open sectors at p intersect: from s to e, and from t to f, counter-clockwise."""
+    """Return whether two open sectors at p intersect: the one from the direction of s counter-clockwise to e, and the
+    one from t to f."""
     return _is_in_sector(p, s, e, t) or _is_in_sector(p, t, f, s)
 
 
@@ -394,8 +408,9 @@ def contact_bits(
     points: FloatArray, following: IntArray, edge: int, side: int, vertices: FloatArray, theirs: IntArray, other: int,
     their_side: int,
 ) -> int:  # fmt: skip
-    """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that two edges prove where they meet, not at the start of
-    either."""
+    """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST proven near the points where edge `edge` of one placed body
+    meets edge `other` of another, if these are vertices but not the start of either edge: there the edge before ends.
+    side, their_side: 1 if the interior is on the left of the edge, -1 on the right."""
     a, b = as_point2(points, edge), as_point2(points, following[edge])
     c, d = as_point2(vertices, other), as_point2(vertices, theirs[other])
     bits = 0

@@ -105,7 +105,8 @@ BODIES = [(d, kind) for d, kinds in FACES.items() for kind in kinds]
 
 
 def meets_as(solid: Solid) -> str:
-    """Return the kind by which a solid is looked up in the table of pairs, "" if collision does not support it."""
+    """Return the kind (mesh, outline, box, sphere, half_space) by which a solid is looked up in the table of pairs, ""
+    if collision does not support it."""
     return row_of(solid).meets.get(solid.dimension, "")
 
 

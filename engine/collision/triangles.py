@@ -34,13 +34,13 @@ from engine.types import UNDECIDED, Accuracy, FloatArray, Int8Array, Point2, Rel
 
 @inline
 def as_facet2(t: FloatArray) -> Facet:
-    """Return the triangle of an array (3, 2)."""
+    """Return a planar triangle (3, 2) as a `Facet` of three points."""
     return Facet(as_point2(t, 0), as_point2(t, 1), as_point2(t, 2))
 
 
 @inline
 def are_apart_on_axis(p: float, q: float, r: float, s: float, t: float, u: float) -> bool:
-    """Return whether the interval around p, q, r and that around s, t, u are disjoint."""
+    """Return whether the interval spanned by p, q, r and the one spanned by s, t, u are disjoint."""
     return max(p, q, r) < min(s, t, u) or max(s, t, u) < min(p, q, r)
 
 
@@ -54,8 +54,9 @@ def are_boxes_apart(t: Facet, u: Facet) -> bool:
 
 @merged
 def against_edge(p: Point2, q: Point2, u: Facet) -> int:
-    """Return the relation of triangle u to the closed half-plane left of the line p q. DISJOINT: u is strictly right;
-    SECOND_INSIDE_FIRST: strictly left; TOUCHING: right and on it; OVERLAPPING; UNSETTLED."""
+    """Return the relation of triangle u to the closed half-plane left of the line from p to q. DISJOINT: u is strictly
+    right; SECOND_INSIDE_FIRST: strictly left; TOUCHING: right and on the line; OVERLAPPING: on both sides, or left and
+    on it; UNSETTLED."""
     a, b, c = orient2d(p, q, u.p), orient2d(p, q, u.q), orient2d(p, q, u.r)
     if max(a, b, c) == UNDECIDED:
         return UNSETTLED
@@ -68,8 +69,9 @@ def against_edge(p: Point2, q: Point2, u: Facet) -> int:
 
 @inline
 def against_edges(t: Facet, u: Facet) -> int:
-    """Return the relation of triangle u to t by the lines of t's edges alone, or UNSETTLED. DISJOINT and
-    SECOND_INSIDE_FIRST are final; TOUCHING: the interiors are disjoint; OVERLAPPING: no edge of t separates."""
+    """Return the relation of triangle u to t, counter-clockwise, by the lines of t's edges alone, or UNSETTLED.
+    DISJOINT and SECOND_INSIDE_FIRST are final; TOUCHING: the interiors are disjoint; OVERLAPPING: no edge of t
+    separates."""
     first = against_edge(t.p, t.q, u)
     if first in (UNSETTLED, DISJOINT):
         return first
@@ -217,7 +219,7 @@ def collide_triangles(
 
 
 def _relate_exactly(t: FloatArray, u: FloatArray, budget: Budget) -> Relation:
-    """Return the relation of two triangles by integer or rational arithmetic."""
+    """Return the relation of two triangles (3, d) by integer or rational arithmetic."""
     if t.shape[1] == 2:
         return collide_outline_outline(Triangle(t), Triangle(u), (None, None), Work(budget, witness=False)).relation
     numbers = scaled_integers([*t.ravel().tolist(), *u.ravel().tolist()])
