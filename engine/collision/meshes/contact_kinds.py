@@ -53,7 +53,9 @@ plane of the other face, 3 bits a face."""
 def _orient3d(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float, work: Int8Array
 ) -> int:
-    """Return the exact sign of orient3d(a, b, c, d); if it is undecided, return 0 and set ``work[_BAD]``."""
+    """Return the exact sign of orient3d(a, b, c, d) of posed points; if it is undecided, return 0 and set
+    ``work[_BAD]`` to 1. poses (n, 12): rotation by rows, then translation; error: bound on the rounding of a posed
+    coordinate."""
     side = sign_of_four(poses, a, b, c, d, error)
     if side == UNDECIDED:
         work[_BAD], side = 1, 0
@@ -65,8 +67,9 @@ def _orient_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float,
     work: Int8Array,
 ) -> int:  # fmt: skip
-    """Return the sign of the turn a, b, c within their common plane: 1, 0, -1; if undecided, set ``work[_BAD]`` and
-    return 0. axis >= 0: in the projection along it; else seen from the point ``off``, which is not in the plane."""
+    """Return the orientation of a, b, c within their common plane: 1, 0, -1; if undecided, set ``work[_BAD]`` to 1 and
+    return 0. axis >= 0: turn in the projection along it, of unposed points; -1: seen from the point ``off``, which is
+    not in the plane."""
     turn = turn_in_plane(poses, a, b, c, off, axis, error)
     if turn == UNDECIDED:
         work[_BAD], turn = 1, 0
@@ -77,8 +80,9 @@ def _orient_in_plane(
 def _contact_with_face(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, axis: int, error: float, work: Int8Array
 ) -> int:
-    """Return the strongest kind of contact of t with the open face u: EDGE_FACE, VERTEX_FACE, or VERTEX_EDGE if there
-    is none. sides: of t's corners at the plane of u. Sets ``work[_BAD]`` if a sign is undecided."""
+    """Return the strongest kind of contact of triangle t with the open face u: EDGE_FACE or VERTEX_FACE; if there is
+    none, VERTEX_VERTEX where a corner of t is one of u, else VERTEX_EDGE. sides: of t's corners at the plane of u;
+    axis: along it the projection of u has an area. Sets ``work[_BAD]`` to 1 if a sign is undecided."""
     off, flat = off_plane_point(u, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     if not np.isfinite(off.x + off.y + off.z):
         work[_BAD] = 1
@@ -125,8 +129,8 @@ def _contact_with_face(
 def _overlap_collinear(
     poses: FloatArray, t: Facet, k: int, c: PosedPoint3, d: PosedPoint3, axis: int, error: float, work: Int8Array
 ) -> bool:
-    """Return whether edge k of t and the collinear segment c d share more than a point. Decided by orient3d against
-    planes through either end of the edge and off its line."""
+    """Return whether edge k of t and the segment c d, on one line, share more than a point. axis: along it the
+    projection of t has an area. Decided by orient3d against planes through either end of the edge and off its line."""
     a, b, apex, off = corner(t, k), corner(t, k + 1), corner(t, k + 2), off_plane_point(t, axis)
     for end in range(2):
         p, q = (a, b) if end == 0 else (b, a)
@@ -141,8 +145,9 @@ def _overlap_collinear(
 def _interiors_of_edges_intersect(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, their_sides: Signs, axis: int, error: float, work: Int8Array
 ) -> bool:
-    """Return whether an open edge of t and an open edge of u have a common point. sides, their_sides: of the corners of
-    t at the plane of u, and vice versa. Sets ``work[_BAD]`` if a sign is undecided."""
+    """Return whether an open edge of t and an open edge of u have a common point. sides: of the corners of t at the
+    plane of u; their_sides: vice versa; axis: along it the projection of t has an area. Sets ``work[_BAD]`` to 1 if a
+    sign is undecided."""
     is_flat = sides[0] == 0 and sides[1] == 0 and sides[2] == 0
     off, flat = off_plane_point(t, axis), axis if (t.p.pose == UNPOSED and u.p.pose == UNPOSED) else -1
     for k in range(3):
@@ -176,8 +181,8 @@ def _interiors_of_edges_intersect(
 
 @inline
 def single_coplanar_corner(sides: Signs) -> int:
-    """Return the only corner of a face that lies in a plane, if the other two lie strictly on one side of it, else -1.
-    sides: of the three corners."""
+    """Return the index of the only corner of a triangle that lies in a plane, if the other two lie strictly on one side
+    of the plane, else -1. sides: signs of the three corners at the plane."""
     for k in range(3):
         if sides[k] == 0 and sides[(k + 1) % 3] * sides[(k + 2) % 3] == 1:
             return k
@@ -188,9 +193,15 @@ def single_coplanar_corner(sides: Signs) -> int:
 def classify_contact(
     poses: FloatArray, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Int8Array
 ) -> tuple[int, int]:
-    """Return the kind of contact of two faces with area (UNSETTLED if undecided), and bits of the open faces that it
-    may cut. Bits: 1 for t, 2 for u, BOTH; 0 if the faces share a single point, or a part of their borders only. Sets
-    ``work[FLUSH]``."""
+    """Return (kind, bits) of the contact of two faces with area that have a common point. axis, their_axis: along them
+    the projections of t and u have an area. Sets ``work[FLUSH]`` to the corners in the other's plane, 3 bits a face.
+
+    | result | meaning |
+    | --- | --- |
+    | kind | FACE_FACE ... VERTEX_VERTEX; UNSETTLED if a sign is undecided |
+    | bits | open faces that the other face may cut: 1 for t, 2 for u, 3 (BOTH) for both or if undecided |
+    | | 0 if the faces share a single point, or a part of their borders only |
+    """
     work[_BAD] = work[FLUSH] = 0
     sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
     for k in range(3):
@@ -225,9 +236,8 @@ def classify_contact(
 
 @inline
 def _plane_sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tuple[int, int]:
-    """Return the signs of the sides of c and d at the plane through the origin, a and b, as proven by floats; 0:
-    undecided.
-    """
+    """Return the signs of the sides of c and d at the plane through the origin, a and b, each 0 where floats do not
+    prove it. error: bound on each coordinate."""
     n, bound = cross(a, b), bound_near(a, b, c, d, d, error)
     one, other = dot(n, c), dot(n, d)
     return int(one > bound) - int(one < -bound), int(other > bound) - int(other < -bound)
@@ -235,13 +245,12 @@ def _plane_sides(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> tu
 
 @merged
 def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Facet, error: float) -> int:
-    """Return 3 k + m if corner k of t and corner m of u are one point, proven to be the only common point; else -1.
+    """Return 3 k + m if corner k of t and corner m of u are proven to be one point, and the only common point; else -1.
 
     t, u: rounded posed triangles, each coordinate within `error`. own, their: the same before their poses. Proof: the
-    other corners v, w of one lie strictly on one side of the plane of the other; or both faces straddle, and leave the
-    corner along the common line in opposite directions. With normals m and n that is (m x n) sign(n . v), and (n x m)
-    sign(m . x), where x is the corner of the other in the role of v.
-    """
+    vectors v, w from the common corner to the other corners of t lie strictly on one side of the plane of u, or those
+    of u, x and y, on one side of the plane of t; or both faces straddle, and leave the corner along the common line in
+    opposite directions. With normals m of t and n of u these are (m x n) sign(n . v), and (n x m) sign(m . x)."""
     for k in range(3):
         for m in range(3):
             p, q = corner(t, k), corner(u, m)
@@ -262,9 +271,9 @@ def common_corner(poses: FloatArray, t: Facet, u: Facet, own: Facet, their: Face
 def insert_sorted(
     faces: Any, their_faces: Any, pairs: Any, kinds: Any, i: int, j: int, kind: int
 ) -> tuple[int, int, int]:
-    """Insert a pair of faces (i, j) and its kind into the last N_NAMED rows, in the order of `_precedes`, empty rows
-    (-1) last. Returns the pair and kind pushed out, the last in order (possibly the given one); its first face is -1 if
-    a row was free."""
+    """Insert a pair of faces (i, j) and its kind into the last N_NAMED rows of pairs (n, 2) and kinds (n,), in the
+    order of `_precedes`, empty rows (i = -1) last. faces, their_faces: the caller's number of each face. Returns the i,
+    j and kind that no longer fit, the last in order, which may be the given ones; i = -1 if a row was free."""
     n = kinds.shape[0]
     for place in range(n - N_NAMED if _precedes(faces, their_faces, i, j, pairs, n - 1) else n, n):
         if _precedes(faces, their_faces, i, j, pairs, place):
@@ -278,6 +287,7 @@ def insert_sorted(
 
 @inline
 def _precedes(faces: Any, their_faces: Any, i: int, j: int, pairs: Any, place: int) -> bool:
-    """Return whether the pair (i, j) sorts before that of row ``place``: by the caller's face numbers, then index."""
+    """Return whether the pair (i, j) sorts before that of row ``place``: by the caller's face numbers `faces[i]` and
+    `their_faces[j]`, then by i and j; an empty row (-1) is last."""
     p, q = pairs[place, 0], pairs[place, 1]
     return p < 0 or (faces[i], their_faces[j], i, j) < (faces[p], their_faces[q], p, q)

@@ -72,8 +72,8 @@ or for all faces of the first, then of the second body, whether a listed pair co
 
 
 class Place(NamedTuple):
-    """Placements of two bodies: a and b rounded (`place_pair`), the error of either, and that of exact signs under
-    poses."""
+    """Placements of two bodies. a, b: as `place_pair` rounds them; error: bound on the rounding of a coordinate placed
+    so; posed_error: the same for points under their own poses, as exact signs read them."""
 
     a: Placement
     b: Placement
@@ -82,8 +82,8 @@ class Place(NamedTuple):
 
 
 class Search(NamedTuple):
-    """One query about two bodies: meshes, placements, goal that ends it early (SEEK_...), room for contacts, cancel
-    flag."""
+    """One query about two bodies: their meshes and placements, work space, the goal ``seek`` that ends the search early
+    (SEEK_...), room for contacts, cancel flag."""
 
     first: MeshArrays
     second: MeshArrays
@@ -101,15 +101,15 @@ def new_descent() -> Descent:
 
 
 def new_contacts(room: int, n_faces: int = 0) -> Contacts:
-    """Allocate room for pairs of faces in contact; n_faces: of both bodies, if pairs with a common corner are selected,
-    else 0."""
+    """Allocate room for pairs of faces in contact. n_faces: number of faces of both bodies together if the pairs with
+    only a corner in common are to be selected, 0 if all pairs are listed."""
     n = room + (N_NAMED if n_faces else 0)
     return Contacts(np.full((n, 2), -1), np.empty(n, np.int8), np.zeros(n_faces, np.bool_))
 
 
 @inline
 def capacity_of(contacts: Contacts) -> int:
-    """Return how many pairs of faces fit, without the N_NAMED extra rows."""
+    """Return how many pairs of faces fit, without the N_NAMED rows added for selected pairs."""
     return len(contacts.kinds) - (N_NAMED if len(contacts.met) > 0 else 0)
 
 
@@ -127,8 +127,8 @@ def place_bodies(
     first: MeshArrays, first_pose: PoseArrays, first_item: int, second: MeshArrays, second_pose: PoseArrays,
     second_item: int, descent: Descent,
 ) -> tuple[Place, bool]:  # fmt: skip
-    """Place two bodies and fill the frames and poses of a search; return the placements, and whether the bodies are
-    proven disjoint."""
+    """Place two bodies under the poses with the given numbers; fill the frames and poses of `descent`. Returns the
+    placements, and whether the boxes around both bodies are proven disjoint."""
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
     is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
@@ -152,16 +152,17 @@ def placed_triangle(t: Facet, place: Placement) -> Facet:
 
 @inline
 def unposed_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet]:
-    """Return face i of the first and face j of the second body in their own coordinates, tagged with their pose
-    numbers."""
+    """Return face i of the first and face j of the second body before their poses, the corners tagged with the row of
+    ``descent.poses`` that moves them (0, 1; UNPOSED for none)."""
     own = with_pose(triangle_of(s.first, i), 0 if s.place.a.is_posed else UNPOSED)
     return own, with_pose(triangle_of(s.second, j), 1 if s.place.b.is_posed else UNPOSED)
 
 
 @inline
 def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
-    """Return faces i and j as input of exact signs, and for each an axis along which its projection has an area. If
-    placing is exact (error 0) these are posed points; else points before their poses, with pose numbers."""
+    """Return (t, u, axis, their_axis): faces i and j as input of exact signs, and for each an axis along which its
+    projection has an area, negative for none. If placing rounds nothing (error 0) the points are placed; else they
+    stand before their poses, tagged with pose numbers, and so do the axes."""
     axis, their_axis = int(s.first.axis[i]), int(s.second.axis[j])
     if s.place.error == 0.0:
         t, u = placed_triangle(triangle_of(s.first, i), s.place.a), placed_triangle(triangle_of(s.second, j), s.place.b)
@@ -178,7 +179,8 @@ def exact_error(s: Search) -> float:
 
 @merged
 def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
-    """Return CORNER + 3 k + m for two faces proven to share one corner, else UNDECIDED; t, u: the faces as placed."""
+    """Return CORNER + 3 k + m if corner k of face i and corner m of face j are proven to be their only common point,
+    else UNDECIDED. t, u: the faces as placed."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their = unposed_faces(s, i, j)
@@ -188,7 +190,8 @@ def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
 
 @merged
 def settle_class(s: Search, i: int, j: int) -> int:
-    """Return the class of two faces by exact signs; UNDECIDED if a face has no area, or exponents are out of range."""
+    """Return the class of faces i and j by exact signs: APART, CROSSING, CONTACT or COPLANAR; UNDECIDED if a face has
+    no area, or exponents are out of range."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their, axis, _ = exact_faces(s, i, j)
@@ -197,7 +200,8 @@ def settle_class(s: Search, i: int, j: int) -> int:
 
 @merged
 def is_decisive(s: Search, kind: int, i: int, j: int) -> bool:
-    """Return whether a contact of class ``kind`` between faces i and j reaches the goal ``s.seek`` of the search."""
+    """Return whether a contact of class ``kind`` between faces i and j reaches the goal ``s.seek``: any contact, or a
+    strict crossing that proves overlapping interiors, or one of a clean face of the body to be pierced."""
     if s.seek == SEEK_CONTACT:
         return True
     if kind != CROSSING:
@@ -221,9 +225,8 @@ def pop_lowest_bit(low: int, high: int) -> tuple[int, int, int]:
 @merged
 def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int) -> tuple[int, int]:
     """Classify pairs of faces of the leaf blocks i and j, and append those in contact to ``s.contacts``. low, high:
-    mask of the pairs, bit 8 * lane of i + lane of j. Returns DONE, SETTLED, FULL or INTERRUPTED, and the number of
-    pairs.
-    """
+    mask of the pairs in two 32-bit halves, bit 8 k + m for lane k of i and lane m of j; n_pairs: number listed so far.
+    Returns the outcome (DONE, SETTLED, FULL or INTERRUPTED) and the new number of pairs."""
     pairs, kinds, met = s.contacts
     room = capacity_of(s.contacts)
     while low != 0 or high != 0:  # bound: each turn takes a bit
@@ -261,8 +264,9 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
 
 @merged
 def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]:
-    """Replace the nodes i and j on the stack by the pairs of children that may intersect. Returns the height of the
-    stack and two halves of a mask: for two leaf blocks, the pairs of faces that may intersect."""
+    """Push the pairs of children of nodes i and j that may intersect on the stack of n_stack pairs. Returns (n_stack,
+    low, high): the new height; for two leaf blocks, of which nothing is pushed, the mask of the pairs of faces that may
+    intersect, in two 32-bit halves, else 0."""
     stack, frames, work, _, _ = s.descent
     child, their_child = s.first.child, s.second.child
     i_block, j_block = child[i, 0] < 0, their_child[j, 0] < 0
@@ -294,8 +298,8 @@ def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]
 
 @merged
 def search(s: Search) -> tuple[int, int]:
-    """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...) and the number of pairs. If
-    one pair decides the query, it stands in row 0."""
+    """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...) and the number of pairs,
+    which may exceed the room. SETTLED: the one pair that decides the query stands in row 0."""
     stack = s.descent.stack
     stack[0, 0], stack[0, 1] = 0, 0
     n_stack, n_pairs = 1, 0

@@ -46,13 +46,14 @@ def plane_through(corners: Corners) -> Plane:
 
 
 def on_lattice(value: float, shift: int) -> int:
-    """Return value * 2^shift, an integer by guarantee of the caller."""
+    """Return value * 2^shift as an integer; caller guarantees that it is one."""
     numerator, denominator = value.as_integer_ratio()
     return (numerator << shift) // denominator
 
 
 class ExactBody:
-    """A posed body, in integers: every coordinate times 2^shift. Vertices and planes are computed on demand."""
+    """A posed body in integers: every posed coordinate times 2^shift, an integer by the choice of shift. Vertices and
+    planes are computed on demand."""
 
     def __init__(self, mesh: MeshBody, pose: Pose | None, shift: int) -> None:
         self.mesh = mesh
@@ -102,7 +103,8 @@ class ExactBody:
         return faces
 
     def at(self, point: Sequence[Fraction]) -> tuple[int, ...]:
-        """Return a rational point as x, y, z, w: its coordinates are x / w, y / w, z / w in units of the lattice."""
+        """Return a rational point as integers x, y, z, w: its coordinates are x / w, y / w, z / w in units of the
+        lattice, 2^-shift."""
         w = math.lcm(*(x.denominator for x in point))
         x, y, z = (int(x * w) << self.shift for x in point)
         return x, y, z, w
@@ -119,7 +121,8 @@ def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[
 
 
 def exact_pair(first: MeshBody, second: MeshBody, poses: Poses, shift: int = 0) -> tuple[ExactBody, ExactBody]:
-    """Return both bodies under their poses, in integers over one power of two, 2^-shift or finer."""
+    """Return both bodies under their poses in integers, over one power of two 2^-s: the finest that either needs, and
+    at least as fine as 2^-shift."""
     for mesh, pose in zip((first, second), poses):
         own = mesh.shift
         if pose is not None:
@@ -136,8 +139,8 @@ def rounded_outward(numerator: int, denominator: int) -> tuple[float, float]:
 
 @inline
 def _is_lane_apart(mesh: MeshArrays, node: int, lane: int, pose: PoseArrays, margin: float, bounds: FloatArray) -> bool:
-    """Return whether the box of child ``lane`` of a node, posed and enlarged by ``margin``, is proven disjoint from
-    ``bounds``. bounds: x, y, z minimum, then maximum. A NaN proves nothing."""
+    """Return whether the box of child ``lane`` of a node, under the only pose in `pose` and enlarged by ``margin``, is
+    proven disjoint from the box ``bounds`` (6,): x, y, z minimum, then maximum. A NaN proves nothing."""
     r, t = pose.rotations[0], pose.translations[0]
     for i in range(3):
         centre, half = t[i], margin
@@ -199,9 +202,10 @@ def as_simplex(t: Corners) -> tuple[Vector, ...]:
 
 
 def _common_weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector]:
-    """Return, for each corner of s, then of t, its weight in each vector of a basis of common weights. Common weights:
-    weights of the corners of s and of those of t, of equal sums, that give the same point.
-    """
+    """Return a row for each corner of s, then of t: its weights in the basis vectors of the space of common weights.
+
+    Common weights: one number for each corner of s and of t, so that the sums over s and over t are equal and so are
+    the weighted sums of corners: up to scale, one point written in corners of both."""
     origin, n = s[0], len(s) - 1  # its own weight is what the others of s lack
     vectors = [*(minus(p, origin) for p in s[1:]), *(minus(origin, p) for p in t)]
     rows = [(*vector, *(int(k == i) for k in range(len(vectors)))) for i, vector in enumerate(vectors)]
@@ -216,7 +220,7 @@ def _common_weights(s: tuple[Vector, ...], t: tuple[Vector, ...]) -> list[Vector
 
 def _is_feasible(positive: list[Vector], not_negative: list[Vector]) -> bool:
     """Return whether some vector z gives dot(row, z) > 0 for all rows of `positive`, and >= 0 for all of
-    `not_negative`."""
+    `not_negative`; by Fourier-Motzkin elimination."""
     n = len(positive[0])
     rows = {(*row, True) for row in positive} | {(*row, False) for row in not_negative}
     for k in range(n):  # of rows that grow and fall with z[k], a sum without it
@@ -227,7 +231,8 @@ def _is_feasible(positive: list[Vector], not_negative: list[Vector]) -> bool:
 
 
 def _simplices_intersect(s: tuple[Vector, ...], t: tuple[Vector, ...], *, within: bool) -> bool:
-    """Return whether two closed simplices have a common point; within: whether their relative interiors have one."""
+    """Return whether two closed simplices of 1 to 3 corners have a common point; if `within`, whether their relative
+    interiors have one."""
     weights = _common_weights(s, t)
     if not weights:
         return False
@@ -270,5 +275,6 @@ def kind_of_contact(t1: Corners, t2: Corners) -> Kind:
 
 
 def _features(s: tuple[Vector, ...]) -> tuple[list[tuple[Vector, ...]], ...]:
-    """Return the lists of corners, of edges and of faces of a simplex, each a tuple of points."""
+    """Return the corners, the edges and the faces of a simplex of 1 to 3 corners: three lists of tuples of 1, 2 and 3
+    points."""
     return tuple(list(combinations(s, n)) for n in (1, 2, 3))

@@ -48,8 +48,8 @@ WITHIN = ((1, 1, 1), (1, 1, 2), (2, 1, 1), (3, 5, 4), (7, 11, 5))
 
 
 class Sides(NamedTuple):
-    """Whether a body is inside just above a point, inside just below it, and inside at it (then the point lies on no
-    face)."""
+    """Where a body is, along an axis through a point: whether it is inside just above the point, inside just below it,
+    and inside at it (then the point lies on no face)."""
 
     above: bool
     below: bool
@@ -65,8 +65,9 @@ def sides_at(body: ExactBody, q: Homogeneous, axis: int) -> Sides:
 
 
 def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) -> Sides | None:
-    """Return whether `body` is inside just above, just below and at a point q of `plane`; None if that is ambiguous.
-    Ambiguous: a face through q is not parallel to the plane. plane None: this is not tested."""
+    """Return whether `body` is inside just above, just below and at a point q of `plane`, along `axis`; None if a face
+    through q is not parallel to the plane, so that the two sides of the plane at q are not uniform. plane None: this is
+    not tested."""
     if not body.mesh.has_inside:
         return Sides(False, False, False)
     above = changes = is_on_face = False
@@ -93,8 +94,8 @@ def sides_over(body: ExactBody, q: Homogeneous, axis: int, plane: Plane | None) 
 
 
 def side_of_clean(body: ExactBody, face: int) -> int:
-    """Return 1 if the body lies on the side of a face to which its normal points, -1 if on the other; 0 if undecided.
-    face: STATE_CLEAN, not crossed or covered by others. Cached in the mesh."""
+    """Return the side of a face of STATE_CLEAN (not crossed or covered by others) on which its body lies: 1 the side to
+    which its normal points, -1 the other; 0 if no sample point decides. Cached in the mesh."""
     cached, axis, plane = body.mesh.arrays.inner, body.axis(face), body.plane(face)
     if cached[face] not in (1, -1):
         for q in points_within(body.corners(face)):
@@ -107,21 +108,23 @@ def side_of_clean(body: ExactBody, face: int) -> int:
 
 
 def points_within(corners: Corners) -> Iterator[Homogeneous]:
-    """Yield a few points in the relative interior of a face, homogeneous."""
+    """Yield a few points in the relative interior of a face, as homogeneous integers (x, y, z, w)."""
     for weights in WITHIN:
         x, y, z = (sum(w * p[side] for w, p in zip(weights, corners)) for side in range(3))
         yield x, y, z, sum(weights)
 
 
 def _around(body: ExactBody, points: Sequence[Homogeneous]) -> tuple[list[float], list[float]]:
-    """Return the low and the high end of a box of doubles that contains the points, which have one w."""
+    """Return the low and the high corner of a box of doubles that contains the points. points: homogeneous, on the
+    lattice of `body`, all with the same w."""
     scale, sides = points[0][3] << body.shift, list(zip(*points))[:3]
     return [rounded_outward(min(x), scale)[0] for x in sides], [rounded_outward(max(x), scale)[1] for x in sides]
 
 
 def _perturbed_line_hits(corners: Corners, j: int, k: int, x: int, y: int, w: int) -> bool:
-    """Return whether the line through (x, y) / w along the third axis, moved by (eps, eps^2), passes through a face. j,
-    k: the axes of x and y. Caller guarantees that the face is not parallel to the line."""
+    """Return whether a line along an axis, moved by (eps, eps^2), passes through a triangle. j, k: the other two axes,
+    on which the line has the coordinates x / w and y / w. Caller guarantees that the triangle is not parallel to the
+    line."""
     before = 0
     for index in range(3):
         a, b = corners[index], corners[(index + 1) % 3]
@@ -139,9 +142,9 @@ def _perturbed_line_hits(corners: Corners, j: int, k: int, x: int, y: int, w: in
 def regions_of(
     body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None = None
 ) -> Iterator[Homogeneous]:
-    """Yield a point in each region into which the faces of `cutters` cut a face with area; no point lies on a trace.
-    only: (side, faces): restricts the cutters to parts of these faces strictly on that side (1, -1) of the face's
-    plane."""
+    """Yield a homogeneous point in each region into which the faces of `cutters` cut a face of `body` with area; no
+    point lies on a trace, the segment in which another face meets the plane. only: (side, faces) restricts the cutters
+    to those of these faces that reach strictly to that side (1: of the normal, -1) of the face's plane; None: all."""
     traces = _traces(body, face, cutters, budget, only)
     if not traces:
         yield next(points_within(body.corners(face)))
@@ -150,8 +153,8 @@ def regions_of(
 
 
 def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homogeneous, list[Homogeneous]]]:
-    """Yield an interior point and the four corners of each trapezoid between the traces of the body's other faces on a
-    face."""
+    """Yield an interior point and the four corners, homogeneous, of each trapezoid into which the traces of the body's
+    other faces, and vertical lines at their ends and crossings, cut a face."""
     plane, axis = body.plane(face), body.axis(face)
     for (x, y), (x0, x1, low, high) in _sample_regions(body, face, _traces(body, face, [body], budget, None), budget):
         corners = (x0, _height(low, x0)), (x1, _height(low, x1)), (x1, _height(high, x1)), (x0, _height(high, x0))
@@ -159,7 +162,8 @@ def cells_of(body: ExactBody, face: int, budget: Budget) -> Iterator[tuple[Homog
 
 
 def _lift_to_plane(x: Rational, y: Rational, plane: Plane, axis: int) -> Homogeneous:
-    """Return the point of a plane whose coordinates other than ``axis`` are (x, y), homogeneous."""
+    """Return the homogeneous point of a plane that projects to (x, y) along ``axis``, to which the plane is not
+    parallel; x, y: the coordinates after the axis, in cyclic order."""
     j, k, n = (axis + 1) % 3, (axis + 2) % 3, abs(plane[axis])
     w, sign = x.denominator * y.denominator, sign_of(plane[axis])
     xw, yw = x.numerator * y.denominator, y.numerator * x.denominator
@@ -174,7 +178,8 @@ def _segment(p: Rational2, q: Rational2) -> Trace:
 
 
 def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget, only: Only | None) -> list[Trace]:
-    """Return the segments where other faces intersect the plane of a face, near the face, projected along its axis."""
+    """Return the segments in which faces of `cutters` meet the plane of a face of `body`, near the face, projected
+    along its axis. only: as in `regions_of`, the faces that count and the side to which they reach."""
     low, high = _around(body, [(*p, 1) for p in body.corners(face)])
     segments = set()
     for cutter in cutters:
@@ -190,8 +195,8 @@ def _traces(body: ExactBody, face: int, cutters: list[ExactBody], budget: Budget
 
 
 def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
-    """Return the segments in which a face intersects a plane, projected along ``axis``; values: its corners' in the
-    plane's equation."""
+    """Return the segments in which a triangle meets a plane, projected along ``axis``: none, one, or its three edges if
+    it lies in the plane. values: its corners' in the plane's equation."""
     if not any(values):
         return [(drop_axis(points[i], axis), drop_axis(points[i - 2], axis)) for i in range(3)]
     flat = [drop_axis(p, axis) for p in points]
@@ -206,7 +211,8 @@ def _trace(points: Corners, values: list[int], axis: int) -> list[Trace]:
 def _sample_regions(
     body: ExactBody, face: int, traces: list[Trace], budget: Budget
 ) -> Iterator[tuple[Rational2, _Cell]]:
-    """Yield a point in every region into which `traces` cut a face, and the trapezoid that contains it, projected."""
+    """Yield a point in every region into which `traces` cut a face, and the trapezoid (`_Cell`) that contains the
+    point; both projected along the face's axis."""
     corners = [drop_axis(corner, body.axis(face)) for corner in body.corners(face)]
     own = [_segment(corners[i], corners[i - 2]) for i in range(3)]
     left, right = min(p[0] for p, _ in own), max(q[0] for _, q in own)
@@ -232,7 +238,8 @@ def _sample_regions(
 
 
 class _Segment(NamedTuple):
-    """A planar segment: its ends, the same as integers (x, y, w), left and right, and its line a x + b y + c = 0."""
+    """A planar segment. ends: the left one first; left, right: the same as homogeneous integers (x, y, w); line: (a, b,
+    c) of its line a x + b y + c = 0."""
 
     ends: Trace
     left: Vector
@@ -258,7 +265,7 @@ def _height(s: _Segment, x: Rational) -> Fraction:
 
 
 def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
-    """Return the abscissa of the crossing of two segments in a point inside both, else None."""
+    """Return the abscissa of the point in which two segments cross, if it is inside both, else None."""
     for one, other in ((s, t), (t, s)):
         if sign_of(dot(one.line, other.left)) * sign_of(dot(one.line, other.right)) >= 0:
             return None
@@ -269,8 +276,8 @@ def _crossing_abscissa(s: _Segment, t: _Segment) -> Fraction | None:
 def pieces_of_segment(
     body: ExactBody, ends: tuple[Vector, Vector], cutter: ExactBody, budget: Budget
 ) -> Iterator[Homogeneous]:
-    """Yield a point inside each piece into which the faces of `cutter` cut a segment, homogeneous; some may lie on a
-    face."""
+    """Yield the homogeneous midpoint of each piece into which the faces of `cutter` cut the segment `ends`, given on
+    the lattice of `body`; some may lie on a face."""
     p, q = ends
     low, high = _around(body, [(*p, 1), (*q, 1)])
     stops = {Fraction(0), Fraction(1)}

@@ -74,7 +74,7 @@ first_face: the least in the first component. has_inside: False for surfaces and
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshBody:
-    """Triangles of one body. arrays: input of kernels; shift: every coordinate times 2^shift is an integer."""
+    """Triangles of one body. arrays: input of kernels; shift: k such that every coordinate times 2^k is an integer."""
 
     arrays: MeshArrays
     shift: int
@@ -114,9 +114,9 @@ def build_mesh_body(solid: Solid) -> MeshBody:
 
 
 def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:
-    """Build the mesh of checked arrays; faces: the caller's face number of each triangle. Triangles and vertices are
-    copied in the order of the tree, so that faces near a contact are close in memory; large meshes under many poses
-    depend on it."""
+    """Build the mesh of checked vertices (n, 3) and triangles (m, 3). faces (m,): the caller's face number of each
+    triangle; has_inside: False for a surface. Triangles and vertices are copied in the order of the tree, so that faces
+    near a contact are close in memory; large meshes under many poses depend on it."""
     vertices, triangles, faces = read_only(vertices), read_only(triangles), read_only(faces)
     n_triangles = len(triangles)
     boxes = np.empty((n_triangles, 6))
@@ -150,10 +150,10 @@ def _reorder_by_tree(
 ) -> tuple[int, int, int]:  # fmt: skip
     """Renumber triangles and vertices in the order of the tree's leaves.
 
-    child: of the tree, rewritten. Filled: order (n,), the old number of each triangle; ordered (n, 3), its vertices;
-    used (n_vertices, 3), their coordinates; axis (n,), `axis_of`; components, the first triangle of each. Returns the
-    numbers of vertices and components, and the least face connected with the first triangle.
-    """
+    child: of the tree, its leaf entries rewritten. Filled: order (n,), the old number of each triangle; ordered (n, 3),
+    its vertices; used (n_vertices, 3), their coordinates; axis (n,), `axis_of`; components, the first triangle of each
+    set of triangles connected through vertices. Returns the number of used vertices, the number of components, and the
+    least face number in the component of the first triangle."""
     n_triangles = n_used = n_components = 0
     number = np.full(vertices.shape[0], -1, np.int64)
     for node in range(child.shape[0]):
@@ -191,8 +191,8 @@ def _reorder_by_tree(
 def _fill_blocks(
     vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float, blocks: Float32Array
 ) -> None:
-    """Fill blocks (n_nodes, 9, 8) of leaf nodes with the corners of their triangles (x, y, z of each), in tree
-    coordinates."""
+    """Fill blocks (n_nodes, 9, 8) at the leaf nodes of a tree with the corners of their triangles (x, y, z of each),
+    one triangle a lane, in tree coordinates (p - origin) / scale; `NOWHERE` in unused lanes."""
     for node in range(child.shape[0]):
         if child[node, 0] >= 0:
             continue
@@ -208,8 +208,8 @@ def _fill_blocks(
 
 @kernel
 def _lattice_of(vertices: FloatArray) -> tuple[float, int, int]:
-    """Return the largest |coordinate|; the largest k such that 2^k divides all coordinates (0 if all are zero); and
-    some k >= 0 such that every coordinate times 2^k is an integer."""
+    """Return the largest |coordinate|; the largest k such that 2^k divides all coordinates; and some k >= 0 such that
+    every coordinate times 2^k is an integer. All are 0 if all coordinates are."""
     reach, lowest, smallest = 0.0, 2000, 2000
     for vertex in range(vertices.shape[0]):
         for k in range(3):
@@ -247,7 +247,8 @@ def _box_triangles(box: Aabb) -> tuple[FloatArray, IntArray, IntArray]:
 
 @inline
 def axis_of(t: Facet) -> int:
-    """Return an axis along which the projection of a triangle has an area, NO_AREA or UNKNOWN_AXIS."""
+    """Return an axis (0, 1, 2) along which the projection of a triangle has an area; NO_AREA if there is none,
+    UNKNOWN_AXIS if a sign is undecided."""
     n = cross(minus(t.q, t.p), minus(t.r, t.p))
     x, y, z = abs(n.x), abs(n.y), abs(n.z)
     best = 0 if (x >= y and x >= z) else (1 if y >= z else 2)
@@ -271,14 +272,16 @@ def triangle_of(mesh: MeshArrays, item: int) -> Facet:
 
 @inline
 def in_tree(mesh: MeshArrays, p: Point3) -> Point3:
-    """Return a point of the body's coordinates in the coordinates of its tree, (p - origin) / scale, rounded."""
+    """Return a point in the coordinates of a mesh's tree, (p - origin) / scale, rounded; p: in the body's own
+    coordinates."""
     o, scale = mesh.origin, mesh.scale
     return Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale)
 
 
 @kernel
 def join_vertices(triangles: IntArray, left_out: BoolArray, parent: IntArray) -> None:
-    """Set parent (n_vertices,) to one representative for all vertices connected by triangles that are not left out."""
+    """Set parent (n_vertices,) to one representative vertex for all vertices connected by triangles (m, 3) that are not
+    left out, left_out (m,) being False."""
     _union(triangles, left_out, parent)
 
 

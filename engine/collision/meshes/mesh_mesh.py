@@ -40,8 +40,9 @@ from engine.types import FloatArray, IntArray, Relation
 
 
 def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
-    """Return whether both bodies are inside on one side of some region of a face, and whether the face has a point
-    inside the other body. own: 0 or 1, the body of the face. The second result is valid if the first is False."""
+    """Return (overlaps, pierces) for a face in contact. overlaps: on one side of some region of the face both bodies
+    are inside, so their open interiors intersect. pierces: the face has a point inside the other body; valid if
+    overlaps is False. own: 0 or 1, the body of the face."""
     body, other = pair.exact[own], pair.exact[1 - own]
     axis = body.axis(face)
     if axis < 0:
@@ -67,7 +68,8 @@ def inspect_regions(pair: MeshPair, own: int, face: int) -> tuple[bool, bool]:
 
 
 def pierces_without_area(pair: MeshPair, own: int, face: int) -> bool:
-    """Return whether a face of body `own` that is only a segment has a point in the other body's open interior."""
+    """Return whether a face of body `own` (0, 1) that is only a segment has a point in the other's open interior; False
+    for other faces."""
     body, other = pair.exact[own], pair.exact[1 - own]
     if body.axis(face) >= 0 or not other.mesh.has_inside:
         return False
@@ -99,7 +101,8 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
 def relation_from_kernel(
     first: MeshBody, second: MeshBody, posed: PosedPair, work: Work
 ) -> Collision | tuple[list[int], Contacts]:
-    """Return the kernel's answer if that is complete, else the row and the contacts that `relate` returns."""
+    """Return the `Collision` of two posed meshes by the kernel if its answer is complete, the witness included if
+    requested; else the row and the contacts that `relate` returns."""
     seek = search_goal(first, second, work)
     row, contacts = relate(first, second, posed, seek, work)
     relation, kind, face, their_face, n = row
@@ -116,8 +119,9 @@ def relation_from_kernel(
 
 @lru_cache(1 << 14)
 def decode_row(relation: int, kind: int, face: int, their_face: int, pierces: bool) -> Collision | None:
-    """Return the answer encoded in a row of `relate_poses`, None if incomplete. Cached, since constructing one costs
-    more than a search. pierces: the contact shows a surface inside the other body."""
+    """Return the answer encoded in a row of `relate_poses` by its relation, kind of contact and the two faces; None if
+    relation or kind is UNSETTLED. pierces: the contact shows a surface inside the other body. Cached, since
+    constructing one costs more than a search."""
     if relation == DISJOINT:
         return NO_CONTACT
     if UNSETTLED in (relation, kind):
@@ -127,7 +131,8 @@ def decode_row(relation: int, kind: int, face: int, their_face: int, pierces: bo
 
 
 def _relation(pair: MeshPair) -> Collision:
-    """Return the relation of a pair: decided by its contacts, else by its patches, else by regions."""
+    """Return the relation of a pair: by its contacts if they decide it, else by its patches (connected faces without
+    contact), else by regions of the faces in contact."""
     contacts = pair.contacts
     if pair.is_settled:
         relation = Relation.OVERLAPPING if pair.seek == SEEK_OVERLAP else Relation.TOUCHING
@@ -147,8 +152,8 @@ def _relation(pair: MeshPair) -> Collision:
 
 
 def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collision:
-    """Return OVERLAPPING or TOUCHING for a pair that meets; no crossing proves OVERLAPPING. patches: by body, sets of
-    its faces without contact, connected through vertices, that lie inside the other body."""
+    """Return OVERLAPPING or TOUCHING for a pair that meets, but of which no crossing proves OVERLAPPING. patches: by
+    body, the sets of its connected faces without contact that lie inside the other body."""
     contacts, piercing = pair.contacts, bool(patches[0] or patches[1])
     both = pair.meshes[0].has_inside and pair.meshes[1].has_inside
     for own in (0, 1):
@@ -175,7 +180,8 @@ def _overlap_or_touch(pair: MeshPair, patches: list[list[IntArray]]) -> Collisio
 
 
 def _containment(pair: MeshPair, relation: Relation, own: int, patch: IntArray, *, piercing: bool = False) -> Collision:
-    """Return a relation whose witness is a patch of body `own` inside the other body."""
+    """Return `relation` with a containment as witness: the least face of `patch`, faces of body `own` (0, 1) that lie
+    inside the other body. piercing: the value of `Witness.piercing`."""
     face = int(pair.meshes[own].faces[patch].min())
     answer = decode_row(relation, CONTAINED, *((face, -1), (-1, face))[own], piercing)
     return answer if pair.work.witness and answer is not None else UNNAMED[relation]
@@ -226,7 +232,8 @@ class _OverlappingPair(MeshPair):
         return Parts(first, second, len(self.contacts) > 0)
 
     def _search(self, contacts: IntArray) -> None:
-        """Inspect patches, then faces in contact, until both bodies are known to stick out or all are inspected."""
+        """Inspect patches, then faces in contact, until both bodies are known to stick out of each other or all are
+        inspected. contacts (n, 2): face of the first and of the second body."""
         for own in (0, 1):
             for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
                 for patch in self.patches(own, contacts[:, own], place):
@@ -244,8 +251,8 @@ class _OverlappingPair(MeshPair):
                     return
 
     def _record_region(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
-        """Record which body has a part outside the other, by the `Sides` of body `own` (ours) and the other (theirs) at
-        a region."""
+        """Record which body has a part outside the other, judging by one region of a face of body `own` (0, 1). ours,
+        theirs: whether body `own`, and the other, is inside above and below the region."""
         for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
             if mine and not other:
                 self._sticks_out[own] = True
@@ -253,8 +260,8 @@ class _OverlappingPair(MeshPair):
                 self._sticks_out[1 - own] = True
 
     def _record_face(self, own: int, face: int, kinds: set[int]) -> None:
-        """Record which body has a part outside the other near a face of body `own`; kinds: details of the face's
-        contacts."""
+        """Record which body has a part outside the other near a face of body `own` (0, 1). kinds: what
+        `classify_in_detail` wrote for the face's contacts: NO_SHARED_AREA + bits of cut faces, SAME_SIDE, OPPOSITE."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:

@@ -43,7 +43,7 @@ SPACE = _WorkSpace()
 
 
 def unless_identity(poses: Poses) -> Poses:
-    """Return both poses, None in place of the identity."""
+    """Return both poses, None in place of a pose that is the identity."""
     a, b = poses
     return None if a is None or a.is_identity else a, None if b is None or b.is_identity else b
 
@@ -52,9 +52,10 @@ def relate(
     first: MeshBody, second: MeshBody, posed: PosedPair, seek: int, work: Work, known: dual.Contacts | None = None,
     n_named: int | None = None,
 ) -> tuple[list[int], dual.Contacts]:  # fmt: skip
-    """Return the relation row (N_COLUMNS,) int64 of two posed meshes, and their contacts, valid until the thread's next
-    call. known: the contacts and their classes, if computed already. n_named: number of contacts from which the witness
-    is chosen; None: as `work` requests."""
+    """Return the row (N_COLUMNS,) of `relate_poses` for two posed meshes, and their contacts, valid until the thread's
+    next call. seek: goal of the search (SEEK_...); known: contacts and their classes if computed already, so that no
+    search runs; n_named: number of contacts from which the witness is chosen, None: as `work` requests. The room for
+    contacts is enlarged until all fit."""
     contacts, n_known = (SPACE.contacts, 0) if known is None else (known, len(known.kinds))
     n_named = (N_NAMED if work.witness else 0) if n_named is None else n_named
     room = len(contacts.kinds)
@@ -83,13 +84,14 @@ def search_goal(first: MeshBody, second: MeshBody, work: Work) -> int:
 
 
 class MeshPair:
-    """One query: kernel results, and the exact coordinates computed so far.
+    """One query about two meshes: kernel results, and the exact coordinates computed so far.
 
     | field | meaning |
     |---|---|
     | row | row of `relate_poses` |
-    | contacts | (n, 2) pairs of faces in contact, in order; if is_settled, the decisive one |
-    | kinds | (n,) their classes, or what `relate_poses` writes there |
+    | is_settled | whether one contact decided the query |
+    | contacts | (n, 2) faces of either body in contact, in order; if is_settled, the decisive pair alone |
+    | kinds | (n,) their classes, or what `relate_poses` writes in their place |
     """
 
     def __init__(self, first: MeshBody, second: MeshBody, poses: Poses, work: Work, n_named: int | None = None) -> None:
@@ -109,7 +111,8 @@ class MeshPair:
         return self._exact
 
     def find_contacts(self, seen: tuple[list[int], dual.Contacts] | None = None) -> None:
-        """Compute all contacts, their classes exact. seen: the result of `relate`, if the pair was related already."""
+        """Compute all contacts, their classes exact. seen: the row and contacts that `relate` returned, if it has run
+        for the pair."""
         self.row, room = seen or relate(*self.meshes, self.posed, self.seek, self.work, n_named=self.n_named)
         self.work.budget.check()
         n, self.is_settled = abs(self.row[N_CONTACTS]), self.row[N_CONTACTS] == ONE_SETTLES
@@ -119,7 +122,8 @@ class MeshPair:
             self._settle_classes(self.kinds)
 
     def _settle_classes(self, kinds: Int8Array) -> None:
-        """Decide exactly the classes that kernels left UNDECIDED, then relate the pair again by all contacts."""
+        """Decide exactly those classes in kinds (n,) that kernels left UNDECIDED, drop pairs of faces that are APART,
+        and relate the pair again by the remaining contacts. Stops at a contact that decides the query (is_settled)."""
         open_ones = np.flatnonzero(kinds == UNDECIDED)
         self.work.n_rational += len(open_ones)
         a, b = self.exact
@@ -137,7 +141,8 @@ class MeshPair:
             self.work.budget.check()
 
     def _is_settled_by(self, kind: int, i: int, j: int) -> bool:
-        """Return whether a contact of an exact class decides the query: the rule of `dual_traversal.is_decisive`."""
+        """Return whether a contact of faces i and j of an exact class `kind` decides the query: the rule of
+        `dual_traversal.is_decisive`."""
         if self.seek == dual.SEEK_CONTACT:
             return True
         if kind != CROSSING:
@@ -150,8 +155,8 @@ class MeshPair:
         return STATE_CLEAN in (first, second) and STATE_STACKED not in (first, second)
 
     def named(self, *, piercing: bool = False) -> Witness | None:
-        """Return the witness: the strongest of the first contacts, among equals that of the lowest faces; None if not
-        requested."""
+        """Return the witness: the strongest of the first N_NAMED contacts, among equals that of the lowest faces; None
+        if not requested. piercing: the value of `Witness.piercing`."""
         if not self.work.witness:
             return None
         best = tuple(self.row[KIND:N_CONTACTS])
@@ -172,8 +177,9 @@ class MeshPair:
         return state_at(self.meshes[own].arrays, face)
 
     def patches(self, own: int, in_contact: IntArray, place: int) -> list[IntArray]:
-        """Return the patches (connected faces without contact) of body `own` whose location in the other body is
-        ``place``. in_contact: its faces in contact. Each patch is an array of faces."""
+        """Return the patches (faces without contact, connected through vertices) of body `own` that lie at ``place`` in
+        the other body, INSIDE or OUTSIDE, each as an array of faces. in_contact: the faces of `own` in contact. None
+        lie anywhere if the other body has no inside."""
         mesh, other = self.meshes[own], self.meshes[1 - own]
         if not other.has_inside:
             return []
@@ -198,8 +204,9 @@ class MeshPair:
         return [free_faces[roots == vertex] for vertex in vertices[locations == place]]
 
     def patch_sides(self, own: int, patch: IntArray) -> Iterator[Sides]:
-        """Yield, for each region of a patch (set of faces), whether body `own` is inside just above, just below and at
-        it. Only one result is yielded, which suffices, if some face separates inside from outside throughout."""
+        """Yield the `Sides` of body `own` (inside just above, just below, at) at each region of a patch, an array of
+        its faces. If some face is not STATE_STACKED, it separates inside from outside throughout: then one result, with
+        one side inside, is yielded for the whole patch."""
         body = self.exact[own]
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):

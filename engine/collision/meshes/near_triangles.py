@@ -35,8 +35,8 @@ _AS_GOOD: Final = 1.0 - 2.0**-45
 
 
 class Nearest(NamedTuple):
-    """Nearest points so far, p on the first and q on the second triangle, their features (codes above), squared
-    distance."""
+    """The nearest pair of points so far: p on the first and q on the second triangle; first, second: codes of the
+    features that they lie on (above); square: their squared distance."""
 
     p: Point3
     q: Point3
@@ -57,13 +57,14 @@ def _clamped(value: float) -> float:
 
 @merged
 def _end_or_edge(t: float, k: int) -> int:
-    """Return the feature code of the point at parameter t (0 .. 1) of edge k: a vertex at either end, else the edge."""
+    """Return the feature code of the point at parameter t (0 .. 1) of edge k of a triangle: a vertex at either end,
+    else the edge."""
     return k if t <= 0.0 else ((k + 1) % 3 if t >= 1.0 else 3 + k)
 
 
 @inline
 def _nearest_on_edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Nearest:
-    """Return the closest points of edge i of s and edge j of t, or `best` if these are no nearer."""
+    """Return the closest points of edge i of triangle s and edge j of t, or `best` if these are no nearer."""
     a, c = corner(s, i), corner(t, j)
     u, v = minus(corner(s, i + 1), a), minus(corner(t, j + 1), c)
     w = minus(a, c)
@@ -82,8 +83,9 @@ def _nearest_on_edges(best: Nearest, s: Facet, i: int, t: Facet, j: int) -> Near
 
 @inline
 def _project_to_triangle(p: Point3, t: Facet) -> tuple[bool, Point3]:
-    """Return whether the foot of p on the plane of t lies in the triangle, and the foot. The foot is a convex
-    combination of the corners: a point of the triangle even if the normal of a needle is badly rounded."""
+    """Return whether the foot of p on the plane of t lies in the triangle, and the foot; False and p if t has no area.
+    The foot is a convex combination of the corners: a point of the triangle even if the normal of a needle is badly
+    rounded."""
     u, v, w = minus(t.q, t.p), minus(t.r, t.p), minus(p, t.p)
     normal = cross(u, v)
     size = dot(normal, normal)
@@ -94,7 +96,8 @@ def _project_to_triangle(p: Point3, t: Facet) -> tuple[bool, Point3]:
 
 
 class SlabBounds(NamedTuple):
-    """Lower bound ``low`` and upper bound ``size`` on the distance of two triangles, and whether the search may end."""
+    """Bounds on the distance of two triangles, as computed: ``low`` from below, ``size`` from above; is_done: they are
+    as close as rounding allows, or low exceeds the limit of the search."""
 
     low: float
     size: float
@@ -103,8 +106,8 @@ class SlabBounds(NamedTuple):
 
 @inline
 def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, most: float) -> SlabBounds:
-    """Return the bounds for new nearest points: from below by the slab between the triangles across the line of the
-    points. most: a lower bound above it ends the search."""
+    """Return the bounds `before` tightened by new nearest points: from above by their distance, from below by the width
+    of the slab between the triangles across the line of the points. most: a lower bound above it ends the search."""
     gap = minus(nearest.q, nearest.p)
     largest = largest_of(gap)
     if not largest > 0.0:
@@ -117,8 +120,9 @@ def _bound_by_slab(s: Facet, t: Facet, nearest: Nearest, before: SlabBounds, mos
 
 @inline
 def nearest_points(s: Facet, t: Facet, most: float) -> tuple[Nearest, SlabBounds]:
-    """Return nearly nearest points of two disjoint triangles, and bounds on the distance. If the triangles are proven
-    farther apart than `most`, the points are any."""
+    """Return nearly nearest points of two disjoint triangles, and bounds on the distance, without the rounding of
+    `rounding_bound`. The search ends once the triangles are proven farther apart than `most`; the points are then any
+    points of the two."""
     best, across = Nearest(s.p, t.p, 0, 0, np.inf), SlabBounds(-np.inf, np.inf, False)
     for i in range(3):
         for j in range(3):
@@ -149,6 +153,7 @@ def relative_to(origin: Point3, s: Facet) -> Facet:
 
 @inline
 def rounding_bound(s: Facet, t: Facet) -> float:
-    """Return a bound on the rounding error of `nearest_points`; s, t: given relative to a point near them."""
+    """Return a bound on the rounding error of the distances that `nearest_points` computes; s, t: its input, given
+    relative to a point near both."""
     largest = max(largest_of(s.p), largest_of(s.q), largest_of(s.r))
     return _ROUNDING * max(largest, largest_of(t.p), largest_of(t.q), largest_of(t.r)) + _TINY

@@ -78,7 +78,7 @@ def perturbed_side(a: Point3, b: Point3, q: Point3, error: float) -> int:
 @inline
 def ray_crosses(t: Facet, q: Point3, error: float) -> int:
     """Return where the vertical line through q, moved by (eps, eps^2), intersects t. 1: above q, -1: below q, 0: at q;
-    MISSED or UNDECIDED."""
+    MISSED or UNDECIDED. error: bound on each coordinate of q."""
     p_side, q_side = perturbed_side(t.p, t.q, q, error), perturbed_side(t.q, t.r, q, error)
     r_side = perturbed_side(t.r, t.p, q, error)
     has_left = p_side == 1 or q_side == 1 or r_side == 1
@@ -95,7 +95,7 @@ def ray_crosses(t: Facet, q: Point3, error: float) -> int:
 
 
 class OwnPoint(NamedTuple):
-    """A point in a body's own coordinates, each off by at most `error`."""
+    """A point in the own coordinates of a body, before its pose; each coordinate is off by at most `error`."""
 
     point: Point3
     error: float
@@ -103,10 +103,10 @@ class OwnPoint(NamedTuple):
 
 @inline
 def to_local_frame(p: Point3, source: Placement, target: Placement, defect: float) -> OwnPoint:
-    """Return a point of the body placed by `source` in the own coordinates of the body placed by `target`. defect:
-    `placement.defect_of` the target's rotation; the transpose replaces the inverse, with an error of 3.1 defect
-    relative to the vector. A rotated vector has components up to 1.74 times as large, and so has its error.
-    """
+    """Return a point p of the body placed by `source`, given before that placement, in the own coordinates of the body
+    placed by `target` (its pose frame). defect: `defect_of` target; the transpose replaces the inverse rotation, with
+    an error of 3.1 defect relative to the vector. A rotated vector has components up to 1.74 times as large, and so has
+    its error."""
     q = placed(p, source)
     if not target.is_posed:
         return OwnPoint(q, source.error)
@@ -126,7 +126,8 @@ def _rotate_axis_last(p: Point3, axis: int) -> Point3:
 
 @allocating
 def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
-    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED: the location of a point in a mesh, by ray parity."""
+    """Return the location of a point in a mesh by ray parity: INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED. own: the
+    point in the mesh's own coordinates."""
     where = locate_along(own, mesh, 2, -1)
     for axis in range(2 if where == UNDECIDED else 0):  # another ray may miss the edges
         where = locate_along(own, mesh, axis, -1) if where == UNDECIDED else where
@@ -135,8 +136,8 @@ def locate_point(own: OwnPoint, mesh: MeshArrays) -> int:
 
 @allocating
 def locate_along(own: OwnPoint, mesh: MeshArrays, axis: int, left_out: int) -> int:
-    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED by the ray along one axis; face ``left_out`` is not counted
-    (-1: all are)."""
+    """Return INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED: the location of a point in a mesh, by the parity of the faces
+    on the ray from it along ``axis``, upward. left_out: a face that is not counted, -1 for none."""
     q, error = own.point, own.error
     local, slack = in_tree(mesh, q), SLACK + error / mesh.scale
     if not (slack < 1.0 and np.isfinite(local.x + local.y + local.z)):  # case: the ends of the exponent range
@@ -169,8 +170,8 @@ def locate_vertices(
     source: MeshArrays, source_pose: PoseArrays, vertices: IntArray, mesh: MeshArrays, pose: PoseArrays,
     locations: Int8Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill locations (n,) int8 with INSIDE, OUTSIDE, 0 or UNDECIDED for vertices (n,) of `source` in `mesh`, both
-    posed."""
+    """Fill locations (n,) int8 with INSIDE, OUTSIDE, 0 (on a face) or UNDECIDED for n vertices, given by index, of mesh
+    `source` in `mesh`, each under the only pose of its pose arrays. Stops early when the flag is set."""
     a, b = place_pair(source.extent, source_pose, 0, mesh.extent, pose, 0)
     defect = defect_of(b)
     for item in range(vertices.shape[0]):
@@ -188,7 +189,8 @@ ABOVE_ALL = 1e6
 
 @inline
 def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
-    """Return the low and the high end of the box from a to b, enlarged by slack, as triples of float32."""
+    """Return the low and the high corner, as triples of float32, of the box from a to b in tree coordinates, enlarged
+    by slack and cut off at ABOVE_ALL."""
     x, y, z = max(a.x - slack, -ABOVE_ALL), max(a.y - slack, -ABOVE_ALL), max(a.z - slack, -ABOVE_ALL)
     p, q, r = min(b.x + slack, ABOVE_ALL), min(b.y + slack, ABOVE_ALL), min(b.z + slack, ABOVE_ALL)
     return (np.float32(x), np.float32(y), np.float32(z)), (np.float32(p), np.float32(q), np.float32(r))
@@ -196,8 +198,9 @@ def box_between(a: Point3, b: Point3, slack: float) -> tuple[Any, Any]:
 
 @inline
 def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any]) -> tuple[int, int]:
-    """Return the next face whose box intersects ``box``, -1 if there is none left, and the new height of the stack.
-    stack (STACK,) int32: nodes, and faces coded as in `MeshArrays.child`; on entry the root, 0."""
+    """Return the next face of a mesh whose box intersects ``box`` (in tree coordinates), -1 if there is none left, and
+    the new height of the stack of n entries. stack (STACK,) int32: nodes, and faces coded as in `MeshArrays.child`; on
+    entry the root, 0."""
     while n > 0:  # bound: each node and face enters once
         n -= 1
         child = int(stack[n])
@@ -213,14 +216,15 @@ def next_face(mesh: MeshArrays, stack: Int32Array, n: int, box: tuple[Any, Any])
 
 @inline
 def side_of_corner(mesh: MeshArrays, face: int, t: Facet, other: int, k: int, p: Point3) -> int:
-    """Return the side (orient3d) of the plane of face t on which p, corner k of face ``other``, lies; 0 if t has that
-    vertex."""
+    """Return the side of the plane of face ``face``, with corners t, on which p lies, corner k of face ``other`` of the
+    same mesh: the sign of orient3d; 0 without arithmetic if that corner is a vertex of ``face``."""
     return 0 if is_corner(mesh, face, other, k) else orient3d(t.p, t.q, t.r, p)
 
 
 @inline
 def update_state(mesh: MeshArrays, face: int, other: int, poses: FloatArray) -> int:
-    """Return the state (STATE_...) of `face`, which has an area, if ``other`` were the only other face of the body."""
+    """Return the state that ``face``, which has an area, would have if ``other`` were the only other face of the body:
+    STATE_CLEAN, STATE_CROSSED or STATE_STACKED (also if a sign is undecided). poses: any (n, 12) array, not read."""
     if mesh.axis[other] == -1:
         return STATE_CLEAN
     if mesh.axis[other] < 0:
@@ -262,7 +266,7 @@ def is_corner(mesh: MeshArrays, face: int, other: int, k: int) -> bool:
 @inline
 def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
     """Return the state (STATE_...) of a face, computed at first use; STATE_STACKED without area. poses: any (n, 12)
-    array, unused values."""
+    array, not read."""
     if mesh.state[face] == STATE_UNKNOWN:
         mesh.state[face] = state_among(mesh, face, poses) if mesh.axis[face] >= 0 else STATE_STACKED
     return int(mesh.state[face])
@@ -270,7 +274,8 @@ def state_of(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @allocating
 def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Compute the state of a face with area, from all other faces whose boxes intersect its box."""
+    """Compute the state of a face with area: the worst that any other face of the body whose box intersects its box
+    gives it."""
     t = triangle_of(mesh, face)
     p, q, r = in_tree(mesh, t.p), in_tree(mesh, t.q), in_tree(mesh, t.r)
     low = Point3(min(p.x, q.x, r.x), min(p.y, q.y, r.y), min(p.z, q.z, r.z))
@@ -287,7 +292,8 @@ def state_among(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @inline
 def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses: FloatArray) -> bool:
-    """Return whether a strict crossing of face i and face j proves that the open interiors of both bodies intersect."""
+    """Return whether the open interiors of both bodies intersect, given that face i of the first and face j of the
+    second cross strictly: neither is stacked and one is clean."""
     a = state_of(first, i, poses)
     if a == STATE_STACKED:
         return False
@@ -322,7 +328,8 @@ SIDE_UNKNOWN: Final = 2
 
 @called
 def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
-    """Return a point inside a face, ``item`` 0, 1 or 2, with corner weights (1, 1, 1), (1, 1, 2) or (2, 1, 1)."""
+    """Return a point inside a face, rounded, with the bound on its error. item: 0, 1 or 2, for corner weights (1, 1,
+    1), (1, 1, 2) or (2, 1, 1)."""
     t = triangle_of(mesh, face)
     u, v = 2.0 if item == 2 else 1.0, 2.0 if item == 1 else 1.0
     w = 3.0 if item == 0 else 4.0
@@ -334,8 +341,8 @@ def point_within(mesh: MeshArrays, face: int, item: int) -> OwnPoint:
 
 @allocating
 def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
-    """Return 1 if the body lies on the side of a face to which its normal points, -1 if on the other, or SIDE_UNKNOWN;
-    cached. poses: any (n, 12) array, unused values."""
+    """Return the side of a face on which its body lies: 1 that of its normal, -1 the other, SIDE_UNKNOWN for a face
+    that is not clean or where no sample point decides. Cached. poses: any (n, 12) array, not read."""
     if mesh.inner[face] == 0:
         mesh.inner[face] = _side_of_clean(mesh, face) if state_of(mesh, face, poses) == STATE_CLEAN else SIDE_UNKNOWN
     return int(mesh.inner[face])
@@ -343,8 +350,8 @@ def inner_side(mesh: MeshArrays, face: int, poses: FloatArray) -> int:
 
 @allocating
 def _side_of_clean(mesh: MeshArrays, face: int) -> int:
-    """Compute `inner_side` of a STATE_CLEAN face (not crossed or covered by others) by ray parity from points inside
-    it."""
+    """Compute `inner_side` of a face of STATE_CLEAN (not crossed or covered by others): 1, -1 or SIDE_UNKNOWN, by ray
+    parity from points inside it."""
     axis, t = int(mesh.axis[face]), triangle_of(mesh, face)
     turn = orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
     for item in range(3):

@@ -13,7 +13,7 @@ a lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so do
                  <= 7.1 u reach + 5.1 u |t| + 4 h
                  <  error = 2^-50 (3 reach + max |t|) + 2^-1060
 
-**Frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with their
+**Pose frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with their
 margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of two
 bodies give
 
@@ -37,7 +37,8 @@ from engine.types import UNDECIDED, Float32Array, FloatArray, Point2, Point3
 
 
 class PoseArrays(NamedTuple):
-    """Poses of a body for kernels: rotations (n, 3, 3), translations (n, 3); is_posed: False if it has no pose."""
+    """Poses of a body for kernels: rotations (n, 3, 3), translations (n, 3); is_posed: False if the body has no pose,
+    the arrays then being the identity."""
 
     rotations: FloatArray
     translations: FloatArray
@@ -45,9 +46,8 @@ class PoseArrays(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """A pose ready for use: rows x, y, z of the rotation, translation, and a bound on the rounding of a coordinate (0:
-    exact).
-    """
+    """A pose ready for use: rows x, y, z of the rotation; shift, the translation; is_posed, False for no pose; error, a
+    bound on the rounding of a placed coordinate (0: exact)."""
 
     x: Point3
     y: Point3
@@ -66,7 +66,7 @@ class Extent(NamedTuple):
 
 @merged
 def as_placement(pose: PoseArrays, item: int, shift: Point3, error: float) -> Placement:
-    """Return the placement with the rotation of pose ``item`` and the given translation and error."""
+    """Return the placement with the rotation of pose number ``item`` and the given translation and error."""
     r, i = pose.rotations, item
     x, y = Point3(r[i, 0, 0], r[i, 0, 1], r[i, 0, 2]), Point3(r[i, 1, 0], r[i, 1, 1], r[i, 1, 2])
     return Placement(x, y, Point3(r[i, 2, 0], r[i, 2, 1], r[i, 2, 2]), shift, pose.is_posed, error)
@@ -94,7 +94,8 @@ def _largest_power_of_two(value: float) -> float:
 def place_pair(
     a: Extent, a_pose: PoseArrays, a_item: int, b: Extent, b_pose: PoseArrays, b_item: int
 ) -> tuple[Placement, Placement]:
-    """Return the placements of two bodies; of two posed bodies both are moved so that the first has no translation."""
+    """Return the placements of two bodies under pose number a_item of a_pose and b_item of b_pose. If both are posed,
+    both are moved by minus the first translation, so that the first has none."""
     s, t = as_point3(a_pose.translations, a_item), as_point3(b_pose.translations, b_item)
     none, apart = Point3(0.0, 0.0, 0.0), minus(t, s)
     shift, grain = largest_of(apart), min(a.grain, b.grain)
@@ -123,13 +124,13 @@ def placed(p: Point3, place: Placement) -> Point3:
 
 @merged
 def rotate(place: Placement, v: Point3) -> Point3:
-    """Return R v."""
+    """Return R v, R the rotation of a placement, rounded."""
     return Point3(dot(place.x, v), dot(place.y, v), dot(place.z, v))
 
 
 @merged
 def rotate_back(place: Placement, v: Point3) -> Point3:
-    """Return R' v, R' the transpose of the rotation R."""
+    """Return R' v, R' the transpose of the rotation R of a placement, rounded."""
     x, y, z = column(place, 0), column(place, 1), column(place, 2)
     return Point3(dot(x, v), dot(y, v), dot(z, v))
 
@@ -159,8 +160,8 @@ def orient2d_near(a: Point2, b: Point2, c: Point2, error: float) -> int:
 
 @inline
 def axis_at(axis: int, place: Placement) -> int:
-    """Return the axis onto which a placement maps a coordinate axis; caller guarantees that it permutes axes, or no
-    pose."""
+    """Return the axis onto which a placement maps a coordinate axis; a negative axis stays. Caller guarantees that the
+    rotation permutes axes, or that there is no pose."""
     if not place.is_posed or axis < 0:
         return axis
     there = column(place, axis)
@@ -190,9 +191,12 @@ def set_frame(
     frame: Float32Array, a: Placement, a_origin: FloatArray, a_scale: float, b: Placement, b_origin: FloatArray,
     b_scale: float, defect: float,
 ) -> bool:  # fmt: skip
-    """Fill frame (22, 8) float32 with the map a = M b + T from tree b to tree a and its margin, see the module.
+    """Fill frame (22, 8) float32 with the map a = M b + T from the tree coordinates of body b to those of body a, and
+    its margin (rows: `lanes/boxes.py`; derivation: top). a, b: placements; origin, scale: of either tree; defect: bound
+    on |R' R - I| of both.
 
-    Returns whether the trees are proven apart. |.| of vectors is the largest component; tree coordinates are at most 2:
+    Returns whether the trees are proven disjoint. |.| of vectors is the largest component; tree coordinates are at most
+    2:
 
         size   = (|o_a| + |o_b| + |t_b - t_a|) / s_a + 2 + 2 s_b / s_a
         margin = 2^-19 (2 + 3.5 s_b / s_a + |T|)      float32: M, T, sums of `meeting`: < 32 roundings

@@ -31,7 +31,8 @@ NO_SHARED_AREA, SAME_SIDE, OPPOSITE = 16, 20, 21
 
 @inline
 def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshArrays, place: Placement) -> int:
-    """Return how many components of `source` lie inside `mesh`, given that none is in contact with it, or UNSETTLED."""
+    """Return how many components (faces connected through vertices) of `source` lie inside `mesh`, each under its
+    placement, given that no faces meet; UNSETTLED if a location is undecided."""
     n_inside, defect = 0, defect_of(place)
     for item in range(source.components.shape[0] if mesh.has_inside else 0):
         p = as_point3(source.vertices, source.triangles[source.components[item], 0])
@@ -45,7 +46,8 @@ def n_components_inside(source: MeshArrays, source_place: Placement, mesh: MeshA
 
 @inline
 def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> int:
-    """Return the relation of two bodies without contact; UNSETTLED if only some of their components lie inside."""
+    """Return the relation code of two bodies without contact: disjoint or one inside the other; UNSETTLED if only some
+    components of a body lie inside the other."""
     in_second = n_components_inside(first, place.a, second, place.b)
     in_first = n_components_inside(second, place.b, first, place.a)
     if in_second == 0 and in_first == 0:
@@ -57,8 +59,9 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> 
 
 @called
 def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
-    """Fill the row of a pair from all its n contacts; the first n_named name the witness. Sorts the contacts; unless a
-    class is UNDECIDED, each class becomes DECIDED + bits of corners in the other face's plane."""
+    """Fill the row (N_COLUMNS,) of a pair from all its n contacts in ``s.contacts``, choosing the witness among the
+    first n_named. Sorts the contacts. If a class is UNDECIDED the row stays as it is; else the class of each contact
+    examined becomes DECIDED + bits, 3 a face, of the corners in the other face's plane."""
     pairs, kinds, _ = s.contacts
     first, second = s.first, s.second
     has_crossing = False
@@ -119,7 +122,8 @@ def classify_in_detail(s: dual.Search, n: int) -> None:
 
 @merged
 def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
-    """Return `classify_contact` of faces i and j; UNSETTLED and BOTH if one has no area."""
+    """Return what `classify_contact` gives for faces i and j: the kind of contact, and bits of the open faces that may
+    be cut; UNSETTLED and BOTH if one has no area."""
     t, u, axis, their_axis = dual.exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
         s.descent.signs[contact.FLUSH] = 0
@@ -129,8 +133,8 @@ def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
 
 @inline
 def sort_named_first(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
-    """Move the first N_NAMED of n pairs to the front, sorted: COPLANAR pairs first, then by the caller's faces, then by
-    index."""
+    """Move the first N_NAMED of n pairs of faces, with their classes, to the front, sorted: COPLANAR pairs first, then
+    by the caller's face numbers (`faces`, `their_faces`), then by index."""
     for item in range(1, n):
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
         key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item
@@ -149,12 +153,13 @@ def relate_poses(
     first: MeshArrays, second: MeshArrays, still: PoseArrays, poses: PoseArrays, seek: int, n_named: int,
     descent: dual.Descent, contacts: dual.Contacts, n_known: int, rows: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill rows (n, N_COLUMNS) int64 for n poses of the second body; still: the only pose of the first.
+    """Fill rows (n, N_COLUMNS) int64 (columns above) for n poses of the second body; still: the only pose of the first.
 
-    n_named: number of contacts from which the witness is chosen; 0: only relations are written; DETAIL: only the
-    details of the contacts. descent, contacts: work space; pairs with more contacts than fit, or without proof, are
-    UNSETTLED. The contacts of the last pose stay there. n_known: number of contacts of one pose already in `contacts`.
-    """
+    seek: goal that ends a search early (SEEK_...). n_named: number of contacts from which the witness is chosen; 0:
+    only relations are written; DETAIL: only the details of the contacts. descent, contacts: work space; pairs with more
+    contacts than fit, or without proof, are UNSETTLED. The contacts of the last pose stay there. n_known: number of
+    contacts of one pose that `contacts` holds already, so that no search runs; 0: search. Stops early when the flag is
+    set."""
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED

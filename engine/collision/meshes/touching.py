@@ -53,8 +53,8 @@ _SAMPLED = 16
 
 
 class Vertices(NamedTuple):
-    """Vertices (n, 3) of a body as input of exact signs, its placement, and its pose number (UNPOSED where placing is
-    exact)."""
+    """Vertices of a body as input of exact signs: points (n, 3) before the pose, its placement, and its pose number
+    (UNPOSED where placing rounds nothing)."""
 
     points: Any
     place: Placement
@@ -72,8 +72,9 @@ def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
 
 @called
 def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
-    """Return 1 or -1 if all n_samples vertices of a body lie on that closed side of a plane, 0 if all lie in it, else
-    UNDECIDED."""
+    """Return on which side of the plane through the corners of `plane` a body lies, by about n_samples of its vertices,
+    evenly spread (at least that many): 1 or -1 (closed sides), 0 if all lie in the plane, UNDECIDED if they are on both
+    sides or a sign is undecided."""
     common_side, n = 0, v.points.shape[0]
     for vertex in range(0, n, max(1, n // n_samples)):
         side = sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error)
@@ -85,7 +86,8 @@ def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_sa
 
 @called
 def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: float) -> bool:
-    """Return whether a plane separates the vertices of two bodies, which may touch it but not both lie in it."""
+    """Return whether the plane through the corners of `plane` is proven to separate two bodies, by all vertices; both
+    may touch it, but not both lie in it."""
     for n_samples in (_SAMPLED, max(len(u.points), len(v.points))):  # most planes cut the bodies in the middle
         side = side_of_all(poses, plane, u, error, n_samples)
         if side == UNDECIDED:
@@ -98,7 +100,8 @@ def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: 
 
 @called
 def are_separated(s: Search, first: int, n_faces: int) -> bool:
-    """Return whether the plane of a face in contacts ``first`` .. n_faces - 1 is proven to separate the bodies."""
+    """Return whether the plane of either face of one of the contacts ``first`` .. n_faces - 1 is proven to separate the
+    two bodies."""
     poses, error, is_exact = s.descent.poses, exact_error(s), s.place.error == 0.0
     u = Vertices(s.first.vertices, s.place.a, UNPOSED if is_exact or not s.place.a.is_posed else 0)
     v = Vertices(s.second.vertices, s.place.b, UNPOSED if is_exact or not s.place.b.is_posed else 1)
@@ -115,8 +118,9 @@ def are_separated(s: Search, first: int, n_faces: int) -> bool:
 def _edge_enters_interior(
     s: Search, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, mesh: MeshArrays, face: int
 ) -> int:
-    """Return OVERLAPPING if an edge of t passes through the open face u to the inner side of u's body; else TOUCHING or
-    UNSETTLED. sides: of the corners of t at the plane of u. face: number of u in its mesh."""
+    """Return OVERLAPPING if an edge of t lies in the plane of u and passes through the open face u, and the rest of t
+    is on the inner side of u's body; else TOUCHING, or UNSETTLED if a sign or the inner side is unknown. sides: of t's
+    corners at the plane of u; mesh, face: u's mesh and its number there; off, axis: as in `turn_in_plane`."""
     for k in range(3):
         a, b, apex = sides[k], sides[(k + 1) % 3], sides[(k + 2) % 3]
         if a == 0 and b == 0:
@@ -130,8 +134,9 @@ def _edge_enters_interior(
 
 @called
 def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPoint3) -> tuple[int, bool]:
-    """Return the relation that two coplanar faces prove, and whether they share an area. OVERLAPPING: they share an
-    area and both bodies lie on the same side; TOUCHING: not so; UNSETTLED. off: a point off the plane."""
+    """Return (relation, shares) of coplanar faces i and j with corners t and u. OVERLAPPING: they share an area and
+    both bodies lie on the same side; TOUCHING: not so; UNSETTLED: undecided. shares: whether they share an area. axis:
+    along it t has an area; off: a point off the plane."""
     poses, error = s.descent.poses, exact_error(s)
     how = separation(poses, t, u, axis, error)
     if how == UNDECIDED or how >= 0:
@@ -147,8 +152,8 @@ def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPo
 def _corners_on_face(
     poses: FloatArray, t: Facet, sides: Signs, u: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return a bit for each corner of t that lies on the closed face u, -1 if undecided; sides: of the corners at u's
-    plane."""
+    """Return bits of the corners of t (1, 2, 4) that lie on the closed face u, -1 if undecided. sides: of the corners
+    at the plane of u; off, axis: as in `turn_in_plane`."""
     corners = 0
     for k in range(3):
         how = is_on_face(poses, corner(t, k), u, off, axis, error) if sides[k] == 0 else 0
@@ -160,8 +165,9 @@ def _corners_on_face(
 
 @called
 def decide_contact(s: Search, item: int) -> tuple[int, bool]:
-    """Return OVERLAPPING if contact ``item`` proves it, else TOUCHING, or UNSETTLED; and whether its faces share an
-    area. Its class becomes DECIDED + bits of the corners that lie on the other face."""
+    """Return (relation, shares) for contact number ``item``. OVERLAPPING: it proves that the open interiors intersect;
+    TOUCHING: it does not; UNSETTLED: undecided. shares: whether its faces share an area. Its class becomes DECIDED +
+    bits, 3 a face, of the corners that lie on the other closed face."""
     i, j, kinds = s.contacts.pairs[item, 0], s.contacts.pairs[item, 1], s.contacts.kinds
     if CORNER <= kinds[item] < DECIDED:
         common = kinds[item] - CORNER
@@ -198,7 +204,8 @@ def decide_contact(s: Search, item: int) -> tuple[int, bool]:
 
 @allocating
 def relate_clean(s: Search, n: int) -> int:
-    """Return OVERLAPPING or TOUCHING from n contacts, no crossing, if their faces are STATE_CLEAN; else UNSETTLED."""
+    """Return OVERLAPPING or TOUCHING from n contacts, none a crossing, if the faces that matter are STATE_CLEAN; else
+    UNSETTLED."""
     shares = np.zeros(n, np.bool_)
     for item in range(n):
         how, shares[item] = decide_contact(s, item)
@@ -210,8 +217,8 @@ def relate_clean(s: Search, n: int) -> int:
 @allocating
 def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> int:
     """Return OVERLAPPING or TOUCHING if the n contacts of two placed bodies decide it, else UNSETTLED. is_free: no
-    contact is flush or cuts an open face; the classes then name the corners in the plane of the other face.
-    has_crossing: some contact is a crossing, but none proves overlapping."""
+    contact is flush or cuts an open face; the classes are then DECIDED + bits of the corners in the plane of the other
+    face. has_crossing: some contact is a crossing, though none proves overlapping."""
     both = s.first.has_inside and s.second.has_inside
     if both and is_free:
         relation = relate_by_locations(s, n, np.empty(0, np.bool_))
@@ -232,8 +239,8 @@ DECIDED = 64
 
 @inline
 def hash_slot(known: IntArray, vertex: int) -> int:
-    """Return the slot of key ``vertex`` in an open-addressing hash table (size a power of two), or the free slot for
-    it."""
+    """Return the slot of key ``vertex`` in an open-addressing hash table (n,), n a power of two, -1 in free slots; the
+    free slot for it if it is not there."""
     last = known.shape[0] - 1
     place = vertex & last
     while known[place] >= 0 and known[place] != vertex:  # bound: half the places are free
@@ -243,8 +250,8 @@ def hash_slot(known: IntArray, vertex: int) -> int:
 
 @allocating
 def may_be_corner(own: parity.OwnPoint, mesh: MeshArrays) -> bool:
-    """Return whether a point coincides, within its error, with a vertex of a mesh; faces without a contact are tested
-    too."""
+    """Return whether a point coincides, within its error, with a vertex of a mesh. Faces without a listed contact are
+    tested too."""
     local, slack, stack = in_tree(mesh, own.point), parity.SLACK + own.error / mesh.scale, np.empty(STACK, np.int32)
     box = parity.box_between(local, local, slack)
     stack[0] = 0
@@ -263,17 +270,18 @@ def may_be_corner(own: parity.OwnPoint, mesh: MeshArrays) -> bool:
 def where_faces_are(
     s: Search, own: int, n: int, shares: BoolArray, known: IntArray, is_flush: BoolArray, sharing: IntArray
 ) -> int:
-    """Return OUTSIDE, INSIDE or UNDECIDED for the faces in contact of body `own` (0, 1).
+    """Locate the faces of body `own` (0, 1) in its n contacts, and its components, in the other body.
 
     | result | meaning |
     |---|---|
-    | OUTSIDE | every face has points outside: its corners off the other body; so are all components without contact |
-    | INSIDE | one provably lies inside, with an inside of its own body next to it |
+    | OUTSIDE | every such face and component has a point proven outside, or shares an area with a face of the other |
+    | INSIDE | a point of one is proven inside, and its own body has an interior next to the face |
+    | UNDECIDED | else |
 
-    own: column of the body in contacts (n, 2), whose classes have the corners on the other face, maybe others in its
-    plane (`classify_contact`, `decide_contact`). shares: (n,) whether two faces share an area, or empty. known,
-    is_flush: table (`hash_slot`) of vertices; sharing: table of faces that share an area.
-    """
+    ``s.contacts``: column `own` of pairs (n, 2) has the faces; kinds (n,) are DECIDED + bits, 3 a face, of the corners
+    on the other face or in its plane. shares (n,): whether the faces of a contact share an area; empty: none does.
+    Scratch, 6 n slots or more: hash tables (`hash_slot`) of vertices, known, with is_flush, whether one touches the
+    other body, and of the faces that share an area, sharing."""
     contacts, flush, met = s.contacts
     source, mesh = (s.first, s.second) if own == 0 else (s.second, s.first)
     place, target = (s.place.a, s.place.b) if own == 0 else (s.place.b, s.place.a)
@@ -315,8 +323,9 @@ def where_faces_are(
 def _where_within(
     source: MeshArrays, face: int, place: Placement, mesh: MeshArrays, target: Placement, defect: float
 ) -> int:
-    """Return the location in the other body of a sampled point within a face; UNDECIDED if no sample decides. Placing
-    rounds such a point even where it rounds no vertex: each of two sums by 2^-53 of its terms."""
+    """Return the location, INSIDE or OUTSIDE, of a sampled point within a face of `source`, placed by `place`, in
+    `mesh`, placed by `target`; UNDECIDED if no sample decides. defect: `defect_of` target. Placing rounds such a point
+    even where it rounds no vertex: each of two sums by 2^-53 of its terms."""
     for item in range(3):
         p = parity.point_within(source, face, item)
         q = parity.to_local_frame(p.point, place, target, defect)
@@ -329,14 +338,14 @@ def _where_within(
 
 @inline
 def has_interior_beside(s: Search, source: MeshArrays, face: int) -> bool:
-    """Return whether the body has an interior next to a face: the face has an area and is not STATE_STACKED."""
+    """Return whether a body has an interior next to a face of it: the face has an area and is not STATE_STACKED."""
     return bool(source.axis[face] >= 0 and parity.state_of(source, face, s.descent.poses) != STATE_STACKED)
 
 
 @allocating
 def relate_by_locations(s: Search, n: int, shares: BoolArray) -> int:
-    """Return OVERLAPPING or TOUCHING if the locations of the faces in contact decide it, else UNSETTLED. shares: (n,)
-    whether two faces share an area, or empty."""
+    """Return OVERLAPPING or TOUCHING if the locations of the faces in the n contacts decide it, else UNSETTLED. shares
+    (n,): whether the two faces of a contact share an area; empty: none does."""
     n_places = 16
     while n_places < 6 * n:
         n_places *= 2

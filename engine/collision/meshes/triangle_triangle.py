@@ -55,7 +55,8 @@ def facet_at(points: FloatArray, i: int, j: int, k: int) -> Facet:
 
 @inline
 def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
-    """Return the triangle with its corners tagged with a pose number, under which exact signs read them, or UNPOSED."""
+    """Return the triangle with its corners tagged with a pose number, the row of `poses` by which exact signs move
+    them; UNPOSED: none."""
     return Facet(
         PosedPoint3(t.p.x, t.p.y, t.p.z, pose),
         PosedPoint3(t.q.x, t.q.y, t.q.z, pose),
@@ -102,8 +103,9 @@ def rotate_vertices(t: Facet, lone: int) -> Facet:
 
 @inline
 def lone_first(t1: Facet, t2: Facet, sides: Signs, their_sides: Signs) -> tuple[Facet, Facet]:
-    """Return two triangles, each rotated so that its first vertex is alone on its side of the other's plane, and above
-    it. sides: of t1's vertices at the plane of t2; their_sides: of t2's vertices at the plane of t1."""
+    """Return two triangles, each rotated so that its first vertex is alone on one side of the other's plane, and turned
+    over where needed so that it is above that plane. sides: of t1's vertices at the plane of t2; their_sides: of t2's
+    vertices at the plane of t1."""
     lone1, side1 = lone_vertex(sides[0], sides[1], sides[2])
     lone2, side2 = lone_vertex(their_sides[0], their_sides[1], their_sides[2])
     a, b = rotate_vertices(t1, lone1), rotate_vertices(t2, lone2)
@@ -125,12 +127,11 @@ def corner(t: Facet, index: int) -> Any:
 
 @merged
 def bound_near(u: Point3, v: Point3, p: Point3, q: Point3, r: Point3, error: float) -> float:
-    """Return an error bound for determinants of differences of six points, five of them given relative to the sixth.
+    """Return an error bound for orientation determinants of six points: u, v, p, q, r are five of them minus the sixth.
 
     M = 2 m bounds differences of two points, m the largest given; e: twice the error of a coordinate, known to +-
     `error`: ``|det - exact| <= 11 u 6 M^3 + 18 e (M + e)^2`` (7 u as in `orient3d_filter`; some differences are rounded
-    twice), plus underflow (`placement.py`).
-    """
+    twice), plus underflow (`placement.py`)."""
     m = 2.0 * max(max(largest_of(u), largest_of(v)), max(largest_of(p), largest_of(q), largest_of(r)))
     e = 2.0 * error
     return 2.0**-46 * (m * m * m) + 18.5 * e * ((m + e) * (m + e)) + 2.0**-1068 * (1.0 + m)
@@ -176,7 +177,8 @@ def sign_of_four(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
 ) -> int:
     """Return the exact sign of orient3d of four posed points (`orient3d_posed`), or UNDECIDED. 0 without arithmetic if
-    two points coincide, or all share a coordinate, under one pose."""
+    two points coincide, or all share a coordinate, under one pose. error: bound on the rounding of a posed coordinate.
+    """
     if is_same(a, d) or is_same(b, d) or is_same(c, d) or is_same(a, b) or is_same(a, c) or is_same(b, c):
         return 0
     if a.pose == d.pose and b.pose == d.pose and c.pose == d.pose:
@@ -204,9 +206,9 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
 
 @called
 def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
-    """Return the class of two triangles with area by exact signs; UNDECIDED only if exponents are out of range. poses
-    (n, 12): R by rows, then t. error: the largest `posed_error` of the corners. axis: along it the projection of t1,
-    before its pose, has an area."""
+    """Return the class of two triangles with area by exact signs: APART, CROSSING, CONTACT or COPLANAR; UNDECIDED only
+    if exponents are out of range. poses (n, 12): R by rows, then t. error: the largest `posed_error` of the corners.
+    axis: along it the projection of t1, before its pose, has an area."""
     p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):
         return APART
@@ -240,7 +242,8 @@ def projected(p: Point3, axis: int) -> Point2:
 
 @inline
 def off_plane_point(t: Facet, axis: int) -> PosedPoint3:
-    """Return a point off the plane of t: its first corner moved along ``axis``, before its pose; maybe infinite."""
+    """Return a point off the plane of t, before its pose: its first corner moved along ``axis``, along which the
+    projection of t has an area. Maybe infinite."""
     p, size = t.p, max(largest_of(minus(t.q, t.p)), largest_of(minus(t.r, t.p)))
     value = p.x if axis == 0 else (p.y if axis == 1 else p.z)
     value = 0.5 * value if abs(value) > size else value + size  # either differs from `value`
@@ -251,8 +254,8 @@ def off_plane_point(t: Facet, axis: int) -> PosedPoint3:
 def turn_in_plane(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return the orientation sign of a, b, c within their common plane. axis >= 0: of the projection along it (no
-    poses). Else seen from ``off``, a point off the plane that fixes the sign."""
+    """Return the orientation sign of a, b, c within their common plane, or UNDECIDED. axis >= 0: of the projection
+    along it, of unposed points. -1: seen from ``off``, a point off the plane, which fixes the sign."""
     if axis >= 0:
         return orient2d(projected(a, axis), projected(b, axis), projected(c, axis))
     return sign_of_four(poses, a, b, off, c, error)
@@ -260,13 +263,14 @@ def turn_in_plane(
 
 @inline
 def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axis: int, error: float) -> int:
-    """Return whether the line of an edge of t separates t from u, both in one plane.
+    """Return whether the line of an edge of t separates t from u, both in one plane; off, axis: as in `turn_in_plane`.
 
     | result | meaning |
     |---|---|
     | 1 | some edge has all of u strictly outside |
     | 0 | some edge has all of u outside or on it |
     | -1 | no edge separates |
+    | UNDECIDED | a sign is |
     """
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     if turn == UNDECIDED:
@@ -296,7 +300,8 @@ def outside_an_edge(poses: FloatArray, t: Facet, u: Facet, off: PosedPoint3, axi
 def passes_within(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float
 ) -> int:
-    """Return 1 if the segment a b, in the plane of t, intersects the open face t, 0 if not, or UNDECIDED."""
+    """Return 1 if the segment a b, in the plane of t, intersects the open face t, 0 if not, or UNDECIDED. off, axis: as
+    in `turn_in_plane`."""
     turn = turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     if turn == UNDECIDED:
         return UNDECIDED
@@ -317,7 +322,8 @@ def passes_within(
 
 @called
 def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, axis: int, error: float) -> int:
-    """Return 1 if p, in the plane of t, lies on the closed face t, 0 if not, or UNDECIDED."""
+    """Return 1 if p, in the plane of t, lies on the closed face t, 0 if not, or UNDECIDED. off, axis: as in
+    `turn_in_plane`."""
     result, turn = 1, turn_in_plane(poses, t.p, t.q, t.r, off, axis, error)
     for edge in range(3):
         side = turn_in_plane(poses, corner(t, edge), corner(t, edge + 1), p, off, axis, error)
@@ -331,7 +337,7 @@ def is_on_face(poses: FloatArray, p: PosedPoint3, t: Facet, off: PosedPoint3, ax
 @inline
 def separation(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
     """Return 1 if two coplanar triangles with area are disjoint, 0 if only their borders meet, -1 if their interiors
-    do. UNDECIDED if a sign is. axis: along it the projection of t1, before its pose, has an area."""
+    do; UNDECIDED if a sign is. axis: along it the projection of t1, before its pose, has an area."""
     off = off_plane_point(t1, axis)
     if not np.isfinite(off.x + off.y + off.z):
         return UNDECIDED
