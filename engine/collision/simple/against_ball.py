@@ -43,8 +43,8 @@ _SPREAD = 64
 
 @inline
 def _box_distance(t: Facet, center: Point3, slack: float) -> float:
-    """Return a lower bound on the squared distance of a triangle's box from the centre; slack: error of coordinates.
-    Widened as in `box_distance_bounds`."""
+    """Return a lower bound on the squared distance of the box around triangle t from the centre of a ball. slack: bound
+    on the error of a coordinate. Widened as in `box_distance_bounds`; 0.0 on overflow."""
     square = 0.0
     for c, p, q, r in (
         (center.x, t.p.x, t.q.x, t.r.x), (center.y, t.p.y, t.q.y, t.r.y), (center.z, t.p.z, t.q.z, t.r.z),
@@ -57,9 +57,9 @@ def _box_distance(t: Facet, center: Point3, slack: float) -> float:
 
 @inline
 def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
-    """Return 1 if a triangle provably has a point in the open ball, 0 if it provably misses the closed ball, else
-    UNSETTLED. error: corners relative to the centre are off by its error and a rounding, distances by less than twice
-    that."""
+    """Return 1 if triangle t provably has a point in the open ball, 0 if it provably misses the closed ball, else
+    UNSETTLED. own: the ball's centre in the triangle's coordinates. error: corners relative to the centre are off by
+    its error and a rounding, distances by less than twice that."""
     t, none = relative_to(own.point, t), Point3(0.0, 0.0, 0.0)
     center = Facet(none, none, none)
     slack = 4.0 * rounding_bound(t, center) + 2.0 * own.error + 2.0**-50 * radius
@@ -74,9 +74,9 @@ def _enters_ball(t: Facet, own: parity.OwnPoint, radius: float) -> int:
 def _surface_against_ball(
     own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray
 ) -> tuple[int, int]:
-    """Return the relation of a mesh's faces to a ball, and a witness face (-1 for none). DISJOINT, TOUCHING (a face
-    enters the open ball) or UNSETTLED. The witness, if is_named, is the entering face with the nearest box, the lowest
-    of equal ones."""
+    """Return (relation, witness) of a mesh's faces to a ball. DISJOINT, TOUCHING (a face enters the open ball) or
+    UNSETTLED; the witness is a triangle that enters, -1 for none; if is_named, of these the one with the nearest box,
+    the lowest of equal ones. own: the ball's centre in the mesh's coordinates, with its error."""
     center, error = own
     sizes = largest_of(Point3(mesh.origin[0], mesh.origin[1], mesh.origin[2])) + largest_of(center) + radius
     local, slack = in_tree(mesh, center), parity.SLACK + (error + 2.0**-48 * sizes) / mesh.scale
@@ -111,7 +111,8 @@ def _surface_against_ball(
 
 @inline
 def _ball_contains_vertex(vertex: int, own: parity.OwnPoint, radius: float, mesh: MeshArrays) -> int:
-    """Return 1 if vertex ``vertex`` of a mesh provably lies in the open ball, 0 if provably not, else UNSETTLED."""
+    """Return 1 if vertex number ``vertex`` of a mesh provably lies in the open ball, 0 if provably not, else UNSETTLED.
+    own: the ball's centre in the mesh's coordinates, with its error."""
     v = minus(as_point3(mesh.vertices, vertex), own.point)
     size = np.sqrt(dot(v, v))
     slack = 2.0**-49 * (size + radius) + 2.0 * own.error + 2.0**-500
@@ -120,8 +121,8 @@ def _ball_contains_vertex(vertex: int, own: parity.OwnPoint, radius: float, mesh
 
 @inline
 def _ball_contains_mesh(own: parity.OwnPoint, radius: float, mesh: MeshArrays, flag: FlagArray) -> int:
-    """Return 1 if all vertices of a mesh provably lie in the open ball, 0 if one provably does not, else UNSETTLED. A
-    sample spread over the mesh is tested first, since neighbours give the same result."""
+    """Return 1 if all vertices of a mesh provably lie in the open ball, 0 if one provably does not, else UNSETTLED.
+    own: the ball's centre. A sample spread over the mesh is tested first, since neighbours give the same result."""
     n, result = mesh.vertices.shape[0], 1
     for step in (n // _SPREAD + 1, 1):
         for vertex in range(0, n, step):
@@ -135,7 +136,9 @@ def _ball_contains_mesh(own: parity.OwnPoint, radius: float, mesh: MeshArrays, f
 
 @inline
 def _relate(own: parity.OwnPoint, radius: float, mesh: MeshArrays, is_named: bool, flag: FlagArray) -> tuple[int, int]:
-    """Return the relation of a mesh (first) and a ball, or UNSETTLED, and a witness triangle, -1 for none."""
+    """Return the relation code of a mesh (first) and a ball, or UNSETTLED, and a triangle that enters the ball, -1 for
+    none. own: the ball's centre in the mesh's coordinates, with its error; is_named: the triangle must be the one that
+    the answer names."""
     relation, triangle = _surface_against_ball(own, radius, mesh, is_named, flag)
     if relation == DISJOINT:
         where = parity.locate_point(own, mesh) if mesh.has_inside else parity.OUTSIDE
@@ -171,7 +174,8 @@ Moves = tuple[FloatArray, FloatArray] | None
 
 
 def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collision:
-    """Return the exact relation of a body with faces or edges (first) and a ball or disc (second)."""
+    """Return the exact relation of a body with faces or edges (first) and a ball or disc (second): by floats if these
+    prove it, else by rational distances."""
     if poses[0] is None or body.dimension == 3:
         is_posed = poses[0] is not None or poses[1] is not None
         row = centers_in_frame(ball, *map(_as_arrays, poses))[0].tolist() if is_posed else [*ball.center.tolist(), 0.0]
@@ -186,20 +190,21 @@ def collide_body_sphere(body: Solid, ball: Sphere, poses: Poses, work: Work) -> 
 
 
 def _as_arrays(pose: Pose | None) -> Moves:
-    """Return a pose as arrays of one rotation and one translation, None for None."""
+    """Return a pose as arrays of one rotation (1, d, d) and one translation (1, d); None for None."""
     return None if pose is None else (pose.rotation[None], pose.translation[None])
 
 
 def centers_in_frame(ball: Sphere, body_poses: Moves, ball_poses: Moves) -> FloatArray:
-    """Return the centres of placed balls in the frame of a placed body, and the error of each coordinate: (n, d + 1).
+    """Return the centre of a ball under n poses in the frame of a body under n poses (or one of either, or None), and
+    the error of each coordinate: (n, d + 1).
 
     **Placed.** A coordinate is the sum of at most three products and a number: seven roundings of 2^-53 of their
     magnitudes, below 2^-50 of the sum of these, and underflow below 2^-1060.
 
-    **In the frame.** R^T (c - t) replaces R^-1 (c - t). R^T R is the identity up to 1e-12 an entry, so the two differ
-    by less than 2^-38 |c - t|; and R preserves distances up to that part, which for those near the radius is that much
-    of it more. A comparison of a distance with the radius, with twice the error as margin, is right about the image.
-    """
+    **In the frame** (pose frame). R^T (c - t) replaces R^-1 (c - t). R^T R is the identity up to 1e-12 an entry, so the
+    two differ by less than 2^-38 |c - t|; and R preserves distances up to that part, which for those near the radius is
+    that much of it more. A comparison of a distance with the radius, with twice the error as margin, is right about the
+    image."""
     d = ball.dimension
     centers, error = ball.center[None], np.zeros((1, 1))
     with np.errstate(all="ignore"):  # what overflows is left open
@@ -244,7 +249,7 @@ def _by_floats(body: Solid, center: list[float], radius: float, work: Work) -> C
 
 
 def named(mesh: MeshBody, relation: int, triangle: int) -> Collision:
-    """Return the answer, with its witness, for a relation and witness triangle of `relate_balls`."""
+    """Return the answer, with its witness, for a relation code and a witness triangle of `relate_balls`."""
     if relation in (OVERLAPPING, TOUCHING):
         face = int(mesh.faces[triangle])
         return Collision(Relation(relation), Witness("surface", face, piercing=relation == TOUCHING))
@@ -290,20 +295,22 @@ def _by_distances(body: Solid, ball: Sphere, poses: Poses, work: Work) -> Collis
 
 
 def _candidates(nearest: FloatArray, limit: Fraction) -> IntArray:
-    """Return the faces whose squared lower bound `nearest` may be at most `limit`, nearest first."""
+    """Return the faces whose squared distance may be at most `limit`, given lower bounds on it by face, `nearest`;
+    nearest first."""
     near = np.flatnonzero(nearest <= rounded(limit) * (1.0 + 2.0**-50) + 2.0**-1000)
     return near[np.argsort(nearest[near], kind="stable")]
 
 
 def _any_part_enters(boundary: Boundary, faces: IntArray, center: Vector, limit: Fraction) -> bool:
-    """Return whether a part of these faces that bounds the interior is nearer to the centre than sqrt(limit); exact."""
+    """Return whether a part of these faces that bounds the interior is nearer to the centre than the radius, exactly;
+    limit: squared radius."""
     return len(faces) > 0 and boundary.has_live(faces, lambda corners: simplex_distance(center, corners) < limit)
 
 
 def _is_within_walls(body: Solid, pose: Pose | None, center: Vector, radius: float, work: Work) -> bool:
-    """Return whether an open ball lies inside the body; no face enters it but parts that cancel (even-odd). Off such
-    parts the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve (t, t^2,
-    t^3) from the centre, which meets a plane at most three times: one of them is on no face."""
+    """Return whether an open ball lies inside the body, given that no face enters it but parts that cancel (even-odd).
+    Off such parts the ball is all inside or all outside, so any point of it decides. The points tried lie on the curve
+    (t, t^2, t^3) from the centre, which meets a plane at most three times: one of them is on no face."""
     location = rational_location(center, body, pose, work.budget.check)
     if location != Location.BOUNDARY:
         return location == Location.INSIDE

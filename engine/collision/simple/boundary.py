@@ -33,12 +33,12 @@ from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Location
 
 
 def box_distance_bounds(point: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper bounds on the squared distance of `point` from anything that fills the boxes ``(n, d)``.
+    """Return lower and upper bounds (n,) on the squared distance of `point` from anything that lies in the boxes ``(n,
+    d)``.
 
     The lower bound is the distance to the box, the upper one that to its farthest corner, both widened by 2^-48 of
     themselves and 2^-1000: at most d + 3 roundings of relative size u enter each, and d underflows of 2^-1074. Overflow
-    makes them infinite or NaN; NaN lower bounds become 0, NaN upper bounds infinity.
-    """
+    makes them infinite or NaN; NaN lower bounds become 0, NaN upper bounds infinity."""
     with np.errstate(all="ignore"):
         gap = np.maximum(np.maximum(low - point, point - high), 0.0)
         reach = np.maximum(np.abs(low - point), np.abs(high - point))
@@ -59,13 +59,13 @@ class Boundary:
     | field | meaning |
     |---|---|
     | ends | (n, d) vertices of each face or edge |
-    | floats | rounded posed vertices at given indices, each number within `error` |
-    | near | superset of the faces within a radius of a point, ascending |
-    | exact | position of a vertex |
-    | number, number_at | the caller's number of a face, and of one at a vertex |
-    | signs | side of each vertex at a plane |
-    | live | parts of faces with interior on one side only: corners of triangles; ends of edges, maybe with others |
-    | is_inside | whether a point on no face is inside |
+    | floats(vertices) | rounded posed vertices, each number within `error` |
+    | near(point, radius) | superset of the faces within the radius of a point, ascending |
+    | exact(vertex) | exact position |
+    | number(face), number_at(vertex) | the caller's number of a face, and of one at a vertex |
+    | signs(plane) | side (-1, 0, 1) of each vertex |
+    | live(faces) | parts of these faces with interior on one side only: corners of triangles, or ends of edges |
+    | is_inside(point) | whether a point on no face is inside |
     | has_inside | False for surfaces and flat boxes |
     """
 
@@ -93,8 +93,8 @@ class Boundary:
         return self.bounds(center, reduce(np.minimum, corners), reduce(np.maximum, corners))
 
     def bounds(self, center: Vector, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return lower and upper bounds on the squared distance of `center` from boxes low, high (n, d) of rounded
-        posed coordinates."""
+        """Return lower and upper bounds on the squared distance of `center` from what lies in the boxes low, high (n,
+        d) of rounded posed coordinates."""
         around = np.array([rounded(value) for value in center])
         slack = self.error + 2.0**-50 * float(np.abs(around).max()) + 2.0**-1070
         return box_distance_bounds(around, low - slack, high + slack)
@@ -105,7 +105,7 @@ class Boundary:
 
     def has_live(self, faces: IntArray, condition: Callable[[tuple[Vector, ...]], bool]) -> bool:
         """Return whether the condition holds for the corners of some part of these faces that has interior on one side
-        only."""
+        only; for an outline, those of other edges are tried too."""
         return any(map(condition, self.live(faces.tolist())))
 
 
@@ -170,13 +170,13 @@ def _outline_boundary(body: Solid, pose: Pose | None, work: Work) -> Boundary:
 
 
 def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work: Work) -> Int8Array:
-    """Return the exact side (-1, 0, 1) at a plane of the image of each of ``(n, 3)`` points under a pose.
+    """Return the exact side (-1, 0, 1) at a plane of the image of each of ``(n, 3)`` points under a pose. work: counts
+    and deadline.
 
     The function is pulled back: with N = n R and D = n . t + d, both rational, it is N . p + D. Scaled so that the
     largest of N and D is about 1, their rounded values have an error of u each (or 2^-1075 where they are denormal),
     and the sum of k products one of (k + 2) u of the sum of magnitudes: 2^-49 of it, 2^-1073 of the sum of coordinates
-    (for the denormal weights) and 2^-1000 more are not exceeded.
-    """
+    (for the denormal weights) and 2^-1000 more are not exceeded."""
     (normal, offset), weights, shift = pulled_back(plane, pose)
     with np.errstate(all="ignore"):
         values = points @ weights + shift
@@ -193,8 +193,8 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
 
 
 def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImage, FloatArray, float]:
-    """Return (N, D), exact, with N . p + D the plane's value at the image of p; then N and D rounded, the largest
-    scaled to 1."""
+    """Return ((N, D), weights, offset). (N, D): exact, with N . p + D the plane's value at the image of p under the
+    pose; weights, offset: N and D as doubles, the largest magnitude scaled to 1."""
     normal, offset = plane
     if pose is not None:
         offset += dot(normal, as_vector(pose.translation.tolist()))
@@ -227,8 +227,8 @@ def simplex_distance(point: Vector, corners: Sequence[Vector]) -> Fraction:
 
 
 def live_parts(mesh: MeshBody, face: int, budget: Budget) -> Iterator[tuple[Vector, ...]]:
-    """Yield triangles, unposed, that fill the part of a face that even-odd does not cancel; the face itself if none
-    does."""
+    """Yield triangles, unposed, that fill the part of a face that even-odd does not cancel: the face itself, unless
+    another face of the body covers a part of it; nothing for a face without area."""
     if mesh.arrays.axis[face] == NO_AREA:
         return
     if state_at(mesh.arrays, face) != STATE_STACKED:

@@ -39,7 +39,8 @@ FORMS: Final = ("aabb", "sphere")
 
 
 def form_of(solid: Solid) -> FloatArray | None:
-    """Return the N_NUMBERS numbers of a ball or a box that is not flat, None for other solids; cached."""
+    """Return the (N_NUMBERS,) numbers of a ball, or of a box that is not flat (`form_relations.py`); None for other
+    solids. Cached."""
     if solid.type not in FORMS:
         return None
     return solid.prepared("form", lambda: _form(solid))
@@ -59,7 +60,7 @@ def _form(solid: Solid) -> FloatArray | None:
 
 
 def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:
-    """Return a pair function that tries `relate_forms`, and calls `otherwise` where that is undecided."""
+    """Return a pair function that tries the compiled `relate_forms`, and calls `otherwise` where that is undecided."""
 
     def collide_forms(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
         d = first.dimension
@@ -72,8 +73,8 @@ def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:
 def relation_closed_form(
     first: Solid, second: Solid, motion: Motion, their_motion: Motion, work: result.Work
 ) -> result.Collision | None:
-    """Return the relation of a box or ball and a box or ball by `relate_forms`; None if undecided or without its
-    witness."""
+    """Return the relation of two solids by `relate_forms`; None if one is neither box nor ball, or the relation or its
+    requested witness is undecided. motion, their_motion: rotation and translation of each."""
     form, other, d = form_of(first), form_of(second), first.dimension
     if form is None or other is None:
         return None
@@ -94,7 +95,7 @@ _BY_BALL = result.NO_CONTACT, result.FIRST_WITHIN, result.SECOND_WITHIN, result.
 
 @lru_cache(4096)
 def _named(code: int) -> result.Collision:
-    """Return the answer encoded by `relate_forms` for two boxes."""
+    """Return the answer, with its witness, encoded in the code that `relate_forms` returns for two boxes."""
     relation, kind = code & _RELATION, code >> relations.KIND_AT & _RELATION
     if relation < OVERLAPPING:
         return _BY_BALL[relation]
@@ -188,9 +189,11 @@ def collide_half_space_body(space: HalfSpace, body: Solid, poses: result.Poses, 
 def _by_scan(
     function: _Function, space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work
 ) -> result.Collision | None:
-    """Return the relation of a half-space and a mesh if floats decide the sides of nearly all vertices, else None. The
-    witness is the face at the first vertex beyond the plane, or on it. Nothing cancels, so the open interior is next to
-    it."""
+    """Return the relation of a half-space and a mesh by the sides of its vertices, in floats for nearly all, exact for
+    a few; None if more are open, or if the triangle with the first vertex inside the half-space is STATE_STACKED.
+    function: of the half-space, in the mesh's frame. The witness is a face at the first vertex inside, or on the plane.
+    No part of that face cancels under even-odd, so the body's open interior is next to it: a vertex inside proves
+    overlapping."""
     mesh, unsure = mesh_body_of(body), np.empty(_FEW_UNSURE, np.int64)
     normal, sizes, offset, size = function
     plane = np.array([normal, sizes, [offset, size, 0.0]])
@@ -224,9 +227,9 @@ def _by_scan(
 
 @inline
 def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
-    """Return 1 or -1 if a vertex is proven to be beyond or before a plane, else 0. plane: (3, 3), see `scan_sides`.
-    Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070; the sum of three
-    products and a number by 2^-50 of the sum of magnitudes more."""
+    """Return 1 or -1 if a vertex is proven to be on the positive or the negative side of a plane, else 0. plane: (3,
+    3), see `scan_sides`. Each weight may be off by 2^-50 of its size, which is no less than the weight, and 2^-1070;
+    the sum of three products and a number by 2^-50 of the sum of magnitudes more."""
     p = as_point3(mesh.vertices, vertex)
     around = Point3(abs(p.x), abs(p.y), abs(p.z))
     value = dot(as_point3(plane, 0), p) + plane[2, 0]
@@ -237,12 +240,12 @@ def _side(mesh: MeshArrays, vertex: int, plane: FloatArray) -> int:
 
 @kernel
 def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: FlagArray) -> tuple[int, int, int]:
-    """Scan the vertices of a mesh until one is provably beyond a plane and one provably before it.
+    """Scan the vertices of a mesh until one is provably on the positive side of a plane and one on the negative side.
 
-    plane: (3, 3), the weights of the coordinates; their sizes, which bound their errors; the offset and its size.
-    Returns the first vertex beyond, the first before (-1 if there is none), and the number of undecided vertices
-    passed, the first of which are listed in `unsure` (n,) int64; one more than fit if the flag was set.
-    """
+    plane (3, 3): the weights of the coordinates; their sizes, which bound their errors; the offset, its size, and a 0.
+    Returns (beyond, before, n_unsure): the first vertex proven positive and the first proven negative, -1 for none, and
+    the number of undecided vertices passed, which are listed in `unsure` (n,) int64 as far as they fit; n + 1 if the
+    flag was set."""
     beyond, before, n_unsure, n = -1, -1, 0, mesh.vertices.shape[0]
     for start in range(0, n, _BLOCK):  # many vertices in one pass, without branches
         stop, n_beyond, n_before = min(start + _BLOCK, n), 0, 0
@@ -271,9 +274,9 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
 
 
 def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
-    """Return the linear function of a half-space in the frame of a body, rounded, with bounds. Under a pose of the body
-    a weight is the sum of three products, the offset one of four numbers: seven roundings of 2^-53 of their magnitudes,
-    whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals."""
+    """Return the linear function n . p + d of a half-space in the pose frame of a body, rounded, with bounds. Under a
+    pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of 2^-53 of
+    their magnitudes, whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals."""
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
     if poses[0] is not None:
@@ -309,7 +312,8 @@ def _reaches(boundary: Boundary, faces: IntArray, plane: HalfSpaceImage, side: i
 
 
 def half_space_body_parts(space: HalfSpace, body: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
-    """Return which of a half-space and a body with faces or edges that overlap has a part outside the other."""
+    """Return which of a half-space and a body with faces or edges that overlap has a part outside the other, and
+    whether the boundaries meet."""
     boundary, plane = boundary_of(body, poses[1], work), image_half_space(space, poses[0])
     signs = boundary.signs(plane)
     sticks_out = _reaches(boundary, boundary.faces_at(signs < 0), plane, -1)

@@ -37,7 +37,7 @@ _N_TOTAL: Final = 1100  # as in `posed.py`
 
 
 class Placed(NamedTuple):
-    """Numbers of a box or ball, with its rotation (d, d) and translation (d,)."""
+    """A box or ball under a pose: its numbers form (N_NUMBERS,), rotation turn (d, d) and translation move (d,)."""
 
     form: Any
     turn: Any
@@ -46,8 +46,8 @@ class Placed(NamedTuple):
 
 @inline
 def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
-    """Return m and +-1 if row ``axis`` of a rotation has its only nonzero entry +-1 in column m; -1, 0.0 if it has
-    others."""
+    """Return (m, s) if row ``axis`` of a rotation has one nonzero entry, s = +-1 in column m; (-1, 0.0) for any other
+    row."""
     source, factor = -1, 0.0
     for m in range(turn.shape[0]):
         if turn[axis, m] != 0.0:
@@ -59,7 +59,8 @@ def source_of(turn: FloatArray, axis: int) -> tuple[int, float]:
 
 @inline
 def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
-    """Return the bound (side 0 low, 1 high) on an axis of a box turned by a lattice rotation."""
+    """Return the low (side 0) or high (side 1) bound on an axis of a box turned by a lattice rotation, before
+    translation."""
     source, factor = source_of(turn, axis)
     return factor * form[source + (HIGH if (side == 1) == (factor > 0.0) else 0)]
 
@@ -69,8 +70,8 @@ def bound_at(form: FloatArray, turn: FloatArray, axis: int, side: int) -> float:
 
 @inline
 def _place(a: Placed, w: Any, first: int) -> bool:
-    """Write the bounds of a posed box as exact sums of two doubles; return False if the pose mixes axes, or out of
-    range. Bounds: low and high of each axis, from w[first] on."""
+    """Write the bounds of a posed box as exact sums of two doubles to w[first:], at 4 axis + 2 side (0 low, 1 high).
+    Returns False if the pose does not map axes to axes, or a bound is out of range."""
     form, turn, move = a
     for axis in range(turn.shape[0]):
         if source_of(turn, axis)[0] < 0:
@@ -85,7 +86,9 @@ def _place(a: Placed, w: Any, first: int) -> bool:
 
 @inline
 def _rank(w: Any, d: int, ranks: Any) -> None:
-    """Write for each bound how many of the four bounds on its axis are smaller; pairs compare lexicographically."""
+    """Write to ranks[3 i + axis] how many of the four bounds on the axis are smaller than bound i: low, high of the
+    first box, low, high of the second. w: 24 numbers, the bounds that `_place` wrote; pairs compare lexicographically.
+    """
     for axis in range(d):
         for i in range(4):
             ranks[3 * i + axis] = 0.0
@@ -96,7 +99,7 @@ def _rank(w: Any, d: int, ranks: Any) -> None:
 
 
 def relate_boxes(low: Any, high: Any, their_low: Any, their_high: Any) -> int:
-    """Return the relation of two closed boxes of any dimension, flat ones too; corners may be ranks."""
+    """Return the relation code of two closed boxes given by corners (d,), flat ones too; corners may be ranks."""
     meet = solid = i_within = j_within = interiors = True
     for axis in range(len(low)):
         a0, a1, b0, b1 = low[axis], high[axis], their_low[axis], their_high[axis]
@@ -119,7 +122,8 @@ _relate = inline(relate_boxes)
 def relate_box_pairs(
     low: FloatArray, high: FloatArray, is_box: BoolArray, pairs: IntArray, relations: Int8Array
 ) -> None:
-    """Fill relations (n,) int8 for those pairs (n, 2) of which both bodies are unposed boxes."""
+    """Fill relations (n,) int8 for those pairs (n, 2) of bodies that are both unposed boxes, is_box (n_bodies,). low,
+    high (n_bodies, d): their corners."""
     for item in range(pairs.shape[0]):
         i, j = pairs[item, 0], pairs[item, 1]
         if is_box[i] and is_box[j]:
@@ -135,15 +139,16 @@ def _face(turn: FloatArray, axis: int, side: int) -> int:
 
 @inline
 def _is_between(ranks: Any, body: int, axis: int, rank: float) -> bool:
-    """Return whether a rank lies strictly between those of the bounds of a body (0, 1) on an axis."""
+    """Return whether a rank lies strictly between those of the bounds of body 0 or 1 on an axis."""
     return bool(ranks[_THEIRS * body + axis] < rank < ranks[_THEIRS * body + 3 + axis])
 
 
 @called
 def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
-    """Return kind, and faces << 3 and << 6, of a contact of two boxes of space that overlap, or UNSETTLED. Faces in one
-    plane on one side share an area. If there are none, an edge of one box passes through a face of the other: on each
-    axis either both ends of one box lie within the other, or one of each."""
+    """Return kind | face << 3 | their_face << 6 of a contact of two boxes of space that overlap, or UNSETTLED. ranks:
+    of their bounds (`_rank`). Faces in one plane on one side share an area. If there are none, an edge of one box
+    passes through a face of the other: on each axis either both ends of one box lie within the other, or one of each.
+    """
     for face in range(6):
         axis, side = face >> 1, face & 1
         if ranks[3 * side + axis] == ranks[_THEIRS + 3 * side + axis]:
@@ -165,8 +170,9 @@ def _name_overlap(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 
 @inline
 def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
-    """Return kind, and faces << 3 and << 6, of the contact of two boxes of space that touch. They share a part of a
-    face, an edge or a vertex, by the number of axes on which they only touch; faces: on the first of these."""
+    """Return kind | face << 3 | their_face << 6 of the contact of two boxes of space that touch. ranks: of their bounds
+    (`_rank`). They share a part of a face, an edge or a vertex, by the number of axes on which they only touch; faces:
+    on the first of these."""
     n, faces = -1, 0
     for axis in range(3):
         side = 1 if ranks[3 + axis] == ranks[_THEIRS + axis] else 0
@@ -223,7 +229,8 @@ def _has_separating_axis(a: Placed, b: Placed) -> bool:
 
 @inline
 def _relate_boxes(a: Placed, b: Placed) -> int:
-    """Return the code of two posed boxes; if a pose mixes axes, DISJOINT by a separating axis, or UNSETTLED."""
+    """Return the code (`relate_forms`) of two posed boxes; if a pose mixes axes, DISJOINT by a separating axis, or
+    UNSETTLED."""
     w, ranks, d = workspace(_N_PAIRS), workspace(_N_RANKS), a.turn.shape[0]
     if not (_place(a, w, 0) and _place(b, w, 12)):
         return DISJOINT if d == 3 and _has_separating_axis(a, b) else UNSETTLED
@@ -254,7 +261,8 @@ def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: fl
 
 @inline
 def _are_safe(a: Placed) -> bool:
-    """Return whether expansions of degree four are exact for a posed box or ball, and that of a box mixes no axes."""
+    """Return whether expansions of degree four are exact for the numbers of a posed box or ball, and a box is mapped to
+    a box."""
     form, turn, move = a
     safe = is_safe(form[RADIUS])
     for axis in range(turn.shape[0]):
@@ -267,8 +275,8 @@ def _are_safe(a: Placed) -> bool:
 
 @inline
 def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
-    """Set expansion e to how far a ball's centre lies beyond a bound of a box (or another centre) along an axis.
-    Negative if it does not. side: 0 the low bound, 1 the high one. Returns the number of components."""
+    """Set expansion e to how far the centre of `ball` lies beyond the low (side 0) or high (side 1) bound of box a on
+    an axis, negative if it does not; of a ball a: beyond its centre. Returns the number of components."""
     factor = 1.0 if side == 0 else -1.0
     n = _grow_coordinate(e, 0, a, axis, side, factor)
     return _grow_coordinate(e, n, ball, axis, 0, -factor)
@@ -276,8 +284,8 @@ def _outside(e: Any, a: Placed, ball: Placed, axis: int, side: int) -> int:
 
 @called
 def _order(a: Placed, ball: Placed, is_far: bool, factor: float) -> int:
-    """Return the exact sign of distance^2 - (ball's radius + factor a's radius)^2. Distance: from the ball's centre to
-    the nearest point of box a (or a's centre), the farthest if is_far."""
+    """Return the exact sign of distance^2 - (r + factor s)^2, r the radius of `ball` and s that of a. Distance: from
+    the ball's centre to the nearest point of box a (or a's centre); if is_far, to the farthest."""
     total, n = workspace(_N_TOTAL), 0
     below, above, both = workspace(_N_COORDINATE), workspace(_N_COORDINATE), workspace(_N_COORDINATE)
     for axis in range(a.turn.shape[0]):
@@ -330,8 +338,8 @@ def relate_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray,
 ) -> int:  # fmt: skip
-    """Return the code of a box or ball and a box or ball, each with rotation (d, d) and translation (d,); if one is a
-    box, the first. The code is the relation; for two intersecting boxes of space, with the kind of contact and the
-    faces in higher bits. UNSETTLED if undecided."""
+    """Return a code of two boxes or balls, a box before a ball, each with rotation (d, d) and translation (d,): the
+    relation, or UNSETTLED if undecided. For two intersecting boxes of space also the kind of contact << KIND_AT and the
+    faces << FACE_AT, << THEIR_FACE_AT."""
     a, b = Placed(form, turn, move), Placed(other, their_turn, their_move)
     return _relate_boxes(a, b) if other[IS_BALL] == 0.0 else _relate_to_ball(a, b)
