@@ -145,7 +145,8 @@ def clearance(
 
 
 def checked_distance(value: float, name: str = "at_least") -> float:
-    """Return a distance; raise unless it is a finite number, 0 or more."""
+    """Return a distance as a float; raise unless it is a finite number, 0 or more. name: of the argument, for the
+    message."""
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
@@ -162,8 +163,8 @@ def do_meet(first: Solid, second: Solid, poses: Poses, budget: Budget) -> bool:
 
 
 def _answer(first: Solid, second: Solid, poses: Poses, least: float | None, budget: Budget) -> Clearance | bool:
-    """Return the clearance of two bodies or, given `least`, whether it is at least that: by closed forms, planes, or a
-    search."""
+    """Return the clearance of two bodies or, given `least`, whether it is at least that: by closed forms, half-space
+    planes, or a search."""
     if least == 0.0:
         return True
     planes = has_plane(first, second)
@@ -268,7 +269,7 @@ def clearance_poses(
 
 
 class _Batch:
-    """One pair of bodies and all poses of the second body."""
+    """One pair of bodies and n poses of the second body, the first unposed; fills distances by range of poses."""
 
     def __init__(self, first: Solid, second: Solid, poses: PoseArrays, budget: Budget) -> None:
         self.first, self.second, self.poses, self.budget = first, second, poses, budget
@@ -307,5 +308,5 @@ class _Batch:
             self.n_exact += pair.n_exact
 
     def _poses(self, item: int) -> Poses:
-        """Return the poses of both bodies for pose ``item``: none for the first."""
+        """Return the poses of both bodies for pose number ``item``: None for the first."""
         return None, Pose.of_checked(self.poses.rotations[item], self.poses.translations[item])

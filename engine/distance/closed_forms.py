@@ -33,7 +33,7 @@ from engine.types import FloatArray
 
 
 class Wide(NamedTuple):
-    """A double-double: the number h + low."""
+    """A double-double: the number h + low, h being the double nearest to it."""
 
     h: float
     low: float
@@ -116,10 +116,9 @@ _GAPS, _ROOM = 24, 30
 
 @inline
 def _nearest_sides(up: int, down: int, lows: int, highs: int) -> tuple[int, int]:
-    """Return for each of two boxes the sides of one axis on which it has nearest points, as bits: low 1, high 2. up:
-    sign of the second's low bound less the first's high one, down: vice versa; lows, highs: signs of the first's bound
-    less the second's.
-    """
+    """Return for each of two boxes, as bits (1 low, 2 high), the sides of one axis on which it has points nearest to
+    the other box. up: sign of the second's low bound less the first's high one; down: sign of the first's low bound
+    less the second's high one; lows, highs: signs of the first's low (high) bound less the second's."""
     if up > 0:
         return 2, 1
     if down > 0:
@@ -129,12 +128,12 @@ def _nearest_sides(up: int, down: int, lows: int, highs: int) -> tuple[int, int]
 
 @inline
 def _choose_shared_ends(faces: int, theirs: int, free: int, d: int) -> tuple[int, int]:
-    """Select one pair of nearest points of two boxes where many are equally near; return the faces that they lie on.
+    """Select one pair of nearest points of two boxes where many are equally near; return the faces of either box that
+    they lie on, as bits.
 
-    A face is bit 2 axis + side. faces, theirs: all with nearest points; free: bits of the axes with several. Order of
-    choice: the smallest face of the first, then the smallest remaining of the second, then the end nearest to the start
-    of the first's face.
-    """
+    A face is bit 2 axis + side. faces, theirs: all with nearest points; free: bits of the axes on which the boxes share
+    an interval; d: dimension. Order of choice: the smallest face of the first, then the smallest remaining of the
+    second, then the end nearest to the start of the first's face."""
     is_high = False
     for turn in range(2):
         own = theirs if turn else faces
@@ -155,7 +154,7 @@ def _choose_shared_ends(faces: int, theirs: int, free: int, d: int) -> tuple[int
 
 @inline
 def _sign(x: Wide, error: float) -> int:
-    """Return the sign of a number known to +- error, 2 if that does not prove it."""
+    """Return the sign of a number known to +- error: 1, 0, -1, or 2 if that does not prove it."""
     if error > 0.0 and abs(x.h) <= error:
         return 2
     return (1 if x.h > 0.0 else 0) - (1 if x.h < 0.0 else 0)
@@ -169,9 +168,9 @@ def _wide(w: Any, at: int) -> Wide:
 
 @inline
 def _place(form: FloatArray, turn: FloatArray, move: FloatArray, w: Any, first: int) -> float:
-    """Write low and high bound of each axis of a posed box or ball centre to w[first:]; return a bound on their error.
-    Infinite for a rotated box and out of range. A rotated coordinate is three exact products and three sums, each off
-    by 4 u^2 of all terms."""
+    """Write low and high bound of each axis of a posed box, or twice a ball's centre, to w[first:] as double-doubles;
+    return a bound on their error. It is infinite for a rotated box and out of range. A rotated coordinate is three
+    exact products and three sums, each off by 4 u^2 of all terms."""
     d, is_turned, size = move.shape[0], False, 0.0
     for k in range(d):
         for m in range(d):
@@ -198,9 +197,17 @@ def gap_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, w: Any,
 ) -> tuple[float, int, int, Wide, float]:  # fmt: skip
-    """Return the distance of two posed boxes or balls, the faces of both with nearest points, distance of the boxes or
-    centres alone as a double-double, and its error bound. Distance: 0.0 if they provably meet, or UNSURE. Faces: bits 2
-    axis + side. w (30,): receives the bounds of both bodies, then the gap on each axis."""
+    """Return (distance, faces, their faces, rest, error) of two posed boxes or balls. form: numbers
+    (`form_relations.py`), turn, move: pose of each. w (30,): receives the bounds of both bodies, then the gap on each
+    axis.
+
+    | result | meaning |
+    |---|---|
+    | distance | the nearest double; 0.0 if they provably meet; UNSURE |
+    | faces, their faces | those with nearest points, as bits 2 axis + side |
+    | rest | distance of the boxes or centres alone, as a double-double |
+    | error | bound on the error of placed coordinates, both bodies together |
+    """
     d, error = move.shape[0], _place(form, turn, move, w, 0) + _place(other, their_turn, their_move, w, 12)
     faces = theirs = free = n_apart = 0
     square, rest = Wide(0.0, 0.0), Wide(0.0, 0.0)
@@ -247,8 +254,8 @@ def nearest_of_forms(
     form: FloatArray, turn: FloatArray, move: FloatArray, other: FloatArray, their_turn: FloatArray,
     their_move: FloatArray, points: FloatArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Return distance and faces of two posed boxes or balls, see `gap_of_forms`, and fill points (2, d) with nearest
-    points. Faces -1: the points are not proven."""
+    """Return (distance, faces, their faces) of two posed boxes or balls as `gap_of_forms` does, and fill points (2, d)
+    with nearest points. First faces -1: the points are not proven."""
     w = workspace(_ROOM)
     distance, faces, theirs, size, error = gap_of_forms(form, turn, move, other, their_turn, their_move, w)
     if not distance > 0.0:
@@ -278,13 +285,13 @@ def nearest_of_forms(
 
 @kernel
 def nearest_of_plane(row: Any, form: Any, turn: Any, move: Any, points: Any) -> tuple[float, int, int]:
-    """Return the distance of a posed box or ball from the half-space row (d + 1,), a status, and the faces of the
-    body's nearest point.
+    """Return (distance, status, faces) of a posed box or ball and the half-space row (d + 1,): n, d with n . x + d >=
+    0; fill points (2, d), the foot on the plane first.
 
-    Distance: 0.0 if they meet, or UNSURE. Status: 0, or -1 if the points (2, d) are not proven. Faces: bits 2 axis +
-    side, the low ones of several. With v = dot(n, x) + d at the body's extreme point, off by `slack`, distance = -v /
-    |n| - radius, and foot = x - v n / dot(n, n). Eight operations of at most 16 u^2 each are below 128 u^2.
-    """
+    Distance: 0.0 if they meet, or UNSURE. Status: 0, or -1 if the points are not proven. Faces: of the body's nearest
+    point, as bits 2 axis + side, the low ones of several. With v = dot(n, x) + d at the body's extreme point, off by
+    `slack`, distance = -v / |n| - radius, and foot = x - v n / dot(n, n). Eight operations of at most 16 u^2 each are
+    below 128 u^2."""
     w, d = workspace(_ROOM), move.shape[0]
     error = _place(form, turn, move, w, 0)
     value, square, terms, size, faces = Wide(row[d], 0.0), Wide(0.0, 0.0), abs(row[d]), 0.0, 0

@@ -37,7 +37,7 @@ _POLL_EVERY: Final = 64
 
 
 class Corner(NamedTuple):
-    """A point of the Minkowski difference M, vertex i of the first body minus vertex j of the second."""
+    """A point of the Minkowski difference M = {a - b}: `at` is vertex i of the first body minus vertex j of the second."""
 
     at: Point3
     i: int
@@ -45,7 +45,7 @@ class Corner(NamedTuple):
 
 
 class Simplex(NamedTuple):
-    """A simplex of n <= 3 corners of M; unused ones repeat a used one."""
+    """A simplex of the GJK walk, n <= 3 corners of the Minkowski difference; unused ones of a, b, c repeat a used one."""
 
     a: Corner
     b: Corner
@@ -55,7 +55,8 @@ class Simplex(NamedTuple):
 
 @inline
 def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
-    """Return the barycentric weights of the point of triangle a b c, maybe degenerate, nearest to the origin."""
+    """Return the barycentric weights, from 0 to 1, of the point of triangle a b c, maybe degenerate, nearest to the
+    origin."""
     u, v = minus(b, a), minus(c, a)
     ua, va, ub, vb, uc, vc = -dot(u, a), -dot(v, a), -dot(u, b), -dot(v, b), -dot(u, c), -dot(v, c)
     if ua <= 0.0 and va <= 0.0:
@@ -82,8 +83,8 @@ def _weights(a: Point3, b: Point3, c: Point3) -> tuple[float, float, float]:
 
 @inline
 def _add_corner(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
-    """Reduce a simplex and a new corner to the sub-simplex that contains its point nearest to the origin; return that
-    point too."""
+    """Return the simplex, of the corners of s and a new one, that carries the point of their hull nearest to the origin
+    and no corner more, and that point."""
     best, reduced, nearest = np.inf, s, new.at
     for turn in range(3):
         p, q = (s.b if turn == 2 else s.a), (s.b if turn == 0 else s.c)
@@ -102,7 +103,8 @@ def _add_corner(s: Simplex, new: Corner) -> tuple[Simplex, Point3]:
 
 @merged
 def _support_corner(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3) -> tuple[Corner, float]:
-    """Support mapping: return the corner of M that minimises dot(v, corner), and that minimum."""
+    """Support mapping of the Minkowski difference {a - b}: return its corner that minimises dot(v, corner), a
+    difference of two vertices, and that minimum, rounded."""
     i = support_vertex(pool.points, a, rotate_back(a.place, negative(v)))
     j = support_vertex(pool.points, b, rotate_back(b.place, v))
     at = minus(placed(point_of(pool.points, i), a.place), placed(point_of(pool.points, j), b.place))
@@ -111,8 +113,8 @@ def _support_corner(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3)
 
 @merged
 def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: float) -> float:
-    """Return a lower bound on the distance of two bodies without their radii: the width of the slab between them across
-    v. error: of a placed point, both bodies together."""
+    """Return a lower bound on the distance of two placed bodies without their radii: the width of the slab between them
+    across the direction v, which points from b to a. error: bound on a placed coordinate, both bodies together."""
     d = negative(v)
     size = abs(d.x) + abs(d.y) + abs(d.z)
     gap = -(support_value(pool.points, a, d) + support_value(pool.points, b, v)) - 2.25 * error * size
@@ -122,8 +124,9 @@ def _slab(pool: ConvexArrays, a: PlacedBody, b: PlacedBody, v: Point3, error: fl
 @merged
 def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b: PlacedBody, gap: float,
                   is_measured: bool) -> float:  # fmt: skip
-    """Return the distance of two convex bodies, infinity if it is at least `gap`, NaN if unproven. is_measured: if
-    False, return 0.0 for a distance below `gap`."""
+    """Return the distance of two convex bodies, correctly rounded; infinity if it is provably at least `gap`, NaN if
+    unproven. first, second: their indices in the pool; a, b: the same, placed. is_measured: if False, 0.0 stands for
+    any distance below `gap`."""
     error = a.place.error + b.place.error
     v = minus(interior_point(pool.numbers, first, a, CENTER), interior_point(pool.numbers, second, b, ASIDE))
     corner, along = _support_corner(pool, a, b, v)
@@ -155,14 +158,15 @@ def gap_of_convex(pool: ConvexArrays, first: int, second: int, a: PlacedBody, b:
 
 @merged
 def _dual(pool: ConvexArrays, f: PlacedBody, vertex: int, shift: Wide3) -> Wide3:
-    """Return a placed vertex in double-doubles, with `shift` in place of the translation."""
+    """Return a vertex of the pool rotated by body f's placement in double-doubles, with `shift` in place of the
+    translation."""
     return corner_of(f.place, point_of(pool.points, vertex), shift)
 
 
 @called
 def _certified_distance(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: PlacedBody, reach: float) -> float:
-    """Return the double nearest to the distance, measured between the features that simplex s names; NaN if unproven.
-    reach: bound on coordinates relative to the first body."""
+    """Return the double nearest to the distance of two placed bodies, measured between the features that the corners of
+    simplex s span; NaN if unproven. reach: bound on coordinates relative to the first body."""
     origin, p, q = Wide(0.0, 0.0), a.place.shift, b.place.shift
     here = Wide3(origin, origin, origin)
     there = Wide3(Wide(*two_diff(q.x, p.x)), Wide(*two_diff(q.y, p.y)), Wide(*two_diff(q.z, p.z)))
@@ -186,7 +190,8 @@ def _certified_distance(pool: ConvexArrays, s: Simplex, a: PlacedBody, b: Placed
 
 @inline
 def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
-    """Return three vertices of a body, distinct ones first, and the code of the feature they span: 0, 3 or FACE."""
+    """Return three vertices of a body, distinct ones first, and the code of the feature that they span: 0 a vertex, 3
+    an edge, or FACE (`near_triangles.py`)."""
     if i == j:
         j, k = k, j
     if i == j:
@@ -196,8 +201,8 @@ def _kinds(i: int, j: int, k: int) -> tuple[int, int, int, int]:
 
 @merged
 def _excess_beyond(pool: ConvexArrays, f: PlacedBody, n: Wide3, base: Wide3, shift: Wide3, reach: float) -> float:
-    """Return max(0, dot(n, x - base)) over the vertices x of a body, without those that floats prove to lie behind the
-    plane."""
+    """Return max(0, dot(n, x - base)) over the vertices x of body f, rotated and moved by `shift`, without those that
+    floats prove to lie behind the plane at base across n. reach: bound on coordinates."""
     d, most = Point3(n.x.h, n.y.h, n.z.h), 0.0
     local = rotate_back(f.place, d)
     level = d.x * (base.x.h - shift.x.h) + d.y * (base.y.h - shift.y.h) + d.z * (base.z.h - shift.z.h)
@@ -213,13 +218,12 @@ def gaps_of_pairs(
     forms: FloatArray, pool: ConvexArrays, bodies: IntArray, kinds: IntArray, poses: PoseArrays, places: IntArray,
     gap: float, is_measured: bool, distances: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill distances (n,) of disjoint pairs: infinity if at least `gap`, NaN if unproven; returns early when the flag
-    is set.
+    """Fill distances (n,) of n disjoint pairs of placed solids: infinity if at least `gap`, NaN if unproven. Returns
+    early when the flag is set.
 
-    kinds (n, 2): the solids of each pair; forms (n_solids, 8): their boxes or balls, NaN for other solids; bodies
-    (n_solids,): their index in the pool, or -1; places (n, 2): rows of the poses, 0 for none. is_measured: if False,
-    0.0 for a distance below `gap`.
-    """
+    kinds (n, 2): the solids of each pair; forms (n_solids, 8): numbers of their boxes or balls, NaN for other solids;
+    bodies (n_solids,): their index in the pool, or -1; places (n, 2): rows of the poses, 0 for none. is_measured: if
+    False, 0.0 stands for any distance below `gap`."""
     w = workspace(30)
     for item in range(places.shape[0]):
         if item % _POLL_EVERY == 0 and flag[0] != 0:

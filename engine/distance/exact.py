@@ -25,14 +25,15 @@ _SMALLEST: Final = 5e-324
 
 
 class Rational(NamedTuple):
-    """A point: numerators over one positive denominator."""
+    """A rational point: numerators over one positive denominator."""
 
     numerators: Vector
     denominator: int
 
 
 class Gap(NamedTuple):
-    """Points p, q of two bodies, the codes of the features they lie on, and their squared distance top / bottom."""
+    """Points p, q of two bodies; first, second: the codes of the features that they lie on (`near_triangles.py`); top /
+    bottom: their squared distance."""
 
     p: Rational
     q: Rational
@@ -47,7 +48,7 @@ class Gap(NamedTuple):
 
 
 class ScaledGap(NamedTuple):
-    """A gap between disjoint bodies, and the radii of balls about its ends; all lengths times `scale`."""
+    """A gap between disjoint bodies, and the radii of balls about its ends, in integers: lengths times `scale`."""
 
     gap: Gap
     radii: tuple[int, int]
@@ -94,7 +95,8 @@ class ScaledGap(NamedTuple):
 
 
 def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap:
-    """Return the gap between two disjoint triangles; first, second: codes of the features that are probably nearest."""
+    """Return the gap between two disjoint triangles. first, second: codes of the features that are probably nearest,
+    tried before all others."""
     suggested = _gap(s, t, first, second)
     if suggested is not None:
         wall, other = walls(suggested)
@@ -115,7 +117,8 @@ _PAIRS: Final = sorted(_ALL, key=lambda pair: max(pair[0] // 3, pair[1] // 3))
 
 
 def walls(gap: Gap) -> tuple[Wall, Wall]:
-    """Return the planes across a gap at its ends, p first: (n, at, size), beyond which lie x with n . x size <= at."""
+    """Return the planes across a gap at its ends, p first, each as (n, at, size): x lies on the plane or beyond it,
+    seen from the gap, if n . x size <= at."""
     (p, p_size), (q, q_size) = gap.p, gap.q
     n = tuple(y * p_size - x * q_size for x, y in zip(p, q))
     return (n, dot(n, p), p_size), (tuple(-x for x in n), -dot(n, q), q_size)
@@ -128,7 +131,8 @@ def is_beyond(wall: Wall, point: Vector) -> bool:
 
 
 def _gap(s: Corners, t: Corners, first: int, second: int) -> Gap | None:
-    """Return the gap of two features, None if the nearest points of their lines or planes lie outside them."""
+    """Return the gap of two features, given by codes, of triangles s and t; None if the nearest points of their lines
+    or planes lie outside them."""
     if first < 3:
         foot = _project(s[first], t, second)
         return None if foot is None else _between(Rational(s[first], 1), foot[0], first, foot[1])
@@ -145,8 +149,8 @@ def _between(p: Rational, q: Rational, first: int, second: int) -> Gap:
 
 
 def _project(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | None:
-    """Return the foot of a point on a feature of a triangle, and the code of the feature that it lies on; None if
-    outside."""
+    """Return the foot of a point on a feature of triangle t, and the code of the vertex, edge or face that it lies on;
+    None if it lies outside the feature."""
     if feature < 3:
         return Rational(t[feature], 1), feature
     if feature < FACE:
@@ -169,7 +173,8 @@ def _project(point: Vector, t: Corners, feature: int) -> tuple[Rational, int] | 
 
 
 def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] | None:
-    """Return the point at part / whole of edge k, and the code of the feature it lies on; None if beyond an end."""
+    """Return the point at parameter part / whole of edge k of t, and the code of the feature it lies on, the edge or an
+    end; None if it lies beyond an end."""
     a, b = t[k], t[(k + 1) % 3]
     if part == 0 or part == whole:
         return Rational(b if part else a, 1), ((k + 1) % 3 if part else k)
@@ -179,8 +184,8 @@ def _on_edge(t: Corners, k: int, part: int, whole: int) -> tuple[Rational, int] 
 
 
 def _edges(s: Corners, i: int, t: Corners, j: int) -> Gap | None:
-    """Return the gap across edge i of s and edge j of t, None if its ends lie outside them. None also for parallel
-    edges: then the gap at an end of one is as small."""
+    """Return the gap across edge i of s and edge j of t (0, 1, 2), None if its ends lie outside them. None also for
+    parallel edges: then the gap at an end of one is as small."""
     u, v, w = minus(s[(i + 1) % 3], s[i]), minus(t[(j + 1) % 3], t[j]), minus(s[i], t[j])
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     size = uu * vv - uv * uv

@@ -39,7 +39,8 @@ MEETING: Final = Clearance(0.0)
 
 
 def _feature(faces: int, d: int) -> Feature:
-    """Return the feature of a box common to some of its faces, given as bits 2 axis + side (0 low, 1 high)."""
+    """Return the feature (vertex, edge or face) of a box of dimension d in which some of its faces meet, given as bits
+    2 axis + side (0 low, 1 high)."""
     numbers = [0]
     for axis in range(d):
         is_within = not faces >> 2 * axis & 3
@@ -55,8 +56,8 @@ FEATURES = {d: [_feature(faces, d) for faces in range(1 << 2 * d)] for d in (2, 
 
 
 def _gap_from_closed_form(distance: float, least: float | None) -> Clearance | bool | None:
-    """Return the answer if a rounded distance decides it, else None. With `least`: whether the distance is at least
-    that; else MEETING for distance 0."""
+    """Return the answer that a correctly rounded distance, or UNSURE, decides. Given `least`, whether the distance is
+    at least that, None if they round alike; else MEETING for distance 0.0, None for any other."""
     if least is not None and distance not in (UNSURE, least):
         return bool(distance > least)
     return MEETING if distance == 0.0 else None
@@ -93,8 +94,8 @@ def between_forms(first: Solid, second: Solid, poses: Poses, least: float | None
 
 
 def between_form_and_plane(first: Solid, second: Solid, poses: Poses, least: float | None) -> Clearance | bool | None:
-    """Return the clearance of a box or ball and an unposed half-space, in either order; with `least`, whether it is at
-    least that. None if unproven."""
+    """Return the clearance of a box or ball and an unposed half-space, in either order; given `least`, whether it is at
+    least that; None if unproven."""
     is_second = isinstance(second, HalfSpace)
     plane, body = (second, first) if is_second else (first, second)
     form = form_of(body)
@@ -117,8 +118,9 @@ STILL2: Final = tuple(array[None] for array in motion_of(None, 2))
 def distances_under_poses(
     first: Solid, second: Solid, motions: Sequence[FloatArray], least: Fraction | None, budget: Budget
 ) -> FloatArray:
-    """Return the distances of two small planar bodies under poses, NaN if unproven. least: then 0.0 for nearer bodies
-    and infinity for others. motions: rotations and translations of each body, read-only."""
+    """Return the distances of two small planar bodies under n poses, NaN if unproven. least: if given, 0.0 for nearer
+    bodies and infinity for others instead. motions: rotations and translations of the first body, then of the second,
+    read-only."""
     turns, moves, their_turns, their_moves = motions
     distances = np.empty(len(their_turns))
     entry_of(nearest_under_poses)(
@@ -147,12 +149,13 @@ def _answer(distance: float, points: FloatArray, first: Feature, second: Feature
 
 
 def _named(solid: Solid, faces: int) -> Feature:
-    """Return the feature of a ball or box; faces: of a box, as bits."""
+    """Return the feature of a ball, or of a box by its faces as bits 2 axis + side."""
     return BALL if isinstance(solid, Sphere) else FEATURES[solid.dimension][faces]
 
 
 def scaled_gap(p: Vector, q: Vector, radii: tuple[float, float]) -> ScaledGap:
-    """Return the gap between points p and q of fractions, with balls of the given radii about them."""
+    """Return the gap between points p and q with rational coordinates, and balls of the given radii about them, in
+    integers."""
     numbers = [*p, *q, *map(Fraction, radii)]
     scale = lcm(*(x.denominator for x in numbers))
     whole = [int(x * scale) for x in numbers]

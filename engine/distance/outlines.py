@@ -31,8 +31,8 @@ _LEAST_FACTOR: Final = 2.0**-300
 
 
 class Look(NamedTuple):
-    """State of a scan for candidates in doubles: rows in `near`, least squared distance, largest squared distance of a
-    candidate, and error bound of distances."""
+    """State of a scan in doubles for pairs of vertex and edge that may be nearest (candidates). n: rows in `near`;
+    least: least squared distance; most: largest squared distance of a candidate; slack: error bound of a distance."""
 
     n: int
     least: float
@@ -41,7 +41,7 @@ class Look(NamedTuple):
 
 
 class Line(NamedTuple):
-    """An edge prepared for distances: start a, direction u, inverse squared length (0.0 for a point)."""
+    """An edge prepared for distances: start a, vector u to its end, share = 1 / |u|^2 (0.0 for an edge without length)."""
 
     a: Point2
     u: Point2
@@ -69,9 +69,9 @@ def way_to(p: Point2, line: Line) -> Point2:
 
 @inline
 def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bool, near: Any, look: Look) -> Look:
-    """Append to `near` the candidates among the vertices of blocks[0] of one body and the edges of blocks[1] of
-    another. Row: squared distance, whether the vertex is the first body's, the vertex, the edge. Returns the new state.
-    """
+    """Append to `near` the candidates among the vertices of block blocks[0] of `own` and the edges of block blocks[1]
+    of `other`. Row: squared distance, whether the vertex is the first body's (is_first), the vertex, the edge. Returns
+    the new state; n above MOST_NEAR: rows are missing."""
     n, least, most, slack = look
     for edge in range(BLOCK * blocks[1], min(BLOCK * (blocks[1] + 1), len(other.following))):
         line = line_of(other, edge)
@@ -92,7 +92,7 @@ def _of_blocks(own: Placed, other: Placed, blocks: tuple[int, int], is_first: bo
 
 @inline
 def row_of(near: Any, row: int) -> tuple[bool, int, int]:
-    """Return of a row of `near` whether the vertex is the first body's, the vertex, and the edge."""
+    """Return, of a row of `near`, whether the vertex is the first body's, the vertex, and the edge."""
     return near[4 * row + 1] != 0.0, int(near[4 * row + 2]), int(near[4 * row + 3])
 
 
@@ -110,7 +110,7 @@ def _retain_near(near: Any, n: int, most: float) -> int:
 
 @inline
 def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float:
-    """Return the squared distance of two boxes in doubles, rounded."""
+    """Return the squared distance of box `block` of boxes and box `other` of others, (n, 4) each, in rounded doubles."""
     x = max(boxes[block, 0] - others[other, 2], others[other, 0] - boxes[block, 2], 0.0)
     y = max(boxes[block, 1] - others[other, 3], others[other, 1] - boxes[block, 3], 0.0)
     return float(x * x + y * y)
@@ -118,7 +118,8 @@ def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float
 
 @inline
 def look_for(a: Placed, b: Placed, near: Any) -> Look:
-    """Write the candidate pairs of vertex and edge to `near`, nearest blocks first; more than MOST_NEAR: too many."""
+    """Write the candidate pairs of vertex and edge to `near`, nearest blocks first; return the state of the scan, with
+    n above MOST_NEAR if they do not fit."""
     least, first, second = np.inf, 0, 0
     for i in range(len(a.boxes)):
         for j in range(len(b.boxes)):
@@ -149,8 +150,8 @@ def _least_face(following: IntArray, vertex: int) -> int:
 
 @inline
 def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) -> tuple[VertexEdge, bool]:
-    """Return the distance of a vertex of `a` from an edge of `b`, and whether the position of the foot is proven.
-    is_first: whether `a` is the first body."""
+    """Return the distance of vertex number `vertex` of body a from edge number `edge` of b, and whether the position of
+    the foot (at an end or between) is proven. is_first: whether `a` is the first body."""
     end = b.following[edge]
     p, c, d = point(a.points, vertex), point(b.points, edge), point(b.points, end)
     distance, bound, where = measure(p, c, d, a.error + b.error)
@@ -165,7 +166,7 @@ def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) 
 
 @inline
 def _offset_between(a: Placed, b: Placed, pair: VertexEdge) -> Wide2:
-    """Return the vector between the two vertices that a pair names."""
+    """Return the vector from the second body's vertex of a pair to the first's; both features of the pair are vertices."""
     return minus2(point(a.points, pair.first), point(b.points, pair.second))
 
 
@@ -202,14 +203,14 @@ def _are_tied(a: Placed, b: Placed, one: VertexEdge, two: VertexEdge) -> bool:
 
 @inline
 def _rank(pair: VertexEdge) -> tuple[int, int, int, int]:
-    """Return the key by which ties are ordered: both faces, then both features."""
+    """Return the key by which tied pairs are ordered: the faces (edges) of both bodies, then the features."""
     return pair.face, pair.their_face, pair.first, pair.second
 
 
 @inline
 def search(a: Placed, b: Placed, near: Any, n: int) -> tuple[VertexEdge, float, bool]:
-    """Return the nearest of the n candidates, ties by the lowest faces; a bound on how much nearer another may be; and
-    whether it is proven unique."""
+    """Return the nearest of the n candidates, ties by the lowest faces; a bound on how much nearer another one may be;
+    and whether the pair of features is proven."""
     none, is_proven = Wide(np.inf, 0.0), True
     best, rival = VertexEdge(none, 0.0, True, -1, -1, 0, 0), none
     for row in range(n):
@@ -249,8 +250,9 @@ _POLL_EVERY: Final = 16
 
 @inline
 def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> bool:
-    """Return whether the line perpendicular to the connection of a vertex and an edge provably separates two bodies.
-    error: for a direction n a product dot(n, x) is off by less than 8 u |n| of the largest coordinate."""
+    """Return whether the line perpendicular to the connection of a vertex of `own` and an edge of `other` provably
+    separates the two bodies. error: for a direction n a product dot(n, x) is off by less than 8 u |n| of the largest
+    coordinate."""
     way, low, high = way_to(as_point2(own.points, vertex), line_of(other, edge)), np.inf, -np.inf
     for vertex in range(len(own.following)):
         low = min(low, way.x * own.points[vertex, 0] + way.y * own.points[vertex, 1])
@@ -261,7 +263,7 @@ def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> 
 
 @called
 def _related(a: Placed, b: Placed, error: float) -> int:
-    """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven; error: of rounded coordinates."""
+    """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven. error: bound on a rounded coordinate."""
     own, their, none = a.following, b.following, a.following[:0]
     relation, _, _, _, _ = relate_placed(a.points, own, none, b.points, their, none, b.boxes, error)
     return -1 if relation == UNSETTLED else (1 if relation == DISJOINT else 0)
@@ -269,7 +271,8 @@ def _related(a: Placed, b: Placed, error: float) -> int:
 
 @inline
 def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
-    """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven or out of range."""
+    """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven or out of range. near, look: the candidates,
+    whose nearest gives the line to try first."""
     error = 2.0**-51 * max(a.reach if a.error > 0.0 else 0.0, b.reach if b.error > 0.0 else 0.0)
     error += 2.0**-1000 if error > 0.0 else 0.0
     if not (a.reach + b.reach < np.inf and look.least < np.inf):
@@ -291,8 +294,9 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
 def _write_offset_point(
     at: Wide2, error: float, errors: float, pair: VertexEdge, way: Wide2, radius: float, points: FloatArray, end: int
 ) -> bool:
-    """Write at + radius way / |way| to points[end]; return whether both coordinates are correctly rounded. error: of
-    the point `at`; errors: of both ends of the connection together. way: toward the other end."""
+    """Write at + radius way / |way| to points[end] (2,); return whether both coordinates are correctly rounded. way:
+    from `at` to the other end of the connection `pair`. error: bound on a coordinate of `at`; errors: of both ends
+    together."""
     is_proven = True
     for k in range(2):
         x, bound = (at.x if k == 0 else at.y), error
@@ -306,9 +310,11 @@ def _write_offset_point(
 
 @inline
 def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray) -> tuple[float, int, int]:
-    """Return the distance of two bodies with radii, and the features of their nearest points, which fill points (2, 2).
-    Distance: 0.0 if they provably meet, or UNSURE. Feature: the vertex, or the number of vertices + the edge; -1 if
-    unproven. A ball is one vertex and a radius."""
+    """Return (distance, feature, other feature) of two placed bodies with radii; fill points (2, 2) with nearest
+    points.
+
+    Distance: the nearest double, 0.0 if they provably meet, or UNSURE. Feature: a vertex, or the number of vertices +
+    the edge; the first is -1 if the points are unproven. A ball is one vertex and a radius."""
     near = workspace(ROOM)
     look = look_for(a, b, near)
     are_apart = _are_apart(a, b, near, look)
@@ -338,7 +344,7 @@ def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: F
 
 @inline
 def _n_rows(following: IntArray) -> int:
-    """Return the number of rows for the points and boxes of an outline."""
+    """Return the number of rows that the points and the boxes of an outline take in the work space."""
     return len(following) + n_blocks(len(following))
 
 
@@ -348,8 +354,9 @@ def nearest_under_poses(
     their_following: IntArray, their_radius: float, their_turns: FloatArray, their_moves: FloatArray,
     distances: FloatArray, points: FloatArray, flag: FlagArray,
 ) -> tuple[float, int, int]:  # fmt: skip
-    """Fill distances with the distance under each pose of the second body, unless empty; return `_nearest` of the last
-    pose. The first body has as many poses as the second, or one. Stops early when the flag is set."""
+    """Fill distances with the distance of two outlines with radii under each pose of the second, unless empty; return
+    the distance and features that `_nearest` gives for the last pose, its points in `points`. turns (n, 2, 2), moves
+    (n, 2): poses of the first, as many as of the second, or one. Stops early when the flag is set."""
     n, m, k = len(following), len(their_following), _n_rows(following)
     room = np.empty((k + _n_rows(their_following), 4))
     at, boxes, their_at, their_boxes = room[:n], room[n:k], room[k : k + m], room[k + m :]

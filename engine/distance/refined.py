@@ -50,7 +50,8 @@ ROOT: Final = -1
 
 
 class View(NamedTuple):
-    """A body in a search: its mesh, its placement, and the power of two by which its numbers are scaled."""
+    """A body in a search: its mesh, its placement, and `unit`, the power of two by which its coordinates are
+    multiplied."""
 
     mesh: MeshArrays
     place: Placement
@@ -71,7 +72,7 @@ work, fixed: of `lanes/faces.py`."""
 
 
 def new_room(room: int) -> Room:
-    """Allocate work space for `room` pairs."""
+    """Allocate work space for `room` pairs of boxes, and as many of triangles."""
     heap, pairs = Heap(np.empty(room), np.empty((room, 2), np.int64)), np.empty((room, 4), np.int64)
     return Room(
         heap, Candidates(pairs, np.empty(room)), np.empty(2),
@@ -81,7 +82,7 @@ def new_room(room: int) -> Room:
 
 
 class Search(NamedTuple):
-    """One query: both bodies, a bound on the rounding of points of both together, and work space."""
+    """One query: both bodies, `error`, a bound on the rounding of points of both together, and work space."""
 
     a: View
     b: View
@@ -97,7 +98,8 @@ def scaled(p: Point3, unit: float) -> Point3:
 
 @inline
 def retain_below(candidates: Candidates, n: int, most: float) -> int:
-    """Remove the candidates of n whose bound is above `most`; return the number of the others."""
+    """Remove the first n candidates' rows whose lower bound is above `most`; return the number of the others, moved to
+    the front."""
     n_left = 0
     for item in range(n):
         if candidates.bounds[item] <= most:
@@ -122,19 +124,20 @@ def _clamped_quotient(top: Wide, bottom: Wide) -> Wide:
 
 @inline
 def _row(a: Point3, p: Point3, shift: Wide) -> Wide:
-    """Return dot(a, p) + shift in double-double."""
+    """Return dot(a, p) + shift in double-double; a, p: doubles."""
     return plus(plus(plus(shift, product(a.x, p.x)), product(a.y, p.y)), product(a.z, p.z))
 
 
 @called
 def corner_of(place: Placement, p: Point3, shift: Wide3) -> Wide3:
-    """Return the rotated point p plus `shift`, in double-doubles."""
+    """Return R p + `shift` in double-doubles, R the rotation of a placement."""
     return Wide3(_row(place.x, p, shift.x), _row(place.y, p, shift.y), _row(place.z, p, shift.z))
 
 
 @inline
 def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
-    """Return the corners of a triangle under its placement in double-doubles, with `shift` as the translation."""
+    """Return the corners of a triangle of a body, rotated by its placement and scaled by its unit, in double-doubles,
+    with `shift` as the translation."""
     t = triangle_of(view.mesh, triangle)
     p, q = corner_of(view.place, scaled(t.p, view.unit), shift), corner_of(view.place, scaled(t.q, view.unit), shift)
     return Facet(p, q, corner_of(view.place, scaled(t.r, view.unit), shift))
@@ -142,22 +145,23 @@ def corners_of(view: View, triangle: int, shift: Wide3) -> Facet:
 
 @inline
 def _edge(t: Facet, k: int) -> tuple[Wide3, Wide3]:
-    """Return the start of edge k of a triangle, and the vector to its end."""
+    """Return the start of edge k (0, 1, 2) of a triangle, and the vector to its end."""
     a = corner(t, k)
     return a, less3(corner(t, k + 1), a)
 
 
 @inline
 def _reach(u: Wide3) -> float:
-    """Return the largest magnitude of a coordinate."""
+    """Return the largest magnitude of a component."""
     return max(abs(u.x.h), abs(u.y.h), abs(u.z.h))
 
 
 @called
 def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, float, float]:
-    """Return the point of a feature of t (vertex, edge, FACE) closest to a point, a margin and an error amplification.
-    If the foot lies outside the feature, some other point of it. Margin: weights times their denominator, the smallest.
-    Amplification: lengths of the edges over the denominator. Both in the units of the module's table."""
+    """Return (closest point, margin, amplification) for a point and a feature of t, given by its code (vertex, edge,
+    FACE). If the foot lies outside the feature, the point is some other point of it. Margin: the smallest weight times
+    the denominator of the weights, negative outside, infinite for a vertex. Amplification of errors (condition number):
+    the lengths of the edges over the denominator. Both in the units of the module's table."""
     if feature < 3:
         return corner(t, feature), np.inf, 0.0
     a, u = _edge(t, feature % 3)
@@ -181,8 +185,8 @@ def _closest_on_feature(point: Wide3, t: Facet, feature: int) -> tuple[Wide3, fl
 
 @called
 def ends_of(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide3, Wide3, float, float]:
-    """Return the closest points of a feature (vertex, edge, FACE) of s and one of t, with margin and error
-    amplification. Margin and amplification: see `_closest_on_feature`."""
+    """Return (p, q, margin, amplification): the closest points of a feature of s and one of t, given by codes, the
+    smaller margin of their weights and the sum of their error amplifications (`_closest_on_feature`)."""
     if second < 3:
         q = corner(t, second)
         p, inside, steepness = _closest_on_feature(q, s, first)
@@ -209,7 +213,8 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 @called
 def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
-    """Return the distance of the closest points of two features, and a bound on how much nearer triangles may be."""
+    """Return the distance of the closest points of two features, and a bound on how much nearer points of the triangles
+    may be; 0, 0 where the distance is too small."""
     p, q, _, _ = ends_of(s, t, first, second)
     n = less3(q, p)
     square = dot3(n, n)
@@ -224,7 +229,8 @@ def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
 
 @inline
 def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
-    """Return the vertices of a feature of a triangle, -1 for none; of an edge the smaller vertex first."""
+    """Return the vertices of a feature, given by its code, of a triangle, -1 in place of missing ones; of an edge the
+    smaller vertex first."""
     t, k = view.mesh.triangles, feature % 3
     i, j = t[triangle, k], t[triangle, (k + 1) % 3]
     if feature < 3:
@@ -234,7 +240,7 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
 
 @inline
 def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
-    """Return the second translation less the first, times the unit, in double-doubles."""
+    """Return the translation `other` of the second body less `start` of the first, times the unit, in double-doubles."""
     unit = s.a.unit
     x, y = Wide(*two_diff(other[0] * unit, start[0] * unit)), Wide(*two_diff(other[1] * unit, start[1] * unit))
     return Wide3(x, y, Wide(*two_diff(other[2] * unit, start[2] * unit)))
@@ -242,8 +248,8 @@ def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
 
 @called
 def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int) -> tuple[float, int]:
-    """Bound n candidates in double-doubles and remove those that cannot be nearest; return the distance and the new n.
-    Distance: the nearest double, -1.0 if unproven. start, other: the translations of both bodies (3,). radii: of the
+    """Bound the first n candidates in double-doubles and remove those that cannot be nearest; return the distance, the
+    nearest double or -1.0 if unproven, and the new n. start, other: the translations of both bodies (3,). radii: of the
     balls about their triangles, times the unit."""
     candidates, unit = s.room.candidates, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
@@ -270,7 +276,8 @@ _SLACK: Final = 2.0**-86
 @inline
 def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3,
                slack: float) -> bool:  # fmt: skip
-    """Return whether all corners of a triangle but those `known` lie strictly behind the plane at base across n."""
+    """Return whether all corners of a triangle, placed as t, but the vertices `known` lie strictly behind the plane at
+    base across n, by more than slack."""
     for k in range(3):
         if view.mesh.triangles[triangle, k] in known:
             continue
@@ -284,8 +291,8 @@ def _write_offset_point(
     view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, error: float,
     point: FloatArray,
 ) -> bool:  # fmt: skip
-    """Write p + start, moved by radius along n, to point (d,); return whether it is correctly rounded. known: the
-    vertices of the feature that p lies on. error: of p."""
+    """Write p + start, moved by radius along n, to point (d,), divided by the unit; return whether it is correctly
+    rounded. known: the vertices of the feature that p lies on, -1 for none. error: bound on p."""
     size, is_proven, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
     is_given = radius == 0.0 and not view.place.is_posed
@@ -306,9 +313,9 @@ def _write_offset_point(
 def certify(
     s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, ...], n: int, points: FloatArray
 ) -> bool:
-    """Fill points (2, d) with the nearest points of two bodies; False if the n candidates do not prove them. The
-    candidate of these points moves to row 0; ties are decided by the lowest faces. start, other: translations of both
-    bodies (3,). radii: of the balls about their triangles."""
+    """Fill points (2, d) with the nearest points of two bodies, if the first n candidates prove them; else return
+    False. The candidate of these points moves to row 0; ties are decided by the lowest faces. start, other:
+    translations of both bodies (3,). radii: of the balls about their triangles, times the unit."""
     pairs, best = s.room.candidates.pairs, 0
     faces, their_faces = s.a.mesh.faces, s.b.mesh.faces
     here, there = named(s.a, pairs[0, 0], pairs[0, 2]), named(s.b, pairs[0, 1], pairs[0, 3])

@@ -54,7 +54,8 @@ def _room() -> Room:
 
 
 class SpreadPair:
-    """Two bodies, the second under many poses, the first under one or as many; used by one thread at a time."""
+    """Two bodies as triangles and radii, the second under n poses, the first under one or n; used by one thread at a
+    time."""
 
     def __init__(self, first: Solid, second: Solid, own: PoseArrays, second_poses: PoseArrays, budget: Budget) -> None:
         self.solids = first, second
@@ -81,13 +82,13 @@ class SpreadPair:
         return Clearance(float(answers[item]), points, self._features((i, j), codes))
 
     def _features(self, triangles: Sequence[int], codes: Sequence[int]) -> tuple[Feature, Feature]:
-        """Return the caller's features for two triangles and a feature code of each."""
+        """Return the caller's features for a triangle of each body and a feature code of each."""
         first, second = map(feature_of, self.solids, self.meshes, triangles, codes)
         return first, second
 
     def fill(self, start: int, stop: int, answers: FloatArray, least: Fraction | None = None) -> None:
-        """Fill the NaN entries of answers[start:stop] with the distances under these poses; the triangles do not meet.
-        least: then 0.0 for nearer bodies, infinity for others."""
+        """Fill the NaN entries of answers[start:stop] with the distances under these poses; caller guarantees that the
+        bodies' triangles do not meet. least: if given, 0.0 for nearer bodies, infinity for others instead."""
         limits = (np.inf, -1.0) if least is None else _around(least + sum(map(Fraction, self._radii)))
         for _, item, pairs in self._unanswered(start, stop, answers, Query(*limits, *self._radii, self._reach, False)):
             gap, _ = self._least(item, pairs)
@@ -96,8 +97,9 @@ class SpreadPair:
     def _unanswered(
         self, start: int, stop: int, answers: FloatArray, query: Query
     ) -> Iterator[tuple[int, int, Iterable[Sequence[int]]]]:
-        """Yield (outcome, pose, candidates) for each pose that the search in floats does not answer; the consumer fills
-        the answer. Candidates: rows of two triangles and a feature code of each."""
+        """Yield (outcome, pose number, candidates) for each pose start .. stop - 1 that the search in floats does not
+        answer; the consumer fills the answer. Candidates: rows of two triangles and a feature code of each; ANSWERED:
+        the answer is filled, and the first row names the nearest features."""
         (a, b), (own, poses) = self.meshes, self.poses
         while True:  # bound: an answer is filled, or the room doubles
             start, how, n = entry_of(find_nearest)(
@@ -115,8 +117,8 @@ class SpreadPair:
                 self._room = new_room(2 * len(self._room.candidates.bounds))
 
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
-        """Return the smallest gap of the candidates of pose `item`, ties by the lowest faces, and its two triangles;
-        exact."""
+        """Return the smallest gap of the candidates of pose number `item`, ties by the lowest faces, and its two
+        triangles; exact. pairs: rows of two triangles and a feature code of each."""
         self.n_exact += 1
         (a, b), (own, poses) = self.meshes, self.poses
         placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
@@ -147,7 +149,7 @@ class SpreadPair:
 
 
 class _ExactPair:
-    """Two bodies and their radii in integers, on one lattice."""
+    """Two bodies under one pose each, and their radii, in integers on one lattice."""
 
     def __init__(self, a: MeshBody, b: MeshBody, poses: Poses, radii: tuple[float, float]) -> None:
         self._bodies = exact_pair(a, b, poses, lattice_shift(np.array(radii)))
@@ -162,7 +164,8 @@ class _ExactPair:
         self._walls, self._beyond = walls(gap), ({}, {})
 
     def are_beyond(self, i: int, j: int) -> bool:
-        """Return whether triangles i and j are provably no nearer than the reference gap; vertex tests are cached."""
+        """Return whether triangle i of the first and j of the second body are provably no nearer than the reference
+        gap: both lie beyond its `walls`. Tests of vertices are cached."""
         for body, wall, known, triangle in zip(self._bodies, self._walls, self._beyond, (i, j)):
             for vertex in body.mesh.arrays.triangles[triangle].tolist():
                 if vertex not in known:
@@ -172,18 +175,19 @@ class _ExactPair:
         return True
 
     def gap(self, i: int, j: int, first: int, second: int) -> ScaledGap:
-        """Return the gap between triangles i and j; first, second: the probably nearest features."""
+        """Return the gap between triangles i and j; first, second: codes of the probably nearest features."""
         a, b = self._bodies
         return ScaledGap(nearest_of_triangles(a.corners(i), b.corners(j), first, second), self._radii, self._scale)
 
 
 def _pose_at(poses: PoseArrays, item: int) -> Pose | None:
-    """Return pose number `item`, None if the body has no pose."""
+    """Return pose number `item` of a body as a `Pose`, None if the body has no pose."""
     return Pose(poses.rotations[item], poses.translations[item]) if poses.is_posed else None
 
 
 def _around(target: Fraction) -> tuple[float, float]:
-    """Return a double above and one below a positive rational; the upper is infinite beyond the largest double."""
+    """Return (above, below): doubles around a positive rational with room for rounding; the upper one is infinite
+    beyond the largest double."""
     try:
         value = target.numerator / target.denominator
     except OverflowError:
@@ -192,7 +196,7 @@ def _around(target: Fraction) -> tuple[float, float]:
 
 
 def spread_pair(first: Solid, second: Solid, poses: Poses, budget: Budget) -> SpreadPair:
-    """Return two bodies as a `SpreadPair`, the input of distance kernels; poses: one `Pose` or None for each body."""
+    """Return two bodies, each under a `Pose` or None, as a `SpreadPair`, the input of distance kernels."""
     own, their = (STILL if at is None else in_space(at.rotation[None], at.translation[None]) for at in poses)
     return SpreadPair(first, second, own, their, budget)
 
@@ -210,7 +214,8 @@ def spread_of(solid: Solid) -> MeshBody:
 
 
 def _built(solid: Solid) -> MeshBody:
-    """Build the triangles without area of a planar body's edges, or of a ball's centre."""
+    """Build the mesh of a planar body's edges, or of a ball's centre: triangles without area at z = 0, one for each
+    edge or centre."""
     points, following = outline_of(solid)[:2]
     vertices = np.zeros((len(points), 3))
     vertices[:, : solid.dimension] = points
@@ -222,8 +227,8 @@ Outline = tuple[FloatArray, IntArray, float, "_Names"]
 
 
 def outline_of(solid: Solid) -> Outline:
-    """Return vertices (n, d), the end vertex of each edge, the radius, and the features of vertices, then edges;
-    cached. A ball is one vertex with a radius."""
+    """Return vertices (n, d), the end vertex of each edge (n,), the radius, and the features by number, vertices before
+    edges, of a planar body or a ball. Cached. A ball is one vertex with a radius."""
     cached: Outline | None = solid.cached("outline and names")
     return solid.prepared("outline and names", lambda: _outline(solid)) if cached is None else cached
 
@@ -236,7 +241,7 @@ def _outline(solid: Solid) -> Outline:
 
 
 class _Names(dict[int, Feature]):
-    """Features of an outline by number: vertices, then edges; made at first use."""
+    """Features of an outline by number: n vertices, then n edges; made at first use."""
 
     def __init__(self, solid: Solid, following: Sequence[int]) -> None:
         self._is_box, self._following = solid.type == "aabb", following
@@ -267,7 +272,8 @@ def in_space(rotations: FloatArray, translations: FloatArray) -> PoseArrays:
 
 
 def feature_of(solid: Solid, mesh: MeshBody, triangle: int, code: int) -> Feature:
-    """Return the feature with code `code` of a triangle (near_triangles.py), in the caller's numbering."""
+    """Return the feature with code `code` (`near_triangles.py`) of a triangle of a solid's mesh, in the caller's
+    numbering of vertices and faces."""
     if isinstance(solid, Sphere):
         return BALL
     face = int(mesh.faces[triangle])

@@ -35,8 +35,8 @@ from engine.types import FlagArray, Float32Array, FloatArray
 
 @inline
 def load_lane(view: View, at: int, fixed: Float32Array) -> None:
-    """Write box (6 rows) and disc (8 rows) of child at = 8 node + lane to column 0 of `fixed`; ROOT: around the whole
-    tree."""
+    """Write box (6 rows) and disc (8 rows) of a child of a body's tree to column 0 of `fixed`. at: 8 node + lane of the
+    child, or ROOT: around the whole tree."""
     if at == ROOT:
         for row in range(FIXED_ROWS):
             fixed[row, 0] = 4.0 if row > 11 else (2.0 if 3 <= row < 6 else (1.0 if row == 9 else 0.0))
@@ -49,7 +49,7 @@ def load_lane(view: View, at: int, fixed: Float32Array) -> None:
 
 @merged
 def size_of(view: View) -> float:
-    """Return the size of a unit of the body's tree coordinates in the scaled coordinates of the search."""
+    """Return the length, in the scaled coordinates of the search, of a unit of the body's tree coordinates."""
     return float(view.mesh.scale * view.unit)
 
 
@@ -72,7 +72,7 @@ def _triangle(view: View, item: int) -> Facet:
 @inline
 def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, float, tuple[int, int]]:
     """Return a lower and an upper bound on the distance of two triangles, and the feature codes of nearly nearest
-    points. error: bound on the rounding of points, both bodies together. If the lower bound is above `most`, features
+    points. error: bound on the rounding of points, both bodies together. If the lower bound is above `most`, the codes
     are arbitrary."""
     origin = s.p
     s, t = relative_to(origin, s), relative_to(origin, t)
@@ -83,8 +83,8 @@ def _measure(s: Facet, t: Facet, error: float, most: float) -> tuple[float, floa
 
 @merged
 def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatArray) -> tuple[int, int]:
-    """Append the candidate pairs of triangles of leaf blocks i and j; return the outcome and the number of candidates.
-    limits: see the module; the first is lowered to the least upper bound."""
+    """Append the candidate pairs of triangles of leaf blocks i and j to the n_candidates so far; return the outcome
+    (DONE, FULL, CLOSER) and their new number. limits: see the module; the first is lowered to the least upper bound."""
     frames, work, candidates, per_size = s.room.frames, s.room.work, s.room.candidates, _ABOVE_ONE / size_of(s.a)
     place_triangles(s.b.mesh.blocks, j, frames, work)
     for k in range(LANES):
@@ -124,9 +124,9 @@ _LARGEST: Final = 1e300
 
 
 class Query(NamedTuple):
-    """Goal of a search. most: distances of triangles up to it count. enough: a distance below it ends the search.
-    radius, other_radius: of balls about the triangles. reach: bound on sums of coordinates. is_answered: return
-    candidates of proven answers too."""
+    """Goal of a search. most: pairs farther apart do not count; enough: a distance below it ends the search; radius,
+    other_radius: of balls about the triangles; reach: bound on sums of coordinates; is_answered: also stop at poses
+    with a proven answer, for their features."""
 
     most: float
     enough: float
@@ -165,9 +165,9 @@ def drop_first(heap: Heap, n: int) -> None:
 
 @merged
 def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
-    """Push the pairs of one box with each child of a node of the other body; return the size of the heap. pair: the
-    node, the child (8 node + lane, or ROOT) of the other body, whether the node is the first body's. most: pairs with a
-    greater bound are dropped."""
+    """Push the pairs of one box with each child of a node of the other body on the heap of n entries; return its new
+    size. pair: the node; the box, 8 node + lane of the other body, or ROOT; whether the node is the first body's. most:
+    pairs with a greater bound are dropped."""
     node, other, is_first = pair
     view, fixed, own = (s.a, s.b, 0) if is_first else (s.b, s.a, 1)
     unit, their_unit = size_of(view), size_of(fixed)
@@ -186,14 +186,15 @@ def _expand(s: Search, n: int, pair: tuple[int, int, bool], most: float) -> int:
 
 @merged
 def _half_of(view: View, at: int) -> float:
-    """Return the largest half width of the box of child at = 8 node + lane, in tree coordinates."""
+    """Return the largest half width of the box of child at = 8 node + lane (ROOT: of the tree), in tree coordinates."""
     node, lane, b = at >> 3, at & 7, view.mesh.boxes
     return 2.0 if at == ROOT else float(max(b[node, 3, lane], b[node, 4, lane], b[node, 5, lane]))
 
 
 @inline
 def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
-    """Fill the candidates by a best-first search; return the outcome and their number. limits: see the module."""
+    """Fill the candidates by a best-first search; return the outcome (DONE, FULL, CLOSER, INTERRUPTED) and their
+    number. limits: see the module."""
     first, second, sizes = s.a.mesh.child, s.b.mesh.child, (size_of(s.a), size_of(s.b))
     n, n_candidates = 1, 0
     s.room.heap.bounds[0], s.room.heap.lanes[0, 0], s.room.heap.lanes[0, 1] = 0.0, ROOT, ROOT
@@ -226,10 +227,9 @@ def find_nearest(
     """Fill the NaN entries of answers (n,) for poses span[0] .. span[1] - 1 of both bodies; the first may have one
     pose.
 
-    Returns the first pose left open, the outcome of its search, and the number of candidates in `room.candidates`;
-    span[1] if none is left. An answer is the double nearest to the distance; with a limit 0.0 for a pose that is
-    provably nearer, infinity for one that is provably not.
-    """
+    Returns (pose, outcome, n): the first pose left open, the outcome of its search, and the number of candidates in
+    `room.candidates`; pose span[1] if none is left. An answer is the double nearest to the distance; with a limit in
+    the query 0.0 for a pose that is provably nearer, infinity for one that is provably not."""
     limits, has_one = room.limits, len(first_poses.translations) == 1
     for item in range(span[0], span[1]):
         if answers[item] == answers[item]:

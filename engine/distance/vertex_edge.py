@@ -62,8 +62,9 @@ VertexEdge = namedtuple("VertexEdge", "distance bound is_first first second face
 def place(
     vertices: FloatArray, following: IntArray, turn: FloatArray, move: FloatArray, points: FloatArray, boxes: FloatArray
 ) -> tuple[float, float]:
-    """Write the points and boxes of an outline under a pose; return `error` and `reach` of `Placed`. Each sum of three
-    is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles unchanged."""
+    """Write the points (n, 4) and the boxes of blocks of edges of an outline under a pose; return `error` and `reach`
+    of `Placed`. Each sum of three is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles
+    unchanged."""
     reach, is_given = 0.0, True
     for k in range(2):
         reach = max(reach, abs(move[k]))
@@ -84,7 +85,8 @@ def place(
 
 @inline
 def _reach(points: FloatArray, following: IntArray, boxes: FloatArray, reach: float) -> float:
-    """Write the boxes of placed points; return `reach` of `Placed`. reach: bound on the terms of coordinates."""
+    """Write the boxes of placed points; return `reach` of `Placed`, infinite if an edge is too short or a coordinate
+    too large for the bounds. reach: bound on the terms of coordinates."""
     box_blocks(points, following, boxes)
     for block in range(len(boxes)):
         for k in range(4):
@@ -123,7 +125,7 @@ def _magnitude(a: Wide) -> Wide:
 
 @inline
 def _is_whole(a: Wide) -> bool:
-    """Return whether a double-double is one double that may be a factor of an exact product."""
+    """Return whether a double-double is one double, zero or large enough to be a factor of an exact product."""
     return a.low == 0.0 and (a.h == 0.0 or abs(a.h) > _SHORTEST)
 
 
@@ -144,7 +146,7 @@ def _dot(u: Wide2, w: Wide2) -> Wide:
 
 @inline
 def _along(u: Wide2, w: Wide2, error: float) -> tuple[float, float]:
-    """Return dot(u, w) in floats and a bound on its error, 0.0 if its sign is proven; error: of coordinates."""
+    """Return dot(u, w) and a bound on its error, 0.0 if its sign is proven. error: bound on coordinates."""
     reach = max(size2(u), size2(w))
     value, slack = u.x.h * w.x.h + u.y.h * w.y.h, 2.0**-48 * size2(u) * size2(w) + 16.0 * error * reach + 2.0**-1000
     if abs(value) > slack:
@@ -170,8 +172,8 @@ def _is_level(u: Wide2, error: float) -> bool:
 
 @called
 def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, int]:
-    """Return the distance of p from segment ab, its error bound, and where p's foot lies: 0 at a, 1 at b, 2 between, -1
-    unproven. error: of the coordinates of both bodies together."""
+    """Return (distance, bound, where) of p and the segment ab: the distance as a double-double, its error bound, and
+    where p's foot lies: 0 at a, 1 at b, 2 between, -1 unproven. error: bound on coordinates of both bodies together."""
     u, w, v = minus2(b, a), minus2(p, a), minus2(b, p)
     is_level = _is_level(u, error)
     if is_level:
@@ -196,8 +198,8 @@ def measure(p: Wide2, a: Wide2, b: Wide2, error: float) -> tuple[Wide, float, in
 
 @inline
 def foot_of(own: Placed, other: Placed, vertex: int, feature: int) -> tuple[Wide2, float]:
-    """Return the point of `other` nearest to a vertex, on a feature known to contain it, and the point's error bound.
-    feature: a vertex, or number of vertices + edge."""
+    """Return the point of `other` nearest to vertex `vertex` of `own`, on a feature known to contain it, and the
+    point's error bound. feature: a vertex of `other`, or its number of vertices + an edge."""
     n, p, error = len(other.following), point(own.points, vertex), own.error + other.error
     if feature < n:
         return point(other.points, feature), other.error
