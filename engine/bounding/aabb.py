@@ -37,7 +37,8 @@ def box_of_points(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def corners_of_box(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the ``(2 ** dimension, dimension)`` corners of a box; bit k of the row says low or high on axis k."""
+    """Return the ``(2 ** dimension, dimension)`` corners of a box; bit k of a row's number says high (1) or low (0) on
+    axis k."""
     dimension = len(low)
     is_high = np.arange(2**dimension)[:, None] >> np.arange(dimension) & 1
     return np.where(is_high == 1, high, low)
@@ -48,13 +49,12 @@ def place_boxes(
     boxes: FloatArray, reaches: FloatArray, radii: FloatArray, kinds: IntArray, rows: IntArray, rotations: FloatArray,
     translations: FloatArray, low: FloatArray, high: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill low and high (n, d) with boxes of posed bodies, rounded outward.
+    """Fill low and high (n, d) with boxes around posed bodies, rounded outward.
 
-    boxes (n_kinds, 2, d): low and high of each kind of body, of a ball its centre twice. reaches (n_kinds,): largest
-    distance of the body's points (of a ball: its centre) from the middle of the box. radii (n_kinds,): of balls, 0.0
-    for others. kinds (n,) int64: kind of each body. rows (n,) int64: row of its pose in rotations (n_poses, d, d) and
-    translations (n_poses, d), -1 for none.
-    """
+    boxes (n_kinds, 2, d): low and high corner of each distinct body, of a ball its centre twice. reaches (n_kinds,):
+    largest distance of the body's points (of a ball: its centre) from the middle of the box. radii (n_kinds,): of
+    balls, 0.0 for others. kinds (n,) int64: row in these of each body. rows (n,) int64: row of its pose in rotations
+    (n_poses, d, d) and translations (n_poses, d), -1 for none."""
     dimension = low.shape[1]
     for body in range(low.shape[0]):
         kind, pose = kinds[body], rows[body]
@@ -89,8 +89,9 @@ _ENLARGED: Final = 2.0**-20
 
 @allocating_kernel
 def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, discs: Float32Array) -> None:
-    """Fill discs (n_nodes, 8, 8) at the inner nodes of a tree, from its blocks of triangles (`lanes/faces.py`) and its
-    boxes."""
+    """Fill discs (n_nodes, 8, 8) float32 of a tree: rows cx cy cz nx ny nz r t, one flat cylinder a lane around the
+    triangles below each child of an inner node. blocks (n_nodes, 9, 8): corners of the triangles at leaf nodes; child,
+    boxes: of the tree (`bvh.py`), in whose coordinates all is. Unused lanes get zeros; leaf nodes are not set."""
     n_nodes = child.shape[0]
     parents = np.full(n_nodes, -1, np.int64)  # 8 times the parent, and the lane
     for node in range(n_nodes):
@@ -121,15 +122,17 @@ def fill_discs(blocks: Float32Array, child: Int32Array, boxes: Float32Array, dis
 
 @inline
 def _corner(rows: Float32Array, node: int, lane: int, corner: int) -> Point3:
-    """Return corner `corner` (0, 1, 2) of the triangle in a lane of a block; of boxes, corner 0 is the centre."""
+    """Return corner 0, 1 or 2 of the triangle in a lane of a node's block (n_nodes, 9, 8); of rows of boxes (n_nodes,
+    6, 8), corner 0 is the centre."""
     x, y, z = rows[node, 3 * corner, lane], rows[node, 3 * corner + 1, lane], rows[node, 3 * corner + 2, lane]
     return Point3(float(x), float(y), float(z))
 
 
 @inline
 def _set_normals(blocks: Float32Array, child: Int32Array, parents: IntArray, normals: FloatArray) -> None:
-    """Set normals (n_nodes, 3), zero on entry, to the unit vector along the sum of the normals of all triangles below a
-    node. parents: 8 * parent node + lane; -1 for the root."""
+    """Set normals (n_nodes, 3), zero on entry, to the unit vector along the sum of the normals, weighted by area, of
+    all triangles below each node; z where the sum is about 0. parents (n_nodes,): 8 * parent node + lane; -1 for the
+    root."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
             continue
@@ -157,8 +160,9 @@ def _set_reached(
     blocks: Float32Array, child: Int32Array, boxes: Float32Array, parents: IntArray, normals: FloatArray,
     reached: FloatArray,
 ) -> None:  # fmt: skip
-    """Set reached (n_nodes, 3): least and largest dot(corner, normal) over the triangles below a node, and the largest
-    squared distance of a corner from the axis; relative to the centre of the node's box."""
+    """Set reached (n_nodes, 3), (inf, -inf, 0) on entry, for each node but the root: least and largest dot(v, normal),
+    and largest squared distance from the axis along the normal, over the corners of the triangles below it; v: a corner
+    minus the centre of the node's box. parents: as in `_set_normals`."""
     for node in range(len(child)):
         if child[node, 0] >= 0:
             continue

@@ -1,4 +1,5 @@
-"""Pairs of boxes with a common point: by a grid of cells at least as wide as all boxes but a few, or by a sweep.
+"""Broad phase: pairs of boxes with a common point, by a grid of cells at least as wide as all boxes but a few, or by a
+sweep.
 
 A box stands in the cell of its low corner. Two boxes of one cell's width or less that meet have their low corners at
 most a width apart on each axis, so in the same or in neighbouring cells. Each pair is tested from one side only:
@@ -43,7 +44,8 @@ _FASTEST: Final = 1e300
 
 
 class Axis(NamedTuple):
-    """A uniform division of an interval into cells; `cells_per_unit` is 0.0 for an empty interval."""
+    """A uniform division of the interval low .. high into n_cells cells; `cells_per_unit`: for each unit of x / 2, see
+    the module; 0.0 for an empty interval, of one cell."""
 
     low: float
     high: float
@@ -143,7 +145,7 @@ def _sweep_grid(low: FloatArray, high: FloatArray, numbers: IntArray, row: int) 
 
 @np.errstate(all="ignore")
 def _build_grid(low: FloatArray, high: FloatArray) -> CornerGrid | None:
-    """Return the `CornerGrid` of boxes (n, d), or None where a sweep is faster."""
+    """Return the `CornerGrid` of boxes (n, d), or None where a sweep is faster or coordinates are not finite."""
     n_boxes, dimension = low.shape
     extent = np.empty(n_boxes)
     _measure_extents(low, high, extent)
@@ -181,7 +183,8 @@ def _measure_extents(low: FloatArray, high: FloatArray, extent: FloatArray) -> N
 
 @kernel
 def _corner_ranges(low: FloatArray, extent: FloatArray, widest: float, span: FloatArray) -> None:
-    """Fill span (2, 3) with the least and largest low corner among boxes of extent <= `widest`."""
+    """Fill span (2, 3) with the least and the largest low corner, by axis, among boxes whose extent (n,) is <=
+    `widest`."""
     for box in range(low.shape[0]):
         if extent[box] <= widest:
             for axis in range(low.shape[1]):
@@ -194,8 +197,9 @@ def _sort_into_cells(
     low: FloatArray, high: FloatArray, extent: FloatArray, widest: float, least: FloatArray, width: FloatArray,
     grid: CornerGrid,
 ) -> int:  # fmt: skip
-    """Fill the arrays of `grid`; boxes and starts are zero on entry. Return the sum of (number of boxes)^2 over the
-    cells."""
+    """Fill the arrays of `grid`, zero on entry: boxes of extent <= `widest` by the cell of their low corner, then the
+    others. least, width (3,): corner of the first cell, and size of a cell. Returns the sum of (number of boxes)^2 over
+    the cells."""
     starts, n_boxes, n_cells, dimension = grid.starts, low.shape[0], grid.starts.shape[0] - 1, low.shape[1]
     cells = np.empty(n_boxes, np.int64)
     n_small = 0
@@ -245,8 +249,8 @@ def _boxes_intersect(boxes: FloatArray, box: int, other: int) -> bool:
 def _append_run(
     boxes: FloatArray, numbers: IntArray, box: int, start: int, stop: int, keys: IntArray, n_pairs: int
 ) -> int:
-    """Append to keys the pairs of `box` with those boxes start .. stop - 1 that it intersects; return the new number of
-    keys. The entry after the last key may be overwritten."""
+    """Append to keys those pairs of `box` with boxes start .. stop - 1 that intersect, as first * n_boxes + second in
+    input numbers; return the new number of keys. The entry after the last key may be overwritten."""
     n_boxes, own = numbers.shape[0], numbers[box]
     for other in range(start, stop):
         number = numbers[other]
@@ -257,8 +261,8 @@ def _append_run(
 
 @kernel
 def _collect_pairs(grid: CornerGrid, start: int, enough: int, keys: IntArray, flag: FlagArray) -> tuple[int, int]:
-    """Write keys first * n + second for the boxes from index `start` on, until there are at least `enough`. Returns the
-    number of keys, and the index to go on from."""
+    """Write keys first * n + second of the pairs of boxes from index `start` of the grid on, until there are at least
+    `enough` keys. Returns the number of keys, and the index to go on from; (0, n) if the flag is set."""
     boxes, numbers, starts, row, layer = grid.boxes, grid.numbers, grid.starts, grid.row, grid.layer
     n_boxes, n_small, n_pairs = numbers.shape[0], int(starts[-1]), 0
     for box in range(start, n_boxes):

@@ -1,4 +1,5 @@
-"""A tree of boxes over many small boxes, eight children a node, in flat arrays, built by the surface-area heuristic.
+"""Bounding volume hierarchy (broad phase): a tree of boxes over many small boxes, eight children a node, in flat arrays,
+built by the surface-area heuristic.
 
     node     boxes (n_nodes, 6, 8) float32: rows cx cy cz hx hy hz,      child (n_nodes, 8) int32
              centre and half width of each child, one child to a lane
@@ -62,7 +63,8 @@ _WORK = 1 << 18
 
 
 class Bvh(NamedTuple):
-    """Arrays of the tree; boxes and child as in the table of this module."""
+    """A tree of boxes: boxes (n_nodes, 6, 8) and child (n_nodes, 8) as in the table of this module; tree coordinates
+    are (x - origin) / scale."""
 
     boxes: Float32Array
     child: Int32Array
@@ -93,7 +95,7 @@ Bins = namedtuple("Bins", "boxes centres numbers costs")
 
 def build_bvh(boxes: FloatArray) -> Bvh:
     """Return the tree over `boxes` (n_items, 6) float64: xmin ymin zmin xmax ymax zmax; n_items >= 1. Cost: n log n;
-    the two stored arrays take some 45 bytes an item. Raises: what `poll` does."""
+    the two stored arrays take some 45 bytes an item. Raises: DeadlineExceededError, CancelledError."""
     n_items, origin = len(boxes), np.empty(3)
     n_halves = 2 * n_items - 1
     own, around = np.empty((2, n_items, WIDTH), np.float32), np.empty((2, n_halves, WIDTH), np.float32)
@@ -124,8 +126,8 @@ def cache_aligned(array: Any) -> Any:
 
 @kernel
 def _normalise(boxes: FloatArray, origin: FloatArray, items: Items, halves: BinaryTree) -> float:
-    """Write the boxes in tree coordinates to items, and set origin (3,) and the root of the binary tree; return the
-    scale."""
+    """Write the boxes in tree coordinates to items, and set origin (3,) and the root (node 0) of the binary tree;
+    return the scale, a power of two."""
     n_items, half = boxes.shape[0], 0.0
     for axis in range(3):
         low, high = boxes[0, axis], boxes[0, 3 + axis]
@@ -168,23 +170,23 @@ def _middle_of(boxes: FloatArray, axis: int) -> float:
 
 @inline
 def _set_empty(halves: Any, node: int) -> None:
-    """Set the bounds of a node (or bin) to the empty box."""
+    """Set the bounds (boxes and centres) of a node or bin to the empty box."""
     fill(halves.boxes, node, _NO_BOX)
     fill(halves.centres, node, _NO_BOX)
 
 
 @inline
 def _include(halves: Any, node: int, others: Any, other: int) -> None:
-    """Enlarge the bounds of a node (or bin) by those of an item (or bin)."""
+    """Enlarge the bounds (boxes and centres) of a node or bin by those of an item or bin."""
     join(halves.boxes, node, others.boxes, other)
     join(halves.centres, node, others.centres, other)
 
 
 @allocating_kernel
 def _build_binary_tree(items: Items, halves: BinaryTree, stack: IntArray, state: IntArray) -> None:
-    """Continue building the binary tree, for about `_WORK` items. stack: (node, depth) of nodes to be split. state:
-    length of the stack, number of nodes. Caller guarantees 2 n - 1 rows of nodes, the first filled.
-    """
+    """Continue building the binary tree, for about `_WORK` items. stack: (node, depth) of nodes to be split. state
+    (2,): length of the stack and number of nodes, read and written. Caller guarantees 2 n - 1 rows of nodes, the first
+    one filled."""
     n_stack, n_nodes, n_seen = state[0], state[1], 0
     boxes, centres = np.empty((N_BINS, WIDTH), np.float32), np.empty((N_BINS, WIDTH), np.float32)
     bins = Bins(boxes, centres, np.empty(N_BINS, np.int64), np.empty(N_BINS, np.float32))
@@ -217,8 +219,9 @@ def _build_binary_tree(items: Items, halves: BinaryTree, stack: IntArray, state:
 def _collapse_to_eight(
     items: Items, halves: BinaryTree, boxes: Float32Array, child: Int32Array, stack: IntArray, state: IntArray
 ) -> None:
-    """Continue merging binary nodes into nodes of eight children, largest boxes first, for at most `_WORK` / 8 nodes.
-    stack: (binary node, node) to be filled. state: length of the stack, number of nodes filled or on it."""
+    """Continue merging binary nodes into nodes of eight children, opening the largest boxes first, for at most `_WORK`
+    / 8 nodes. stack: (binary node, node to be filled). state (2,): length of the stack, and number of nodes filled or
+    on it, read and written."""
     n_stack, n_nodes = state[0], state[1]
     gathered, left, runs = np.empty(WIDTH, np.int64), halves.left, halves.runs
     for _ in range(_WORK // WIDTH):
@@ -274,8 +277,9 @@ def _half_area(rows: Float32Array, row: int) -> float:
 
 @inline
 def _partition(items: Items, halves: BinaryTree, node: int, bins: Bins, parts: int) -> int:
-    """Sort the items of a node into two children, nodes parts and parts + 1, by the surface-area heuristic; set their
-    bounds. Returns the index of the right child's first item; the node's first item if there is no useful cut."""
+    """Split the items of a node between two children, nodes parts and parts + 1, by the surface-area heuristic (SAH);
+    reorder the items and set the children's bounds. Returns the index of the right child's first item; the node's first
+    item if there is no useful cut."""
     start, end, low, width, axis = halves.runs[node, 0], halves.runs[node, 1], np.float32(0.0), np.float32(-1.0), 0
     for candidate in range(3):
         smallest, largest = halves.centres[node, candidate], -halves.centres[node, 4 + candidate]
@@ -316,7 +320,8 @@ def _bin_of(centre: float, low: float, scale: float, n_bins: int) -> int:
 
 @inline
 def _cheapest_cut(boxes: Float32Array, scratch: int, bins: Bins, n_bins: int) -> int:
-    """Return how many bins are left of the cheapest cut, 0 if no cut has a finite cost. Overwrites boxes[scratch]."""
+    """Return the number of bins on the left of the cheapest cut by the surface-area heuristic, 0 if no cut has a finite
+    cost. Overwrites boxes[scratch] and the costs of the bins."""
     fill(boxes, scratch, _NO_BOX)
     number = 0
     for index in range(n_bins - 1, 0, -1):

@@ -74,9 +74,8 @@ def corners_of_half_spaces(rows: Sequence[Sequence[float]], budget: Budget | Non
 def _add(
     constraint: Vector, number: int, lines: list[Vector], rays: list[_Ray], budget: Budget
 ) -> tuple[list[Vector], list[_Ray]]:
-    """Return the lines and rays of the cone (lines, rays) intersected with the half-space constraint . x >= 0. number:
-    index of the constraint, its bit in `_Ray.zeros`.
-    """
+    """Return the lines and rays that generate the cone of `lines` and `rays` intersected with the half-space constraint
+    . x >= 0. number: index of the constraint, its bit in `_Ray.zeros`."""
     bit, slopes = 1 << number, [_dot(constraint, line) for line in lines]
     i_line = next((i for i, slope in enumerate(slopes) if slope != 0), None)
     if i_line is None:
@@ -90,9 +89,9 @@ def _add(
 
 
 def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: Budget) -> list[_Ray]:
-    """Return the rays of a pointed cone intersected with the half-space constraint . x >= 0. n_common: least number of
-    constraints that are zero on two adjacent rays, which lie on a common face of dimension 2. bit: of this constraint
-    in `_Ray.zeros`."""
+    """Return the rays of a cone, whose lines all lie on the constraint, intersected with the half-space constraint . x
+    >= 0. bit: of this constraint in `_Ray.zeros`. n_common: least number of constraints that are zero on two adjacent
+    rays, which span a face of dimension 2."""
     before: list[tuple[_Ray, int]] = []
     behind: list[tuple[_Ray, int]] = []
     survivors: list[_Ray] = []
@@ -119,7 +118,8 @@ def _cut(constraint: Vector, bit: int, rays: list[_Ray], n_common: int, budget: 
 
 
 def _project_onto(constraint: Vector, vector: Vector, line: Vector, slope: int) -> Vector:
-    """Return a positive multiple of `vector` + s line, with s such that it lies on the plane of the constraint."""
+    """Return a positive multiple of `vector` + s line, with s such that it lies on the plane of the constraint. slope:
+    constraint . line, positive."""
     value = _dot(constraint, vector)
     return reduced([slope * x - value * y for x, y in zip(vector, line)])
 

@@ -1,4 +1,4 @@
-"""Smallest enclosing sphere, exact: float64 proposes the farthest point, integers decide.
+"""Minimal enclosing ball (smallest enclosing sphere), exact: float64 proposes the farthest point, integers decide.
 
 The walk: take the smallest ball of a few points (`smallest_ball`, exact). Take the point farthest from its centre. If
 it is outside, take the smallest ball of the support and that point, which is strictly larger, and repeat; there are
@@ -48,7 +48,7 @@ _FEW: Final = 64  # candidates that are not worth a double-double pass
 
 @dataclass(frozen=True, slots=True)
 class MinimalSphere:
-    """Smallest enclosing sphere, its support and the work it took."""
+    """Minimal enclosing ball (smallest enclosing sphere), its support and the work it took."""
 
     center: FloatArray  # (dimension,): each coordinate the double nearest to the exact one
     radius: float  # the smallest double whose closed ball about `center` contains every point
@@ -81,8 +81,8 @@ def minimal_sphere_of_rationals(points: list[Rational], budget: Budget | None = 
 
 
 class _Walk:
-    """State of one search: points in float64, their exact coordinates by index, and a bound on the distance between the
-    two."""
+    """State of one search: points (n, d) in float64, their exact coordinates by index, and `slack`, a bound on the
+    distance between the two."""
 
     def __init__(self, points: FloatArray, exact: Callable[[int], Rational], slack: float, budget: Budget) -> None:
         self.points = points
@@ -195,8 +195,8 @@ def _round_up(value: Fraction) -> float:
 def excess_double_double(
     points: FloatArray, center: FloatArray, shift: list[Fraction], square: Fraction, unit: Fraction
 ) -> tuple[FloatArray, float]:
-    """Return |p - c|^2 - `square` for each point p and the exact centre c, and a bound on the error; both in units of
-    unit^2.
+    """Return |p - c|^2 - `square` for each point p (n,) and the exact centre c, and a bound on the error; both in units
+    of unit^2.
 
     center, shift: c = center + unit * shift, with |shift| below an ulp of the centre. unit: a power of two in which no
     component of p - c is above 1. bound: p - c is a double-double from the exact difference; its square and the sum
@@ -248,7 +248,8 @@ def root_up(square: Fraction) -> float:
 
 @dataclass(frozen=True, slots=True)
 class IntBall:
-    """A ball with centre ``center / scale`` and squared radius ``square / scale**2``; scale > 0."""
+    """A ball with centre ``center / scale`` and squared radius ``square / scale**2``, all integers; scale > 0. support:
+    the points on it that determine it."""
 
     center: IntPoint
     square: int
@@ -261,8 +262,8 @@ class IntBall:
 
 
 def smallest_ball(points: Sequence[IntPoint], through: int) -> IntBall:
-    """Return the smallest ball of integer points; ``points[through]`` must be on its surface. Support sets of at most
-    dimension + 1 points are tried from the smallest up; the smallest ball is unique and has such a support, so the
+    """Return the smallest ball around integer points; ``points[through]`` must be on its surface. Support sets of at
+    most dimension + 1 points are tried from the smallest up; the smallest ball is unique and has such a support, so the
     first ball that contains all points is that ball. For at most dimension + 2 points: 15 sets."""
     others = [index for index in range(len(points)) if index != through]
     for size in range(min(len(others), len(points[0])) + 1):

@@ -68,8 +68,9 @@ Bounds = tuple[list[Lanes], list[Lanes]]
 
 @traced
 def meeting(first: Rows, i: int, second: Rows, j: int, frames: Rows) -> tuple[int, int]:
-    """Return the pairs of children of node i of the first tree and node j of the second whose boxes may meet, as two
-    masks. Bit 8 a + b of the first 32-bit mask: lanes a < 4 and b; of the second: lanes a + 4 and b."""
+    """Return the pairs of children, lane a of node i of the first tree and lane b of node j of the second, whose boxes
+    may meet, as two 32-bit masks: bit 8 a + b of the first for a < 4, bit 8 (a - 4) + b of the second for the others.
+    """
     a = [load(first, BOX_ROWS * i + row) for row in range(BOX_ROWS)]
     b = [load(second, BOX_ROWS * j + row) for row in range(BOX_ROWS)]
     image, own, their_image, theirs = _image(b, frames, 0), _ends(a), _image(a, frames, FRAME_ROWS), _ends(b)
@@ -77,8 +78,9 @@ def meeting(first: Rows, i: int, second: Rows, j: int, frames: Rows) -> tuple[in
 
 
 def are_separated(lane: int, own: Bounds, image: Bounds, their_image: Bounds, theirs: Bounds) -> Mask:
-    """Return the mask of boxes of the second tree that an axis of either tree separates from the first tree's box in
-    `lane`."""
+    """Return a mask of eight boxes of the second tree: true where an axis of either tree separates a box from the box
+    in `lane` of the first tree. Each pair (low, high) bounds eight boxes: own and theirs in their own tree, image those
+    of the second tree in the first, their_image those of the first in the second."""
     pairs = []
     for (low, high), (their_low, their_high) in ((own, image), (their_image, theirs)):
         for k in range(3):
@@ -88,13 +90,13 @@ def are_separated(lane: int, own: Bounds, image: Bounds, their_image: Bounds, th
 
 
 def _ends(box: list[Lanes]) -> Bounds:
-    """Return low and high corners of eight boxes given as centre and half widths."""
+    """Return the low and the high corners of eight boxes given as six rows: centre and half widths."""
     return [box[k] - box[3 + k] for k in range(3)], [box[k] + box[3 + k] for k in range(3)]
 
 
 def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
-    """Return low and high corners of the boxes around the images of eight boxes under the map of `frames` from row
-    `first` on."""
+    """Return the low and the high corners of the boxes around the images of eight boxes under a map: rows of `frames`
+    from `first` on."""
     frame = [load(frames, first + row) for row in range(FRAME_ROWS)]
     centre = [dot(frame[3 * k : 3 * k + 3], box[:3]) + frame[SHIFT_ROW + k] for k in range(3)]
     half = [dot(frame[9 + 3 * k : 12 + 3 * k], box[3:]) + frame[MARGIN_ROW] for k in range(3)]
@@ -103,7 +105,8 @@ def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
 
 @traced
 def inside_box(boxes: Rows, node: int, low: Triple, high: Triple) -> int:
-    """Return the mask of a node's lanes whose boxes intersect the box from low to high, two float32 triples."""
+    """Return the mask of a node's lanes whose boxes intersect the box from low to high, two float32 triples in tree
+    coordinates."""
     own_low, own_high = _ends([load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)])
     pairs = [(own_low[k], high[k]) for k in range(3)] + [(low[k], own_high[k]) for k in range(3)]
     return bits_of(~any_above(pairs))
@@ -113,11 +116,12 @@ def inside_box(boxes: Rows, node: int, low: Triple, high: Triple) -> int:
 def enter_boxes(
     boxes: Rows, node: int, middle: Triple, inverse: Triple, slack: Number, last: Number, entered: Rows
 ) -> int:
-    """Return the mask of a node's lanes (`bvh.py`) whose boxes the segment middle + t half may meet for t in [-1,
-    last].
+    """Slab test: return the mask of a node's lanes (`bvh.py`) whose boxes the segment middle + t half may meet for some
+    t in [-1, last], the intervals of t between the two planes of each axis being intersected.
 
-    Sets entered (1, 8) to lower bounds of the entry parameters. All numbers are float32; inverse: 1 / half. With u =
-    2^-24 and S + 2 above all coordinates (`local_segment`), at a point of the box
+    Sets entered (1, 8) to lower bounds of the parameters t of entry. All numbers are float32; inverse: 1 / half; slack:
+    margin of a box. Source: T. Kay, J. Kajiya, Ray tracing complex scenes, 1986. With u = 2^-24 and S + 2 above all
+    coordinates (`local_segment`), at a point of the box
 
         |w - t e| <= h + 3 u (S + 2),    w = c - m as computed here, e the half in float32,
         t >= w / e - (h + 3 u (S + 2)) / |e|
@@ -164,8 +168,8 @@ def discs_meeting(
     low: int, high: int, first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array,
     scales: tuple[float, float], work: Float32Array,
 ) -> tuple[int, int]:  # fmt: skip
-    """Return those of the pairs (low, high), two masks as `meeting` returns them, whose discs may meet. scales: of the
-    two trees. work (DISC_ROWS + 1 or more, 8) float32: scratch."""
+    """Return those pairs of two masks (low, high), as `meeting` returns them for nodes i and j, whose discs may meet.
+    first, second: discs of either tree; scales: of the two trees. work (DISC_ROWS + 1 or more, 8) float32: scratch."""
     if low | high == 0:
         return low, high
     place_discs(second, j, frames, np.float32(scales[1] / scales[0]), inverse_ratio(scales[1], scales[0]), work)
@@ -176,14 +180,15 @@ def discs_meeting(
 
 @inline
 def inverse_ratio(their: float, own: float) -> Any:
-    """Return the factor that turns normals of the other tree's units into unit vectors; infinity, which separates
-    nothing, where float32 would lose bits of them."""
+    """Return own / their, two scales, as float32: the factor that turns normals carried over from the other tree into
+    unit vectors again; infinity, which separates nothing, where float32 would lose bits of them."""
     return np.float32(own / their if own / their <= 2.0**60 else np.inf)
 
 
 @traced
 def place_discs(second: Rows, j: int, frames: Rows, ratio: Number, inverse: Number, work: Rows) -> None:
-    """Write the discs of node j of the second tree, in coordinates of the first, to work; row 8: twice the margin."""
+    """Write the discs of node j of the second tree, in coordinates of the first, to rows 0 .. 7 of work; row 8: twice
+    the margin. ratio: scale of the second tree over that of the first; inverse: 1 / ratio (`inverse_ratio`)."""
     b = [load(second, DISC_ROWS * j + row) for row in range(DISC_ROWS)]
     for k in range(3):
         turn = [load(frames, 3 * k + column) for column in range(3)]
@@ -197,7 +202,8 @@ def place_discs(second: Rows, j: int, frames: Rows, ratio: Number, inverse: Numb
 
 @traced
 def unseparated_discs(lane: int, first: Rows, i: int, work: Rows) -> int:
-    """Return the mask of the discs in work that no normal separates from the disc in `lane` of node i."""
+    """Return the mask of the eight discs in work that neither normal separates from the disc in `lane` of node i of the
+    first tree."""
     a = [load_lane(first, DISC_ROWS * i + row, lane) for row in range(DISC_ROWS)]
     b = [load(work, row) for row in range(DISC_ROWS + 1)]
     gap = [b[k] - a[k] for k in range(3)]

@@ -50,7 +50,8 @@ _LINE: Final = 16
 
 @inline
 def _set_normal(row: Float32Array, place: int, u: tuple[float, ...], v: tuple[float, ...]) -> float:
-    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on its error."""
+    """Write u x v, scaled to a largest component of 1, to row[place : place + 3]; return a bound on the error of a
+    component, NaN if u x v is out of range."""
     x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     size = max(
         abs(u[1] * v[2]) + abs(u[2] * v[1]), abs(u[2] * v[0]) + abs(u[0] * v[2]), abs(u[0] * v[1]) + abs(u[1] * v[0])
@@ -65,7 +66,7 @@ def _set_normal(row: Float32Array, place: int, u: tuple[float, ...], v: tuple[fl
 
 @inline
 def set_nothing(row: Float32Array) -> None:
-    """Write an entry that no segment in the cell crosses, for a lane without a triangle."""
+    """Write an entry that no segment in the cell crosses, for a lane without a triangle; row (13,) or longer."""
     for k in range(ROWS - 1):
         row[k] = 0.0
     row[3] = -_FAR
@@ -77,7 +78,7 @@ def set_entry(
     v: tuple[float, ...],
 ) -> None:  # fmt: skip
     """Write the entry of a triangle to row (13,) or longer; NaN where a sign would not be certain. a, b, c: corners
-    minus R; u, v: b - a and c - a; each difference rounded once, in units of the cell."""
+    minus the cell's reference point R; u, v: b - a and c - a; each difference rounded once, in units of the cell."""
     normal_error = _set_normal(row, 0, u, v)
     distance = row[0] * a[0] + row[1] * a[1] + row[2] * a[2]
     reach = max(abs(a[0]), abs(a[1]), abs(a[2]))
@@ -99,8 +100,9 @@ def set_entry(
 
 @traced
 def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> int:
-    """Return the parity of crossings of the segment from R to (x, y, z) with eight triangles, group `group` of (n, 14,
-    8). The bit UNDECIDED is added where a triangle is too close to be certain."""
+    """Return 0 or 1, the parity of crossings of the segment from the cell's reference point R to R + (x, y, z) with the
+    eight triangles of group `group` of (n, 14, 8). The bit UNDECIDED (2) is added where a triangle is too close to be
+    certain."""
     side, least, most = planes_of(groups, group, (x, y, z))
     is_crossed = (side < -BAND) & ((least > BAND) | (most < -BAND))
     is_apart = (side > BAND) | ((least < -BAND) & (most > BAND))
@@ -109,8 +111,9 @@ def group_parity(groups: Rows, group: int, x: Number, y: Number, z: Number) -> i
 
 @merged
 def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: float) -> int:
-    """Return the parity of crossings of the segment from R to w with a cell's triangles, from group `group` to the
-    list's end. The bit UNDECIDED is added where a triangle is too close to be certain."""
+    """Return 0 or 1, the parity of crossings of the segment from the cell's reference point R to R + w with the cell's
+    triangles, from group `group` to the end of its list. The bit UNDECIDED (2) is added where a triangle is too close
+    to be certain."""
     parity = group_parity(groups, group, wx, wy, wz)
     while groups[group, ROWS - 1, 0] == 0.0:  # bound: the last group of each leaf says so
         group += 1
@@ -120,8 +123,9 @@ def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: fl
 
 
 def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, Lanes, Lanes]:
-    """Return, for eight triangles, a point's signed distance to the plane, and the least and largest to the three edge
-    planes."""
+    """Return (side, least, most) for each of eight triangles at a point x relative to R: n . x - d of its plane, and
+    the least and the largest m . x of the three planes through R and an edge; normals n and m have a largest component
+    of 1."""
     rows = [load(groups, ROWS * group + row) for row in range(ROWS - 1)]
     side = dot(rows[0:3], point) - rows[3]
     a, b, c = dot(rows[4:7], point), dot(rows[7:10], point), dot(rows[10:13], point)
@@ -130,7 +134,7 @@ def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, 
 
 @traced
 def prefetch_group(groups: Rows, group: int) -> None:
-    """Prefetch a group into the cache."""
+    """Prefetch group `group` of (n, 14, 8) into the cache."""
     for place in range(0, ROWS * LANES, _LINE):
         prefetch(groups, ROWS * LANES * group + place)
 

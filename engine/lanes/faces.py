@@ -105,9 +105,9 @@ def longest_axis(half: tuple[float, ...]) -> int:
 def near_triangles(
     corners: Rows, node: int, i: int, j: int, k: int, middle: Triple, r: Number, s: Number, reach: Number, slack: Number
 ) -> int:
-    """Return the mask of a block's lanes whose triangles a segment may meet. All numbers are float32. k: axis of the
-    largest component of the half e; i, j: the other two. middle: of the segment, on the axes i, j, k. r, s: e_i / e_k,
-    e_j / e_k. reach: |e_k| + slack."""
+    """Return the mask of a block's lanes (block number `node`) whose triangles a segment may meet. All numbers are
+    float32. k: axis of the largest component of e, half the segment; i, j: the other two. middle: of the segment, on
+    the axes i, j, k. r, s: e_i / e_k, e_j / e_k. reach: |e_k| + slack, slack as derived above."""
 
     def away(axis: int, place: int) -> Any:
         return [load(corners, CORNER_ROWS * node + axis + 3 * corner) - middle[place] for corner in range(3)]
@@ -133,9 +133,9 @@ LEAST_REACH: Final = 2.0**-50
 
 @traced
 def overhead(blocks: Rows, boxes: Rows, node: int, x: Number, y: Number, z: Number, blur: Number) -> tuple[int, int]:
-    """Return the masks of a node's lanes whose triangles are certainly above a point, and certainly not above it. x, y:
-    of the point, relative to the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
-    """
+    """Return two masks of a node's lanes: triangles that are certainly above a point, and triangles that certainly are
+    not. x, y: of the point, relative to the block's centre; z: an upper bound, in the coordinates of boxes (`bvh.py`).
+    blur: bound on the error of x and y."""
     rows = [load(blocks, OVERHEAD_ROWS * node + row) for row in range(OVERHEAD_ROWS)]
     u, v = [rows[k] - x for k in (0, 2, 4)], [rows[k] - y for k in (1, 3, 5)]
     turns = [u[i] * v[j] - v[i] * u[j] for i, j in ((0, 1), (1, 2), (2, 0))]
@@ -162,8 +162,9 @@ _BEYOND: Final = 2.0**98  # a float32 between all coordinates with their margins
 def faces_meeting(
     first: Float32Array, i: int, second: Float32Array, j: int, frames: Float32Array, work: Float32Array
 ) -> tuple[int, int]:
-    """Return the pairs of triangles of block i of the first tree and block j of the second that may meet, as two masks.
-    Masks as `boxes.meeting` returns them. work (WORK_ROWS, 8) float32: scratch."""
+    """Return the pairs of triangles, lane a of block i of the first tree and lane b of block j of the second, that may
+    meet, as two 32-bit masks (`boxes.meeting`). frames: maps between the trees (`boxes.py`). work (WORK_ROWS, 8)
+    float32: scratch."""
     low, high = meet_boxes(first, i, second, j, frames, work)
     if low | high == 0:
         return low, high
@@ -185,8 +186,8 @@ def _greatest(a: Lanes, b: Lanes, c: Lanes) -> Lanes:
 
 @traced
 def meet_boxes(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> tuple[int, int]:
-    """Return the pairs, two masks, that no axis of either tree separates; write the blocks' images under `frames` to
-    work."""
+    """Return the pairs of triangles of two blocks, as two masks, whose boxes no axis of either tree separates; write
+    both blocks' corners in coordinates of the other tree to work."""
     own, image = _bounds(first, i, second, j, frames, 0, work, _SECOND_IMAGE)
     theirs, their_image = _bounds(second, j, first, i, frames, FRAME_ROWS, work, _FIRST_IMAGE)
     masks = []
@@ -199,8 +200,9 @@ def meet_boxes(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Ro
 def _bounds(
     own_rows: Rows, own_block: int, rows: Rows, block: int, frames: Rows, frame_row: int, work: Rows, image_row: int
 ) -> tuple[Bounds, Bounds]:
-    """Return (low, high) of the triangles of one block, widened by the margin, and of the images of another block's
-    triangles. The images are written to work from row image_row on."""
+    """Return the boxes (low, high) of the triangles of one block, widened by the margin, and those of another block's
+    triangles in coordinates of the first tree. Their corners there are written to work from row image_row on;
+    frame_row: first row in frames of the map."""
     own, other = _block(own_rows, own_block), _block(rows, block)
     frame = [load(frames, frame_row + row) for row in range(FRAME_ROWS)]
     margin, image = frame[MARGIN_ROW], []
@@ -215,7 +217,8 @@ def _bounds(
 
 @traced
 def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: Rows) -> None:
-    """Write the normals of two blocks' triangles to work, with the least and largest product with their own corners."""
+    """Write the normals w of the triangles of block i and of block j to work, each with the least and largest product w
+    . x of its own corners x, widened by the margin."""
     for rows, block, frame_row, row in ((first, i, 0, _FIRST_NORMAL), (second, j, FRAME_ROWS, _SECOND_NORMAL)):
         own = _block(rows, block)
         p, q, r = own[0:3], own[3:6], own[6:9]
@@ -229,8 +232,8 @@ def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: R
 
 @traced
 def unseparated_faces(lane: int, work: Rows) -> int:
-    """Return the mask of the second block's triangles that no normal separates from the first block's triangle in
-    `lane`."""
+    """Return the mask of the second block's triangles that neither normal separates from the first block's triangle in
+    `lane`. work: what `meet_boxes` and `set_normals` wrote."""
 
     def rows(first: int, n_rows: int) -> list[Lanes]:
         return [load(work, first + row) for row in range(n_rows)]
@@ -263,14 +266,15 @@ def _sizes(v: Sequence[Lanes]) -> list[Lanes]:
 
 
 def _gaps(v: Sequence[Lanes], reach: Sequence[Lanes]) -> Lanes:
-    """Return the squared length of max(|v_k| - reach_k, 0) over three axes: squared distance of two boxes."""
+    """Return the squared length of max(|v_k| - reach_k, 0) over three axes: the squared distance of two boxes with
+    centres v apart and half widths that add up to reach."""
     gaps = [greater(abs(x) - r, 0.0) for x, r in zip(v, reach)]
     return dot(gaps, gaps)
 
 
 def _width(disc: Sequence[Lanes], cosine: Lanes) -> Lanes:
-    """Return the half width of a disc (radius, half thickness) along a direction; cosine: of the direction and its
-    normal."""
+    """Return how far a disc (radius, half thickness) reaches from its centre along a direction; cosine: of the angle
+    between the direction and the disc's normal."""
     radius, half = disc
     return abs(cosine) * half + root(greater((1.0 + ROUND) - cosine * cosine, ROUND)) * radius
 
@@ -280,12 +284,12 @@ def child_bounds(
     boxes: Rows, discs: Rows, node: int, fixed: Rows, frames: Rows, own: int, theirs: int, ratio: Number,
     inverse: Number, work: Rows,
 ) -> None:  # fmt: skip
-    """Write lower bounds on the distances of a node's eight children from a box with its disc to row 0 of work.
+    """Write lower bounds on the distances of a node's eight children from one box with its disc to row 0 of work, in
+    units of the node's tree.
 
-    fixed (FIXED_ROWS, 8): in lane 0 the box and the disc, in coordinates of the other tree. own, theirs: first rows in
-    frames of the maps to and from the node's tree. ratio: scale of the other tree over that of the node's tree;
-    inverse: see `inverse_ratio`.
-    """
+    boxes, discs: of that tree. fixed (FIXED_ROWS, 8): in lane 0 the box and the disc, in coordinates of the other tree.
+    own, theirs: first rows in frames of the maps to and from the node's tree. ratio: scale of the other tree over that
+    of the node's tree; inverse: 1 / ratio (`inverse_ratio`)."""
     box, disc = (
         [load(rows, n * node + row) for row in range(n)] for rows, n in ((boxes, BOX_ROWS), (discs, DISC_ROWS))
     )
@@ -319,15 +323,15 @@ def child_bounds(
 
 
 def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]:
-    """Return the least and largest product of the direction `way` with three corners."""
+    """Return the least and the largest product of the direction `way` with the three corners (9 rows) of a triangle."""
     p, q, r = (dot(way, corners[3 * k : 3 * k + 3]) for k in range(3))
     return lesser(p, lesser(q, r)), greater(p, greater(q, r))
 
 
 @traced
 def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
-    """Write the triangles of a block of the second tree, in coordinates of the first, and three times their centroids
-    to work."""
+    """Write the triangles of block `node` of the second tree, in coordinates of the first, to rows 0 .. 8 of work, and
+    three times their centroids to rows 9 .. 11."""
     own, corners = [load(blocks, CORNER_ROWS * node + row) for row in range(CORNER_ROWS)], []
     for corner in range(3):
         for k in range(3):
@@ -340,8 +344,8 @@ def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
 
 @traced
 def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number, work: Rows) -> int:
-    """Return the mask of the triangles in work that may be within distance `most` of the triangle in `lane` of a block.
-    Unused lanes count as near."""
+    """Return the mask of the eight triangles in work (`place_triangles`) that may be within distance `most` of the
+    triangle in `lane` of block `node` of the first tree. Unused lanes count as near."""
     own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
     theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
     d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]

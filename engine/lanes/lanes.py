@@ -160,8 +160,8 @@ def count_bits(bits: int) -> int:
 
 @inline
 def filter_pairs(bits: int, first_lane: int, remaining: _Traced, arguments: Any) -> int:
-    """Return those of the pairs `bits` that stay after a filter: byte k of `bits` has the partners of lane first_lane +
-    k. remaining(lane, *arguments): the mask of the partners that stay for a lane; called where a byte is not 0."""
+    """Return the pairs of a 32-bit mask `bits` that pass a filter: byte k holds the partners of lane first_lane + k as
+    bits. remaining(lane, *arguments): the mask of the partners that pass for a lane; called where a byte is not 0."""
     left = 0
     while bits != 0:  # bound: each turn ends a lane
         shift = lowest_bit(bits) & -LANES
@@ -180,8 +180,8 @@ def _emit_move(target: EmittedArray, at: Any, source: EmittedArray, first: Any, 
 
 @instruction(_emit_move)
 def move(target: Array, at: int, source: Array, first: int, n: int) -> None:
-    """Copy source[first : first + n] to target[at : at + n]. Flat float64 arrays, not the same; the caller guarantees
-    that both ranges are within them."""
+    """Copy source[first : first + n] to target[at : at + n]; both are flat float64 arrays, not the same one. The caller
+    guarantees that both ranges are within them."""
     target[at : at + n] = source[first : first + n]
 
 
@@ -252,8 +252,8 @@ def plain_array_at(address: int, shape: Any, dtype: Any) -> Any:
 
 
 def _array_intrinsic(typing_context: Any, address: Any, shape: Any, dtype: Any) -> Any:
-    """Return signature and code generator of `array_at`, the compiled form of `plain_array_at`, without reference
-    counting."""
+    """Return Numba signature and code generator of `array_at`, the compiled form of `plain_array_at`: an array that
+    does not own its memory, without reference counting."""
     made = types.Array(dtype.dtype, len(shape), "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -43,7 +43,8 @@ Triple: TypeAlias = tuple[Number, Number, Number]
 
 
 class Emitted:
-    """A value (LLVM) of the code that is being generated."""
+    """A stand-in for a value of traced code: the LLVM value, and the builder that appends instructions to the code
+    being generated."""
 
     __array_ufunc__ = None  # numpy leaves the operators to the stand-in
 
@@ -52,7 +53,7 @@ class Emitted:
 
     @classmethod
     def of(cls, builder: Any, number: Any) -> Any:
-        """Return `number` unchanged if it is emitted already, else as a constant."""
+        """Return `number` unchanged if it is a stand-in of this type already, else as a constant."""
         return number if isinstance(number, cls) else cls(builder, cls.constant(number))
 
     @staticmethod
@@ -62,7 +63,8 @@ class Emitted:
 
 
 def _writes(name: str) -> Any:
-    """Return a binary operator that emits the LLVM instruction `name`."""
+    """Return a binary operator of stand-ins that emits the LLVM instruction `name` and returns a stand-in of the left
+    operand's type."""
 
     def write(a: Any, b: Any) -> Any:
         return type(a)(a.builder, getattr(a.builder, name)(a.value, a.of(a.builder, b).value))
@@ -71,7 +73,8 @@ def _writes(name: str) -> Any:
 
 
 def _compares(word: str) -> Any:
-    """Return a comparison operator, lane by lane, false for NaN; word: <, <=, > or >=."""
+    """Return a comparison operator of stand-ins, lane by lane, false for NaN, that returns an `EmittedMask`; word: <,
+    <=, > or >=."""
 
     def write(a: Any, b: Any) -> EmittedMask:
         return EmittedMask(a.builder, a.builder.fcmp_ordered(word, a.value, a.of(a.builder, b).value))
@@ -80,15 +83,15 @@ def _compares(word: str) -> Any:
 
 
 class EmittedArray(Emitted):
-    """A C-contiguous array, represented by its base address."""
+    """A stand-in for a C-contiguous array, represented by its base address."""
 
     def address(self, place: Any) -> Any:
-        """Return the address of element `place`, counted through all axes."""
+        """Return the address of element number `place`, counted through all axes."""
         return self.builder.gep(self.value, [EmittedWord.of(self.builder, place).value])
 
 
 class EmittedWord(Emitted):
-    """An int64 in generated code."""
+    """A stand-in for an int64."""
 
     __add__, __mul__, __lshift__ = _writes("add"), _writes("mul"), _writes("shl")
     __and__, __or__ = _writes("and_"), _writes("or_")
@@ -101,7 +104,7 @@ class EmittedWord(Emitted):
 
 
 class EmittedMask(Emitted):
-    """Eight truth values in generated code."""
+    """A stand-in for eight truth values."""
 
     __and__, __or__ = _writes("and_"), _writes("or_")
 
@@ -110,7 +113,7 @@ class EmittedMask(Emitted):
 
 
 class EmittedLanes(Emitted):
-    """Eight float32 in generated code."""
+    """A stand-in for eight float32."""
 
     __add__, __sub__ = _writes("fadd"), _writes("fsub")
     __mul__, __truediv__ = _writes("fmul"), _writes("fdiv")
@@ -167,7 +170,8 @@ register_model(_MaskType)(lambda manager, kind: models.PrimitiveModel(manager, k
 
 
 def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
-    """Return the emitted form of an argument: of a type in `_TYPES`, or an array."""
+    """Return the stand-in for an argument of a traced function. kind: its Numba type, an array or one of `_TYPES`;
+    value: its LLVM value."""
     if isinstance(kind, types.Array):
         return EmittedArray(builder, context.make_array(kind)(context, builder, value).data)
     if kind == _NUMBERS:
@@ -181,7 +185,8 @@ def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 class _Traced(_Intrinsic):  # type: ignore[misc]
-    """A function that generates its own code in compiled callers; emit: what generates it, if not the function."""
+    """A function that Numba compiles by calling it: in compiled callers it, or `emit` if given, generates code from
+    stand-ins; in Python it runs as it is."""
 
     def __init__(self, function: Callable[..., Any], emit: Callable[..., Any] | None = None) -> None:
         signature = inspect.signature(function)
@@ -208,7 +213,8 @@ class _Traced(_Intrinsic):  # type: ignore[misc]
             )
 
     def _typed(self, arguments: tuple[Any, ...]) -> Any:
-        """Return the Numba signature for these argument types and the code generator, None if the types do not fit."""
+        """Return the Numba signature for these argument types and the code generator; None, which Numba reports as a
+        type error, if they do not fit the annotations."""
         kinds = [_TYPES.get(kind, given) for kind, given in zip(self._kinds, arguments, strict=True)]
         for kind, given in zip(self._kinds, kinds):
             if kind in ("Array", "Rows") and not (isinstance(given, types.Array) and given.layout == "C"):
@@ -238,7 +244,7 @@ def instruction(emit: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]
 
 
 def _define(operation: Any, operands: list[Any], result: Any) -> None:
-    """Define an operator on lanes or masks for compiled functions: types of operands and result."""
+    """Define an operator on lanes or masks for compiled functions. operands, result: their Numba types."""
 
     def typed(context: Any) -> Callable[..., Any]:
         if len(operands) == 1:
