@@ -59,7 +59,8 @@ _NEXT: Final = 4
 
 @merged
 def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float, float, float]:
-    """Return p + t (q - p) as a sum of two doubles, t = th + tl, then t (q - p) and q - p, rounded."""
+    """Return (h, l, m, d): h + l is p + t (q - p) as a double-double, t = th + tl; m and d are t (q - p) and q - p,
+    rounded."""
     dh, dl = two_diff(q, p)
     mh, ml = two_prod(th, dh)
     sh, sl = two_sum(p, mh)
@@ -68,8 +69,9 @@ def point_along(p: float, q: float, th: float, tl: float) -> tuple[float, float,
 
 @inline
 def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[float, bool]:
-    """Return p + t (q - p), and whether it is the proven nearest double; t is known to 18 u^2 + `slack`, relative.
-    Coordinates below 2^1000. A zero is never certified unless p = q."""
+    """Return p + t (q - p), t = th + tl, rounded, and whether it is the proven nearest double. slack: relative error of
+    t beside that of a quotient of double-doubles, 18 u^2. Coordinates below 2^1000. A zero is never certified unless p
+    = q."""
     sh, low, mh, _ = point_along(p, q, th, tl)
     bound = POINT_BOUND * (abs(p) + abs(mh)) + slack * abs(mh) + TINY
     return sh + low, (sh + (low - bound) == sh + (low + bound)) | (p == q)
@@ -79,8 +81,9 @@ def point_at(p: float, q: float, th: float, tl: float, slack: float) -> tuple[fl
 def side_of(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, x: float, step: float, e: Components
 ) -> int:
-    """Return the exact sign of (p w_q + q w_p) / (w_p + w_q) - (x + step), for weights given as expansions. `e` is a
-    workspace of 6 (n_wp + n_wq) places."""
+    """Return the exact sign of (p w_q + q w_p) / (w_p + w_q) - (x + step): on which side of x + step the cut lies. wp,
+    wq: the weights, positive, as expansions of n_wp and n_wq components. `e` is a workspace of 6 (n_wp + n_wq) places.
+    """
     n = 0
     ah, al = two_diff(p, x)
     bh, bl = two_diff(q, x)
@@ -99,12 +102,12 @@ def side_of(
 def nearest(
     p: float, q: float, wp: Components, n_wp: int, wq: Components, n_wq: int, sum_h: float, sum_l: float, e: Components
 ) -> tuple[float, bool]:
-    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and False if numbers are out of range.
+    """Return the double nearest to (p w_q + q w_p) / (w_p + w_q), and whether it is certain; False if numbers are out
+    of range.
 
-    wp, wq: positive compressed expansions (or zero, not both) of components within 2^-240 .. 2^240; sum: of both, to 4
-    u^2. `e`: see `side_of`. p and q must not be so far apart in size that products underflow. Subnormal results are
-    rounded correctly too, on numbers times 2^600.
-    """
+    wp, wq: the weights, positive compressed expansions (or zero, not both) of components within 2^-240 .. 2^240. sum_h,
+    sum_l: their sum as a double-double, to 4 u^2. `e`: workspace of 6 (n_wp + n_wq) places. p and q must not be so far
+    apart in size that products underflow. Subnormal results are rounded correctly too, on numbers times 2^600."""
     if p == q or n_wp == 0:
         return p + 0.0, True
     if n_wq == 0:
@@ -153,8 +156,9 @@ def parameter_and_point(
     segment: FloatArray, wp: Components, n_wp: int, wq: Components, n_wq: int, axis: int, at: float, point: FloatArray,
     e: Components,
 ) -> tuple[float, bool]:  # fmt: skip
-    """Set `point` to the nearest doubles of the crossing with weights wp, wq; return t, and whether all are certified.
-    axis, at: an axis whose coordinate is known, -1 for none. Weights and places of `e`: see `nearest`."""
+    """Set `point` (d,) to the nearest doubles of the point that divides the segment (2, d) by the weights wp, wq;
+    return its parameter t, 0 at the start, and whether all are certified. axis, at: an axis on which the coordinate is
+    known to be at, -1 for none. Weights and workspace `e`: as in `nearest`."""
     sum_h, sum_l = dd_add(
         wp[n_wp - 1] if n_wp > 0 else 0.0,
         wp[n_wp - 2] if n_wp > 1 else 0.0,

@@ -43,7 +43,8 @@ _BASE: Final = 2.0**BITS
 
 @inline
 def normalise(heap: IntArray, a: int) -> None:
-    """Carry the digits of the number at index a, and drop zeros at both ends; caller guarantees room for a carry."""
+    """Carry the digits of the number at index a of the heap so that each is in its range, and drop zeros at both ends;
+    caller guarantees room for a carry."""
     n, first, carry = heap[a], a + 2, 0
     for i in range(first, first + n):
         total = heap[i] + carry
@@ -91,8 +92,8 @@ def sign_of(heap: IntArray, a: int) -> int:
 
 @inline
 def sum_products(heap: IntArray, terms: IntArray, n_terms: int, c: int) -> bool:
-    """Store the sum of ``factor * a * b`` over n_terms rows ``terms[i] = (a, b, factor)`` at index c; False if it is
-    too long. a, b: indices of numbers. factor: 1 or -1."""
+    """Store the sum of ``factor * a * b`` over the first n_terms rows ``terms[i] = (a, b, factor)`` at index c of the
+    heap; False if it would be too long. a, b: indices of numbers. factor: 1 or -1."""
     bottom, top, n_summed = 0, 0, 0
     for i in range(n_terms):
         a, b = terms[i, 0], terms[i, 1]
@@ -133,8 +134,8 @@ def negate(heap: IntArray, a: int) -> None:
 
 @inline
 def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
-    """Return the five leading digits of the number at index a as a double-double, and the exponent of their unit in
-    digits."""
+    """Return (h, l, e) for the number at index a of the heap: its five leading digits, or fewer, are the double-double
+    h + l, in units of 2^(28 e)."""
     n = heap[a]
     h, low, taken = 0.0, 0.0, min(n, 5)
     for i in range(taken):
@@ -144,9 +145,9 @@ def leading(heap: IntArray, a: int) -> tuple[float, float, int]:
 
 @inline
 def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, free: int) -> tuple[float, bool]:
-    """Return the double nearest to x / w, ties to even, for w > 0; False if it is out of range or too long. x, w, one:
-    indices of numbers, one that of 1. free: index of three working slots.
-    """
+    """Return the double nearest to x / w, ties to even, for w > 0, and whether it is certain: False if it is out of
+    range or too long. x, w, one: indices of numbers on the heap, one that of 1. terms (3, 3): scratch; free: index of
+    three free slots."""
     if heap[x] == 0:
         return 0.0, True
     xh, xl, x_place = leading(heap, x)
@@ -174,7 +175,8 @@ def nearest_quotient(heap: IntArray, terms: IntArray, x: int, w: int, one: int, 
 
 
 def packed_numbers(numbers: list[list[int]]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return a heap of the numbers, row by row, and their indices; None if one has more than `MOST_OF_ROW` digits."""
+    """Return a heap (n,) of the numbers, row by row, and the index of each (n_rows, n_columns); None if one has more
+    than `MOST_OF_ROW` digits."""
     heap: list[int] = []
     places = np.zeros((len(numbers), len(numbers[0])), np.int64)
     for i, row in enumerate(numbers):

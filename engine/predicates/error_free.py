@@ -1,4 +1,4 @@
-"""Error-free sums and products of two doubles, and double-double arithmetic with proven error bounds.
+"""Error-free transformations (sums and products of two doubles), and double-double arithmetic with proven error bounds.
 
 The only file of the engine that needs compiler intrinsics: `fma` (one instruction where the CPU has it, else the C
 library's) and `workspace` (a few doubles on the stack, so that exact stages allocate nothing). Each has a plain twin

@@ -1,4 +1,4 @@
-"""Exact arithmetic on expansions: unevaluated sums of non-overlapping doubles.
+"""Expansion arithmetic, exact: expansions are unevaluated sums of non-overlapping doubles.
 
 An expansion is stored in a workspace `e` of the caller, with `n` components ``e[0] .. e[n - 1]``, all nonzero, of
 increasing magnitude, no two sharing a bit position. Its value is their exact sum, its sign that of the last component,
@@ -35,7 +35,7 @@ def is_safe(x: float) -> bool:
 
 @called
 def grow(e: Components, n: int, b: float) -> int:
-    """Add the double b to the expansion e of n components in place; return the new length."""
+    """Add the double b to the expansion e of n components in place; return the new length, at most n + 1."""
     q, n_out = b, 0
     for i in range(n):
         q, h = two_sum(q, e[i])
@@ -50,7 +50,7 @@ def grow(e: Components, n: int, b: float) -> int:
 
 @inline
 def grow_product(e: Components, n: int, a: float, b: float) -> int:
-    """Add a b to the expansion e in place, two more places; return the new length."""
+    """Add the product a b to the expansion e of n components in place; return the new length, at most n + 2."""
     for part in two_prod(a, b)[::-1]:  # the tail first; a loop, because two calls compile twice as long
         if part != 0.0:
             n = grow(e, n, part)
@@ -59,7 +59,7 @@ def grow_product(e: Components, n: int, a: float, b: float) -> int:
 
 @inline
 def add(e: Components, n: int, f: Components, m: int) -> int:
-    """Add the expansion f of m components to e in place, m more places; return the new length."""
+    """Add the expansion f of m components to e of n in place; return the new length, at most n + m."""
     for i in range(m):
         n = grow(e, n, f[i])
     return n
@@ -67,7 +67,7 @@ def add(e: Components, n: int, f: Components, m: int) -> int:
 
 @inline
 def add_scaled(e: Components, n: int, f: Components, m: int, b: float) -> int:
-    """Add b times the expansion f of m components to e in place, 2 m more places; return the new length."""
+    """Add b times the expansion f of m components to e of n in place; return the new length, at most n + 2 m."""
     for i in range(m):
         n = grow_product(e, n, f[i], b)
     return n
@@ -75,7 +75,8 @@ def add_scaled(e: Components, n: int, f: Components, m: int, b: float) -> int:
 
 @inline
 def add_product(e: Components, n: int, f: Components, m: int, g: Components, k: int) -> int:
-    """Add the product of expansions f (m components) and g (k) to e in place, 2 m k places; return the new length."""
+    """Add the product of expansions f (m components) and g (k) to e of n in place; return the new length, at most n + 2
+    m k."""
     for i in range(k):
         n = add_scaled(e, n, f, m, g[i])
     return n
@@ -83,7 +84,8 @@ def add_product(e: Components, n: int, f: Components, m: int, g: Components, k: 
 
 @inline
 def scale(f: Components, m: int, b: float, e: Components) -> int:
-    """Set e to b times the expansion f of m components, 2 m places, e not f; return the length."""
+    """Write the product of the double b and the expansion f of m components to e, another array of 2 m places or more;
+    return the number of components (scale-expansion)."""
     n_out = 0
     q = 0.0
     for i in range(m):
@@ -104,8 +106,8 @@ def scale(f: Components, m: int, b: float, e: Components) -> int:
 
 @called
 def compress(e: Components, n: int) -> int:
-    """Rewrite e in place with as few components as its bits need; return the new length. The last component is then
-    within an ulp of the value."""
+    """Rewrite the expansion e of n components in place with as few components as its bits need; return the new length.
+    The last component is then within an ulp of the value."""
     if n < 2:
         return n
     q = e[n - 1]
@@ -137,7 +139,7 @@ def sign(e: Components, n: int) -> int:
 
 @inline
 def magnitude(e: Components, n: int) -> int:
-    """Replace e by its absolute value, compressed; return the new length."""
+    """Replace the expansion e of n components by its absolute value, compressed; return the new length."""
     n = compress(e, n)
     if sign(e, n) < 0:
         for i in range(n):

@@ -94,7 +94,8 @@ def orient2d(a: Point2, b: Point2, c: Point2) -> int:
 
 @merged
 def rounded_determinant(u: Point3, v: Point3, w: Point3) -> tuple[float, float]:
-    """Return the determinant of three differences in floats, with the sign of orient3d, and its permanent."""
+    """Return the determinant of three difference vectors in floats, with the sign of orient3d, and its
+    permanent: the sum of the magnitudes of its six products."""
     vx_wy, wx_vy = v.x * w.y, w.x * v.y
     wx_uy, ux_wy = w.x * u.y, u.x * w.y
     ux_vy, vx_uy = u.x * v.y, v.x * u.y
@@ -127,8 +128,8 @@ def orient3d(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def axis_shift(smallest: float, largest: float, bottom: int, top: int) -> int:
-    """Return k such that magnitudes smallest .. largest, times 2^k, lie in [2^bottom, 2^top], or OUT_OF_RANGE.
-    smallest: of the nonzero magnitudes (infinity if there is none); largest: of all."""
+    """Return k such that nonzero magnitudes smallest .. largest, times 2^k, lie in [2^bottom, 2^top]: 0 if they do
+    already, OUT_OF_RANGE if no k does. smallest: infinity if all are zero."""
     if largest == 0.0:
         return 0
     high = frexp(largest)[1]
@@ -148,7 +149,8 @@ def smaller_nonzero(smallest: float, value: float) -> float:
 
 @inline
 def _shift_of(a: float, b: float, c: float, d: float, bottom: int, top: int) -> int:
-    """Return the `axis_shift` for four coordinates of one axis."""
+    """Return the `axis_shift` for the four coordinates of one axis: an exponent of two that takes them into [2^bottom,
+    2^top], or OUT_OF_RANGE."""
     smallest = smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(float("inf"), a), b), c), d)
     return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), bottom, top)
 
@@ -264,7 +266,7 @@ def _orient3d_in_pairs(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
 
 @inline
 def _add_scaled_minor(e: Components, n: int, m: Components, length: int, z: float, z_tail: float) -> int:
-    """Add (z + z_tail) times the expansion m to e; return the new length of e."""
+    """Add (z + z_tail) times the expansion m of `length` components to e of n; return the new length of e."""
     if z_tail != 0.0:
         n = add_scaled(e, n, m, length, z_tail)
     return add_scaled(e, n, m, length, z)
@@ -278,8 +280,8 @@ def orient3d_batch(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray, s
 
 
 def tie_sign_exact(ax: Any, ay: Any, bx: Any, by: Any) -> int:
-    """Return the sign of orient2d(a, b, q + (eps, eps^2)), given that orient2d(a, b, q) is 0; 0 if a = b. Any number
-    type."""
+    """Return the sign of orient2d(a, b, q + (eps, eps^2)) for all small eps > 0, given that orient2d(a, b, q) is 0; 0
+    if a = b. Any number type."""
     if ay != by:
         return 1 if ay > by else -1
     return 1 if bx > ax else -1 if bx < ax else 0

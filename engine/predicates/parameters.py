@@ -33,7 +33,7 @@ TINY: Final = 2.0**-1000
 def compare_ratios_filter(
     a: float, a_bound: float, b: float, b_bound: float, c: float, c_bound: float, d: float, d_bound: float
 ) -> int:
-    """Return the sign of |a b| - |c d| for numbers known to +- their bounds, or UNDECIDED. ``||a b| - |exact|| <= |a|
+    """Return the sign of |a b| - |c d| for numbers each known to +- its bound, or UNDECIDED. ``||a b| - |exact|| <= |a|
     b_bound + |b| a_bound + a_bound b_bound``; 2^-50 of each product covers every rounding."""
     a, b, c, d = abs(a), abs(b), abs(c), abs(d)
     left, right = a * b, c * d
@@ -64,8 +64,8 @@ def compare_differences(
 
 @inline
 def compare_in_pairs(ah: float, al: float, bh: float, bl: float, ch: float, cl: float, dh: float, dl: float) -> int:
-    """Return the sign of a b - c d if the products' leading parts prove it, else UNDECIDED; a = ah + al and so on,
-    exact. UNDECIDED for infinities and NaN; underflow is covered."""
+    """Return the sign of a b - c d for a = ah + al and so on, exact, if it is proven from the leading parts of the
+    products, else UNDECIDED. UNDECIDED for infinities and NaN; underflow is covered."""
     left, left_tail = two_prod(ah, bh)
     right, right_tail = two_prod(ch, dh)
     gap, gap_tail = two_diff(left, right)
@@ -105,8 +105,8 @@ def minor(
 
 @inline
 def add_absolute_product(e: Components, n: int, a: Components, na: int, b: Components, nb: int, factor: int) -> int:
-    """Add factor |a b| (factor 1 or -1) to expansion e in place, for expansions a and b; 2 na nb more places. Returns
-    the new length."""
+    """Add factor |a b| (factor 1 or -1) to expansion e of n components in place, for expansions a of na and b of nb
+    components. Returns the new length, at most n + 2 na nb."""
     flip = float(factor * sign(a, na) * sign(b, nb))
     for i in range(na):
         n = add_scaled(e, n, b, nb, flip * a[i])
@@ -117,7 +117,8 @@ def add_absolute_product(e: Components, n: int, a: Components, na: int, b: Compo
 def compare_products(
     a: Components, na: int, b: Components, nb: int, c: Components, nc: int, d: Components, nd: int, e: Components
 ) -> int:
-    """Return the exact sign of |a b| - |c d| for expansions; `e` is a workspace of 2 (na nb + nc nd) places."""
+    """Return the exact sign of |a b| - |c d| for expansions of na, nb, nc and nd components; `e` is a workspace of 2
+    (na nb + nc nd) places."""
     n = add_absolute_product(e, 0, a, na, b, nb, 1)
     n = add_absolute_product(e, n, c, nc, d, nd, -1)
     return sign(e, n)

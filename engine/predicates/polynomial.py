@@ -41,7 +41,8 @@ N_TERM = 1024  # components of one term: fewer than its bits, 53 (16 + 1) = 901,
 
 @inline
 def _fill_powers(points: FloatArray, row: int, powers: Components) -> None:
-    """Set powers[axis * N_POWERS + k] to the k-th power of coordinate ``axis`` of a point, rounded."""
+    """Set powers[axis * N_POWERS + k] to the k-th power, k = 0 .. MAX_DEGREE, of each coordinate of points[row],
+    rounded."""
     for axis in range(points.shape[1]):
         value = float(points[row, axis])
         power = 1.0
@@ -54,13 +55,11 @@ def _fill_powers(points: FloatArray, row: int, powers: Components) -> None:
 def sign_of_polynomial_filter(
     powers: IntArray, coefficients: FloatArray, degree: int, points: FloatArray, row: int, blur: float
 ) -> int:
-    """Return the sign of sum(coefficient * prod(p[k] ** powers[k])) if it is proven for all p within `blur` of
-    points[row].
+    """Return the sign of sum(coefficient * prod(p[k] ** powers[k])) if it is proven for all p each of whose coordinates
+    is within `blur` of that of points[row]; else UNDECIDED.
 
-    Else UNDECIDED. powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller
-    guarantees finite numbers, but for points with a blur, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <=
-    MAX_TERMS.
-    """
+    powers (t, dim) int64, coefficients (t,) float64, points (n, dim) float64, dim 2 or 3. Caller guarantees finite
+    numbers, but for points with a blur, powers >= 0 with row sums <= degree <= MAX_DEGREE, and t <= MAX_TERMS."""
     table = workspace(N_TABLE)
     _fill_powers(points, row, table)
     value, magnitude, weight = 0.0, 0.0, 0.0
@@ -100,8 +99,8 @@ def _term_exponent(powers: IntArray, coefficients: FloatArray, points: FloatArra
 
 @called
 def sign_of_polynomial_exact(powers: IntArray, coefficients: FloatArray, points: FloatArray, row: int) -> int:
-    """Return the sign of a polynomial at points[row] by an expansion, or UNDECIDED. powers (t, dim) int64, coefficients
-    (t,) float64."""
+    """Return the sign of a polynomial at points[row] by an expansion; UNDECIDED if exponents are too far apart. powers
+    (t, dim) int64, coefficients (t,) float64."""
     top = NO_TERM
     for i_term in range(coefficients.shape[0]):
         top = max(top, _term_exponent(powers, coefficients, points, row, i_term))

@@ -54,7 +54,7 @@ N_TOTAL = 1100
 
 
 class PosedPoint3(NamedTuple):
-    """A point before its pose, and the row of that pose in an array of poses, or UNPOSED."""
+    """A point before its pose, and `pose`, the row of that pose in an array of poses (n, 12), or UNPOSED."""
 
     x: float
     y: float
@@ -64,7 +64,8 @@ class PosedPoint3(NamedTuple):
 
 @inline
 def posed_error(poses: FloatArray, pose: int, reach: float) -> float:
-    """Return a bound on the rounding of each coordinate of `posed_point`, for points with coordinates up to `reach`."""
+    """Return a bound on the rounding of each coordinate of `posed_point`, for points with coordinates up to `reach`
+    under pose number `pose`; 0.0 if UNPOSED."""
     if pose == UNPOSED:
         return 0.0
     largest = 0.0
@@ -94,7 +95,7 @@ def _rounded(poses: FloatArray, p: PosedPoint3, axis: int) -> float:
 
 @inline
 def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -> int:
-    """Return orient3d of points known to +- `error` a coordinate; UNDECIDED if that could change the sign."""
+    """Return the sign of orient3d of points known to +- `error` a coordinate; UNDECIDED if that could change it."""
     u, v, w = minus(a, d), minus(b, d), minus(c, d)
     det, permanent = rounded_determinant(u, v, w)
     moved = ENLARGED_TWO * error
@@ -109,8 +110,9 @@ def orient3d_rounded(a: Point3, b: Point3, c: Point3, d: Point3, error: float) -
 def orient3d_posed(
     poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3, error: float
 ) -> int:
-    """Return orient3d of four points under their poses, exact, or UNDECIDED. poses (n, 12) float64: R by rows, then t;
-    caller guarantees det R > 0 and entries of R of at most 1.01. error: the largest `posed_error` of the points."""
+    """Return the sign of orient3d of four points under their poses, exact, or UNDECIDED. poses (n, 12) float64: R by
+    rows, then t; caller guarantees det R > 0 and entries of R of at most 1.01. error: the largest `posed_error` of the
+    points."""
     side = orient3d_rounded(
         posed_point(poses, a), posed_point(poses, b), posed_point(poses, c), posed_point(poses, d), error
     )
@@ -160,7 +162,8 @@ def are_equal_exact(poses: FloatArray, a: PosedPoint3, b: PosedPoint3) -> bool:
 
 @inline
 def _add_product_of(m: Components, n: int, w: Components, lengths: Components, f: int, g: int, factor: float) -> int:
-    """Add ``factor`` (1 or -1) times the product of differences f and g of w to expansion m; return its new length."""
+    """Add ``factor`` (1 or -1) times the product of differences number f and g to expansion m of n components; return
+    its new length. w: differences as expansions, N_DIFFERENCE places each; lengths: their numbers of components."""
     for i in range(int(lengths[f])):
         for k in range(int(lengths[g])):
             n = grow_product(m, n, factor * w[f * N_DIFFERENCE + i], w[g * N_DIFFERENCE + k])
@@ -171,7 +174,8 @@ def _add_product_of(m: Components, n: int, w: Components, lengths: Components, f
 def _set_difference(
     w: Components, start: int, poses: FloatArray, p: PosedPoint3, q: PosedPoint3, axis: int, shift: int
 ) -> int:
-    """Set w[start:] to 2^shift (p - q) on one axis under both poses, exactly, as an expansion; return its length."""
+    """Write 2^shift (p - q) on one axis, both points under their poses, exactly, as an expansion to w[start:]; return
+    its length."""
     e = workspace(N_DIFFERENCE)
     n = 0
     for end in range(2):
@@ -187,7 +191,8 @@ def _set_difference(
 
 @inline
 def _factors(poses: FloatArray, p: PosedPoint3, axis: int, k: int, shift: int, factor: float) -> tuple[float, float]:
-    """Return two doubles whose product is term k (x, y, z, translation) of factor 2^shift times a posed coordinate."""
+    """Return two doubles whose product is one of the four terms of 2^shift factor times coordinate ``axis`` of R p + t:
+    k = 0, 1, 2 for the product with x, y, z, 3 for the translation. factor: 1 or -1."""
     value = factor * (p.x if k == 0 else (p.y if k == 1 else p.z))
     if p.pose == UNPOSED:
         entry = 1.0 if k == axis else 0.0
@@ -200,7 +205,8 @@ def _factors(poses: FloatArray, p: PosedPoint3, axis: int, k: int, shift: int, f
 
 @inline
 def _common_shift(poses: FloatArray, a: PosedPoint3, b: PosedPoint3, c: PosedPoint3, d: PosedPoint3) -> int:
-    """Return the power of two that scales all coordinates into the range of the exact stage, or OUT_OF_RANGE."""
+    """Return the exponent k of the power 2^k that scales the coordinates of four posed points into the range of the
+    exact stage, or OUT_OF_RANGE."""
     largest, smallest, smallest_entry = 0.0, float("inf"), 1.0
     for k in range(4):
         p = a if k == 0 else (b if k == 1 else (c if k == 2 else d))

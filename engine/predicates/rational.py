@@ -110,7 +110,7 @@ def orient3d_rational(a: Sequence[Number], b: Sequence[Number], c: Sequence[Numb
 
 
 def side_rational(row: Sequence[Number], point: Sequence[Number]) -> int:
-    """Return the sign of dot(row, (point, 1)), the row one number longer than the point, in any dimension."""
+    """Return the sign of dot(row, (point, 1)), row being normal and offset of a plane, in any dimension."""
     *normal, offset = scaled_integers(row)
     *scaled_point, one = scaled_integers((*point, 1))
     return sign_of(sum(n * p for n, p in zip(normal, scaled_point)) + offset * one)
@@ -193,18 +193,21 @@ def are_all_safe(numbers: FloatArray) -> bool:
 
 
 def exponent_of(*arrays: FloatArray) -> int:
-    """Return e such that all coordinates are below 2^e; 0 if no scaling is needed."""
+    """Return e such that all coordinates in some arrays are below 2^e; 0 if they need no scaling, the largest being
+    within 2^-64 .. 2^64."""
     return exponent_above(largest_of(*arrays))
 
 
 def exponent_above(largest: float) -> int:
-    """Return e such that a coordinate of size `largest` is below 2^e; 0 if no scaling is needed."""
+    """Return e such that a coordinate of magnitude `largest` is below 2^e; 0 if it needs no scaling, being within 2^-64
+    .. 2^64 or 0."""
     exponent = frexp(largest)[1]
     return 0 if largest == 0.0 or abs(exponent) <= COMFORTABLE else exponent
 
 
 def shifted(array: FloatArray, exponent: int | IntArray) -> FloatArray | None:
-    """Return array 2^exponent, read-only, if that is exact for every number, else None."""
+    """Return array 2^exponent, read-only, if that is exact for every number, else None. exponent: one, or one for each
+    number."""
     if isinstance(exponent, int) and exponent == 0:
         return read_only(array)
     with np.errstate(all="ignore"):
@@ -214,7 +217,8 @@ def shifted(array: FloatArray, exponent: int | IntArray) -> FloatArray | None:
 
 
 def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
-    """Return plane rows for points times 2^-exponent, each row times a power of two; None if that is not exact."""
+    """Return plane rows (n, d + 1), normal and offset, for points multiplied by 2^-exponent, each row also multiplied
+    by a power of two that brings its normal near 1 where needed; None if an offset cannot be scaled exactly."""
     offsets = shifted(rows[:, -1], -exponent)
     if offsets is None:
         return None
@@ -232,9 +236,9 @@ def balanced_rows(rows: FloatArray, exponent: int) -> FloatArray | None:
 
 
 def scaled_back(points: FloatArray, exponent: int) -> tuple[FloatArray, BoolArray]:
-    """Return points 2^exponent, and which of them may have been rounded twice. Those are the ones rounded here: up to
-    and including the smallest normal number. If nothing is rounded here, the nearest double of unlimited exponent is
-    the nearest double."""
+    """Return points (n, d) times 2^exponent, and (n,) which of them may have been rounded twice: those that scaling
+    rounds, up to and including the smallest normal number. If nothing is rounded here, the nearest double of unlimited
+    exponent is the nearest double."""
     with np.errstate(all="ignore"):
         result: FloatArray = np.ldexp(points, exponent)
         doubtful = (np.abs(result) <= SMALLEST_NORMAL) & (np.ldexp(result, -exponent) != points)

@@ -37,7 +37,8 @@ NO_TERM = -(1 << 20)  # exponent of a zero term
 
 @inline
 def side_of_plane_filter(h: HalfSpace3, p: Point3) -> int:
-    """Return the sign of a x + b y + c z + d if rounding cannot have changed it, else UNDECIDED."""
+    """Return the sign of a x + b y + c z + d, the plane function of half-space h at p, if rounding cannot have changed
+    it, else UNDECIDED."""
     ax, by, cz = h.a * p.x, h.b * p.y, h.c * p.z
     value = ax + by + cz + h.d
     threshold = BOUND_PLANE * (abs(ax) + abs(by) + abs(cz) + abs(h.d)) + GUARD
@@ -55,9 +56,9 @@ def side_of_plane(h: HalfSpace3, p: Point3) -> int:
 
 @inline
 def dd_value(a: float, b: float, c: float, d: float, point: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Return a x + b y + c z + d as a double-double, and its error bound. Products are exact, or lose 2^-1074 by
-    underflow; their tails and those of sums, together below 4 u S, are added with six roundings. An intermediate
-    infinity gives NaN."""
+    """Return (h, l, bound): a x + b y + c z + d as a double-double h + l, and a bound on its error. Products are exact,
+    or lose 2^-1074 by underflow; their tails and those of sums, together below 4 u S, are added with six roundings. An
+    intermediate infinity gives NaN."""
     x, y, z = point
     ah, al = two_prod(a, x)
     bh, bl = two_prod(b, y)
@@ -110,13 +111,14 @@ def product_exponent(a: float, b: float) -> int:
 
 @inline
 def is_left_out(exponent: int, shift: int) -> bool:
-    """Return whether a term below 2^exponent, times 2^shift, would lose bits below the smallest subnormal."""
+    """Return whether a product below 2^exponent (NO_TERM for zero), times 2^shift, would lose bits below the smallest
+    subnormal, so that `grow_shifted_product` omits it."""
     return exponent != NO_TERM and exponent + shift < LOWEST_SHIFT
 
 
 @inline
 def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
-    """Return the sign of expansion e, or UNDECIDED if omitted terms could change it."""
+    """Return the sign of expansion e of n components, or UNDECIDED if omitted terms (is_incomplete) could change it."""
     if is_incomplete and (n == 0 or abs(e[n - 1]) < CLEAR):
         return UNDECIDED
     return sign(e, n)
@@ -124,8 +126,8 @@ def clear_sign(e: Components, n: int, is_incomplete: bool) -> int:
 
 @inline
 def grow_shifted_product(e: Components, n: int, a: float, b: float, exponent: int) -> int:
-    """Add the product of the significands of a and b, times 2^exponent, to expansion e, two more places. Not if it is
-    zero or would lose bits. Returns the new length."""
+    """Add the product of the significands of a and b, times 2^exponent, to expansion e of n components; nothing if it
+    is zero or would lose bits. Returns the new length, at most n + 2."""
     if a == 0.0 or b == 0.0 or exponent < LOWEST_SHIFT:
         return n
     p, tail = two_prod(frexp(a)[0], frexp(b)[0])

@@ -26,7 +26,7 @@ def as_point3(points: FloatArray, row: int) -> Point3:
 
 @merged
 def corners_of(vertices: FloatArray, triangles: IntArray, triangle: int) -> tuple[Point3, Point3, Point3]:
-    """Return the corners of triangle ``triangle`` (m, 3) as points."""
+    """Return the three corners of triangle number ``triangle`` of triangles (m, 3), as points."""
     a, b = as_point3(vertices, triangles[triangle, 0]), as_point3(vertices, triangles[triangle, 1])
     return a, b, as_point3(vertices, triangles[triangle, 2])
 
