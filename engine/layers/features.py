@@ -343,7 +343,9 @@ def locate_features(
 
 
 def _with_areas(rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None) -> FeatureRows:
-    """Return the features of rows with polygons; n_bytes: lower bound on a row's bytes of JSON but for the geometry."""
+    """Return the features of rows with polygons. members(row): JSON bytes of a row's members besides type and geometry;
+    n_bytes: lower bound on the bytes of JSON of each row but for the geometry; crs: the common member of the layers as
+    JSON."""
     positions, (rings, pieces, ends) = rows.ragged
     offsets = rings[pieces[ends]]
     n_bytes = summed(_ROW + n_bytes) + _POSITION * offsets

@@ -283,8 +283,9 @@ def _geopandas() -> tuple[Any, Any]:
 
 
 def _check_frames(function: str, others: Any, taken: tuple[str, ...] = (), **frames: object) -> None:
-    """Raise for an option that this function does not have (though geopandas may), and for an argument that is no
-    GeoDataFrame."""
+    """Raise for an argument among `frames` that is no GeoDataFrame, and for an option among `others`, which this
+    function does not have (though geopandas may). function: its name, for messages; taken: names of further options
+    that it accepts."""
     geopandas, _ = _geopandas()
     if others.keys() - set(taken):
         name = sorted(others.keys() - set(taken))[0]
@@ -309,7 +310,8 @@ def _refused(error: type[EngineError], frame: GeoDataFrame, where: tuple[str, in
 
 
 def _layer(frame: GeoDataFrame, name: str, limits: Limits) -> Layer:
-    """Return the polygons of a frame's geometry as a `Layer`; raise for other geometries, a z or NaN."""
+    """Return the polygons of a frame's geometry as a `Layer`; raise for other geometries, a z or NaN. name: of the
+    argument, for messages."""
     _, shapely = _geopandas()
     array = np.asarray(frame.geometry.array)
     if len(wrong := np.flatnonzero(~np.isin(shapely.get_type_id(array), (-1, *_POLYGONS)))):
@@ -334,7 +336,8 @@ def _layer(frame: GeoDataFrame, name: str, limits: Limits) -> Layer:
 
 
 def _geometries(rows: LayerRows, empty: Any = None) -> Any:
-    """Return an array of the rows' geometries: Polygon, MultiPolygon of several pieces, `empty` for no piece."""
+    """Return an array of the rows' geometries: Polygon for one piece, MultiPolygon for several, `empty` for none; with
+    the touching lines and points added."""
     _, shapely = _geopandas()
     positions, (rings, pieces, ends) = rows.ragged
     single = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
@@ -350,7 +353,7 @@ def _geometries(rows: LayerRows, empty: Any = None) -> Any:
 
 
 def _add_touching(geometries: Any, touching: Touching) -> None:
-    """Add the common lines and points of touching pairs to the geometries of rows; mixed types give a
+    """Add the lines and points in which pairs touch to the geometries of their rows, in place; mixed types give a
     GeometryCollection."""
     _, shapely = _geopandas()
     lines = shapely.from_ragged_array(shapely.GeometryType.LINESTRING, touching.vertices, (touching.offsets,))
@@ -374,8 +377,8 @@ def _add_touching(geometries: Any, touching: Touching) -> None:
 
 
 def _frame(left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str) -> GeoDataFrame:
-    """Return the rows as a GeoDataFrame with the attributes of both layers; names that both have get the suffixes _1
-    and _2."""
+    """Return the rows as a GeoDataFrame with the attributes of both layers, of the left one alone for how = difference;
+    names that both have get the suffixes _1 and _2."""
     geopandas, _ = _geopandas()
     import pandas
 

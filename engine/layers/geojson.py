@@ -42,13 +42,14 @@ _BUDGET_STEP: Final = 2**20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CopiedMembers:
-    """JSON texts that result rows copy from the features of a layer.
+    """JSON texts that result rows copy from the n features of a layer.
 
-    | field | by | meaning |
+    | field | shape | meaning |
     | --- | --- | --- |
-    | properties | feature | its properties, without the braces |
-    | ids | feature | a comma and the member "id", or nothing |
-    | n_bytes, id_bytes | feature | (n + 1,) length of both together, of the second; the last is 0, for feature -1 |
+    | properties | n | properties of the feature, without the braces |
+    | ids | n | a comma and the member "id", or nothing |
+    | n_bytes | (n + 1,) | length of both together; the last is 0, for feature -1 (none) |
+    | id_bytes | (n + 1,) | length of ids alone |
     """
 
     properties: list[bytes]
@@ -58,7 +59,7 @@ class _CopiedMembers:
 
 
 def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
-    """Return the common `crs` of the layers as JSON, None if there is none; raise if they differ."""
+    """Return the common member `crs` of the layers as JSON, None if none has it; raise if they differ."""
     there = [side for side in sides if side.crs is not None]
     texts = []
     with limits.budget() as budget:
@@ -78,7 +79,8 @@ def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
 
 
 def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limits) -> list[bytes]:
-    """Return a value of each feature as JSON; member: where that value is in the feature, for messages."""
+    """Return each value, one for each feature of the layer, as JSON. member: of the feature, where the value stands
+    (properties, id, geometry), for messages."""
     texts: list[bytes] = []
     taken = 0
     with limits.budget() as budget:
@@ -107,7 +109,7 @@ def members_of(
 ) -> tuple[Callable[[int, int], bytes], Callable[[IntArray, IntArray], IntArray]]:
     """Return two functions of the pair of features (first, second) of a result row, -1 for none. The first returns the
     row's members besides type and geometry, as JSON; the second, for arrays of pairs, lower bounds on the lengths of
-    these texts."""
+    these texts. names: of the members that say which features a row comes from."""
     columns: list[set[str]] = [set(), set()]
     with limits.budget() as budget:
         for side, column in zip(sides, columns):
@@ -163,8 +165,9 @@ def _copied_members(side: Collection, shared: set[str], end: str, limits: Limits
 
 
 def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntArray, list[dict[int, bytes]]]:
-    """Return the group of each feature by its values of the properties `names`, and the values of each group. Values
-    are JSON texts by index in `names`, null ones left out. Groups are numbered in the order of their first features."""
+    """Return (groups, values): the group (n,) of each feature by its values of the properties `names`, and by group its
+    values, as JSON by index in `names`, null ones left out. Groups are numbered in the order of their first features.
+    """
     places = {name: place for place, name in enumerate(names)}
     order: dict[Any, int] = {} if names else {(): 0}
     values: list[dict[int, bytes]] = [] if names else [{}]
@@ -189,7 +192,8 @@ AREAS: Final = ("Polygon", "MultiPolygon")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collection:
-    """A FeatureCollection whose geometries are of one kind: its features and their properties (empty for null)."""
+    """A FeatureCollection whose geometries are of one kind: its features, the properties of each (empty for null), its
+    `crs`, and the path of the argument, for messages."""
 
     features: list[dict[str, Any]]
     properties: list[dict[str, Any]]
@@ -198,7 +202,8 @@ class Collection:
 
 
 def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ...] = AREAS) -> Collection:
-    """Return a checked FeatureCollection whose geometries are null or of these types; coordinates are not checked."""
+    """Return a checked FeatureCollection whose geometries are null or of the types `kinds`; coordinates are not
+    checked. where: path of the argument, for messages."""
     features = value.get("features") if _type_of(value) == "FeatureCollection" else None
     if not isinstance(features, list):
         raise InvalidInputError(f"{where[0]} must be a GeoJSON FeatureCollection, got {shown(value)}", where)
@@ -229,7 +234,8 @@ def _type_of(value: Any) -> str:
 def refused(
     kind: Callable[[str, Where], EngineError], side: Collection, number: int, what: str, path: Path = ()
 ) -> EngineError:
-    """Return an error for a feature, with its number and id in the message and in `where`."""
+    """Return an error of type `kind` for feature `number` of a layer, with its number and id in the message and in
+    `where`. what: the fault; path: its place in the feature."""
     feature, where = side.features[number], side.where
     named = f" (id {shown(feature['id'])})" if "id" in feature else ""
     return kind(f"{where[0]}.features[{number}]{named} {what}", (*where, "features", number, *path))
@@ -241,8 +247,8 @@ def polygons_of(side: Collection, limits: Limits) -> Layer:
 
 
 def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray, BoolArray]:
-    """Return the parts of all features as polygons, the offsets of each feature's parts, and whether a feature has no
-    geometry."""
+    """Return (arrays, offsets, is_missing): all parts (Polygons) of all features as polygons, the offsets (n + 1,) of
+    each feature's parts, and (n,) whether a feature has no geometry."""
     rings: list[Any] = []
     part_sizes: list[int] = []
     there = [k for k, feature in enumerate(side.features) if feature.get("geometry") is not None]
@@ -271,7 +277,7 @@ def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray
 
 
 def _positions(rings: list[Any]) -> FloatArray:
-    """Return the positions of all rings in one array."""
+    """Return the positions of all rings, one after another, in one array (n, 2)."""
     if not any(isinstance(ring, np.ndarray) for ring in rings):
         return as_points(list(chain.from_iterable(polled(rings))), 2)
     return np.concatenate([as_points(ring, 2) for ring in polled(rings)])
@@ -287,7 +293,8 @@ def _check_rings(geometry: dict[str, Any]) -> None:
 
 
 def check_each(there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any]) -> Any:
-    """Return [check(geometry)] of the features at the indices `there`; an error names its feature."""
+    """Return the array of check(geometry) for the features of a layer at the indices `there`; an error names its
+    feature."""
     made = []
     for number in polled(there):
         try:

@@ -33,7 +33,8 @@ class NotJsonError(ValueError):
 
 
 def text_of(value: Any) -> bytes:
-    """Return a value as JSON, numbers exactly; arrays become lists. Raises: NotJsonError; what `poll` raises."""
+    """Return a value as JSON, numbers exactly; arrays become lists. Raises: NotJsonError, DeadlineExceededError,
+    CancelledError."""
     try:
         if isinstance(value, str) or _count(value, _FEW) <= _FEW:
             return _encoded(value)
@@ -45,9 +46,9 @@ def text_of(value: Any) -> bytes:
 
 
 def key_of(value: Any) -> bytes:
-    """Return a key that is equal for equal JSON values: numbers by value (1 equals 1.0, not true), objects in any order
-    of names. For a list or an object it is a SHA-256, so that keys are short. Raises: TypeError where JSON has no such
-    value; what `poll` raises."""
+    """Return bytes that are equal exactly for equal JSON values, to compare or hash: numbers by value (1 equals 1.0,
+    not true), objects whatever the order of their names. For a list or an object it is a SHA-256, so that keys are
+    short. Raises: TypeError where JSON has no such value, DeadlineExceededError, CancelledError."""
     if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and not value.ndim):
         value = value.tolist()
     if value is None or isinstance(value, bool):
@@ -86,7 +87,8 @@ class _Writer:
         self._path: list[str | int] = []
 
     def write(self, value: Any) -> None:
-        """Write a list, an array or an object of more than `_FEW` values; depth: that of the value."""
+        """Append a list, an array or an object of more than `_FEW` values to the text. Recursion is as deep as the
+        value."""
         names = list(value) if isinstance(value, dict) else None
         items = list(value.values()) if isinstance(value, dict) else value
         self.text += b"[" if names is None else b"{"
@@ -116,7 +118,7 @@ class _Writer:
         self.text += b"]" if names is None else b"}"
 
     def _write_few(self, names: list[Any] | None, items: Any, start: int, stop: int) -> None:
-        """Append items[start:stop] (with their names, of an object) and a comma to the text."""
+        """Append items[start:stop] and a comma to the text; names: of the items, for an object, None for a list."""
         poll()
         if start == stop:
             return
@@ -130,7 +132,7 @@ class _Writer:
 
 
 def _encoded(value: Any) -> bytes:
-    """Return the JSON of a small value; raise NotJsonError."""
+    """Return the JSON of a small value; raise NotJsonError with the path to what cannot be written."""
     try:
         try:
             return _encode(value).encode()
@@ -142,7 +144,8 @@ def _encoded(value: Any) -> bytes:
 
 
 def _as_list(value: Any) -> Any:
-    """Return a numpy array or number as a list or Python number, for the encoder."""
+    """Return a numpy array or number as a list or Python number: what the encoder calls for other types; raise
+    TypeError."""
     if not isinstance(value, (np.ndarray, np.generic)):
         raise TypeError(f"it is of type {type(value).__name__}")
     return value.tolist()
@@ -153,8 +156,8 @@ _encode_ascii = json.JSONEncoder(allow_nan=False, separators=(",", ":"), default
 
 
 def _count(value: Any, most: int) -> int:
-    """Return the number of values in `value`, itself included, long texts counted by length; any number above `most` if
-    there are more. depth: at most `most`."""
+    """Return the number of values in `value`, itself included, 1,000 characters of text counting as one more; some
+    number above `most` if there are more. Recursion is `most` levels deep at most."""
     if isinstance(value, str):
         return 1 + len(value) // _LETTERS
     if type(value) in _SCALARS or not isinstance(value, (dict, list, tuple, np.ndarray)):
@@ -177,7 +180,8 @@ def _count(value: Any, most: int) -> int:
 
 
 def _find_invalid(value: Any) -> tuple[Path, bool]:
-    """Return the path to the first part of a small value that cannot become JSON, and whether that is a float."""
+    """Return the path to the first part of a small value that cannot become JSON, and whether that part is a float
+    (infinity or NaN)."""
     items: Iterable[tuple[Any, Any]] = ()
     if isinstance(value, dict):
         items = value.items()

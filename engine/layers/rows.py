@@ -55,9 +55,9 @@ _HIT_BYTES: Final = 40
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """The polygons of a layer, one for each feature, which may be empty. arrays: the polygons. is_missing: whether a
-    feature has no geometry. parts, owners: the parts of those features whose parts overlap (united in `arrays`), and
-    the feature of each part."""
+    """The polygons of a layer, one for each of n features, which may be empty. arrays: the polygons. is_missing (n,):
+    whether a feature has no geometry. parts, owners: the single parts of those features whose parts overlap (in
+    `arrays` they are united), and the feature of each part."""
 
     arrays: PolygonArrays
     is_missing: BoolArray
@@ -102,7 +102,7 @@ class LayerRows:
 
 
 class Limits:
-    """Remaining time of one public call for the calls it is made of, and their accuracy added up."""
+    """Remaining time of one public call for the calls of which it consists, and the sum of their accuracy reports."""
 
     def __init__(self, deadline: float | None, cancel: Cancel | None, workers: int | None = None) -> None:
         seconds = Budget(deadline, cancel).deadline  # checks both
@@ -169,8 +169,8 @@ def check_how(how: object) -> None:
 def candidate_pairs(
     left: Layer, right: Layer, limits: Limits, with_rivals: bool = False
 ) -> tuple[IntArray, tuple[IntArray, IntArray]]:
-    """Return the pairs (n, 2) of a left and a right feature whose boxes intersect, sorted, and pairs within each layer.
-    with_rivals: whether to look for pairs within a layer; else these arrays are empty."""
+    """Return (pairs, rivals). pairs (n, 2): a left and a right feature whose boxes intersect, sorted. rivals: such
+    pairs within the left layer, and within the right; empty unless with_rivals."""
     filled = [np.flatnonzero(layer.arrays.sizes()) for layer in (left, right)]
     corners = [layer.arrays.boxes(numbers) for layer, numbers in zip((left, right), filled)]
     low, high = (np.concatenate(each) for each in zip(*corners))
@@ -196,7 +196,7 @@ def candidate_pairs(
 
 def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray, limits: Limits) -> LayerRows:
     """Return the rows of remainders: each feature of `layer` minus the features of `others` that it is paired with.
-    pairs: (feature of layer, feature of others), sorted. rivals: pairs of `others` whose boxes intersect."""
+    pairs (n, 2): feature of layer, feature of others, sorted. rivals: pairs of `others` whose boxes intersect."""
     seconds, groups = pairs[:, 1], summed(np.bincount(pairs[:, 0], minlength=len(layer)))
     overlap = _groups_overlap(others, rivals, groups, seconds, limits)
     clips, is_there = others.arrays.take(seconds).merged(groups), layer.arrays.sizes() > 0
@@ -223,8 +223,8 @@ def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntAr
 
 
 def _groups_overlap(others: Layer, rivals: IntArray, groups: IntArray, seconds: IntArray, limits: Limits) -> BoolArray:
-    """Return for each group k whether two of its features, seconds[groups[k]:groups[k + 1]] of `others`, have common
-    area. rivals: pairs of `others` whose boxes intersect."""
+    """Return for each group k (n_groups,) whether two of its features, seconds[groups[k]:groups[k + 1]] of `others`,
+    have common area. groups: offsets; rivals: pairs of `others` whose boxes intersect."""
     has_overlap = np.zeros(len(groups) - 1, np.bool_)
     clashes = rivals[_pairs_overlap(others.arrays, rivals, limits)]
     rivals_of: dict[int, set[int]] = {}
@@ -249,7 +249,8 @@ def unite(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
 
 
 def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits) -> Layer:
-    """Return the `Layer` whose feature k has parts offsets[k] .. offsets[k + 1] - 1; overlapping ones are united."""
+    """Return the `Layer` whose feature k has the polygons offsets[k] .. offsets[k + 1] - 1 of parts; overlapping ones
+    of a feature are united."""
     owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     arrays = parts.merged(offsets)
     filled = np.flatnonzero(parts.sizes())
@@ -283,7 +284,8 @@ def _overlay_batch(
 
 
 def _touching(firsts: PolygonSelection, seconds: PolygonSelection, batch: OverlayBatch, limits: Limits) -> Touching:
-    """Return the lines and points in which pairs meet without common area, or to which common area collapses."""
+    """Return the lines and points in which the pairs (firsts[k], seconds[k]) meet without common area, or to which
+    their common area collapses. batch: their intersections."""
     shells = []
     for pair in np.flatnonzero(_is_lost(batch)).tolist():
         result = limits.record(overlay(firsts[pair], seconds[pair], "intersection", **limits.options()))
@@ -298,7 +300,8 @@ def _is_lost(batch: OverlayBatch) -> BoolArray:
 
 
 def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching | None = None) -> LayerRows:
-    """Return the pairs of a batch that have pieces, or touch (`more`), as rows; left, right: feature numbers."""
+    """Return the pairs of a batch that have pieces, or touch, as rows; left, right: feature numbers of the pairs; more:
+    lines and points of pairs that touch."""
     if batch.status.any():
         row = int(np.flatnonzero(batch.status)[0])
         raise NotRepresentableError(
@@ -350,9 +353,9 @@ def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
 
 
 def locate_points_in_layer(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return (point, feature, on boundary) arrays for all pairs where the feature contains the point, sorted by point,
-    feature. A feature with overlapping parts contains what one of its parts contains; a point on the boundary of some
-    parts, in the interior of none, is on the feature's unless it is inside their union."""
+    """Return (point, feature, on boundary) arrays (n,) for all pairs where the feature contains the point, sorted by
+    point, feature. A feature with overlapping parts contains what one of its parts contains; a point on the boundary of
+    some parts, in the interior of none, is on the feature's boundary unless it is inside the union of the parts."""
     there = np.flatnonzero(layer.arrays.sizes())
     solids = [*PolygonSelection(layer.arrays, there), *PolygonSelection(layer.parts, np.arange(len(layer.owners)))]
     hits = limits.record(locate_scene(points, solids, **limits.options()))
@@ -374,7 +377,8 @@ def locate_points_in_layer(points: object, layer: Layer, limits: Limits) -> tupl
 def with_unmatched_points(
     n: int, first: IntArray, second: IntArray, on_boundary: BoolArray
 ) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return the rows of `locate_points_in_layer` with a row (point, `NONE`, False) for each of n points without."""
+    """Return the rows (first, second, on_boundary) of `locate_points_in_layer` and, for each of n points without a row,
+    one more (point, `NONE`, False), sorted by point."""
     alone = np.setdiff1d(np.arange(n), first)
     rows = (first, alone), (second, np.full(len(alone), NONE)), (on_boundary, np.zeros(len(alone), np.bool_))
     order = np.argsort(np.concatenate(rows[0]), kind="stable")

@@ -57,8 +57,8 @@ def clip_polygon(contours: list[FloatArray], normal: FloatArray, offset: float) 
 
 
 def on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray]:
-    """Clip a polygon to a convex polyhedron of plane rows (normal, offset), one plane after another; return its
-    contours."""
+    """Clip a polygon to a convex polyhedron given by plane rows (normal, offset), one plane after another; return the
+    contours that are left."""
     for row in planes:
         contours = clip_polygon(contours, row[:-1].copy(), float(row[-1]))
     return contours
@@ -66,7 +66,8 @@ def on_convex(contours: list[FloatArray], planes: FloatArray) -> list[FloatArray
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """A vertex or crossing of one ring, linked to its neighbours and, for a crossing, to its twin in the other ring."""
+    """A vertex of one ring, or a crossing of two rings, linked to its neighbours on its ring; of a crossing `twin` is
+    the node for it in the other ring, and is_entry says whether its ring enters the other polygon there."""
 
     x: float
     y: float
@@ -79,8 +80,8 @@ class Node:
 
 
 def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tuple[float, float] | None:
-    """Return the parameters (on ab, on cd), both strictly between 0 and 1, where two segments cross; None if they do
-    not."""
+    """Return the parameters, on ab and on cd, of the point where two segments cross, both strictly between 0 and 1;
+    None if they do not."""
     u, v, w = b - a, d - c, c - a
     area = u[0] * v[1] - u[1] * v[0]
     if area == 0.0:
@@ -90,7 +91,8 @@ def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> tupl
 
 
 def link(ring: FloatArray, crossings: list[Node], other: FloatArray) -> list[Node]:
-    """Return the nodes of a ring in order, linked; a crossing is marked as entry into `other` or as exit."""
+    """Return the nodes of a ring, vertices and crossings in order, linked to each other; a crossing is marked as entry
+    into the polygon `other` or as exit."""
     nodes = [Node(float(x), float(y), (i, 0.0)) for i, (x, y) in enumerate(ring)]
     nodes = sorted(nodes + crossings, key=lambda node: node.at)
     inside = bool(by_half_line(ring[:1], other, np.array([0, len(other)]))[0])
@@ -134,7 +136,8 @@ def _without_crossings(subject: FloatArray, clip: FloatArray) -> list[FloatArray
 
 
 def _walk(start: Node, n_steps: int) -> FloatArray:
-    """Follow the boundary from a crossing and return the ring; at most n_steps: wrong marks may never lead back."""
+    """Follow the boundary of the intersection from a crossing, changing ring at each crossing, and return it as a ring
+    (n, 2). n_steps: nodes visited at most, since wrong marks may never lead back."""
     ring, node, forward = [], start, True
     for _ in range(n_steps):
         node.is_used = True

@@ -38,7 +38,8 @@ MAX_TURNS = 64  # six would do in exact arithmetic: each turn settles one plane
 
 @allocating_kernel
 def on_half_space(segments: FloatArray, normal: FloatArray, offset: float) -> tuple[FloatArray, BoolArray]:
-    """Return clipped segments (n, 2, dim) and kept (n,) bool; a segment that is not kept is returned unchanged."""
+    """Return segments (n, 2, dim) clipped to normal . p + offset >= 0, and (n,) bool, whether anything is left; a
+    segment of which nothing is left is returned unchanged."""
     clipped, kept = segments.copy(), np.ones(len(segments), np.bool_)
     for i in range(len(segments)):
         first, second = segments[i, 0], segments[i, 1]
@@ -55,7 +56,8 @@ def on_half_space(segments: FloatArray, normal: FloatArray, offset: float) -> tu
 
 @merged
 def code_word(p: FloatArray, low: FloatArray, high: FloatArray) -> int:
-    """Return the code word of p: a bit for each side of the box that p is outside of."""
+    """Return the code word (outcode) of p: a bit for each side of the box that p is outside of, 2 k for low and 2 k + 1
+    for high on axis k."""
     code = 0
     for k in range(len(low)):
         if p[k] < low[k]:
@@ -67,7 +69,7 @@ def code_word(p: FloatArray, low: FloatArray, high: FloatArray) -> int:
 
 @allocating
 def cut(p: FloatArray, q: FloatArray, bit: int, low: FloatArray, high: FloatArray) -> Any:
-    """Return the intersection of segment pq with the plane of the side `bit`."""
+    """Return the intersection of segment pq with the plane of the side of the box whose bit number is `bit`."""
     axis = bit // 2
     plane = high[axis] if bit % 2 else low[axis]
     return p + (plane - p[axis]) / (q[axis] - p[axis]) * (q - p)
@@ -75,8 +77,9 @@ def cut(p: FloatArray, q: FloatArray, bit: int, low: FloatArray, high: FloatArra
 
 @allocating
 def clip_one(p: FloatArray, q: FloatArray, n_turns: int, region: Any, code_word: Any, cut: Any) -> int:
-    """Clip segment pq in place; return REJECTED, ACCEPTED or UNFINISHED. code_word(p, *region): a bit for each plane
-    that p is outside of. cut(p, q, bit, *region): intersection with that plane."""
+    """Clip segment pq in place; return REJECTED, ACCEPTED, or UNFINISHED after n_turns cuts. region: arguments of the
+    two functions. code_word(p, *region): a bit for each plane that p is outside of. cut(p, q, bit, *region):
+    intersection with the plane of that bit number."""
     code_p, code_q = code_word(p, *region), code_word(q, *region)
     for _ in range(n_turns):
         if code_p == 0 and code_q == 0:
@@ -97,7 +100,7 @@ def clip_one(p: FloatArray, q: FloatArray, n_turns: int, region: Any, code_word:
 
 @allocating_kernel
 def on_box(segments: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return clipped segments (n, 2, dim) and status (n,): REJECTED, ACCEPTED or UNFINISHED."""
+    """Return segments (n, 2, dim) clipped to a box, and a status (n,): REJECTED, ACCEPTED or UNFINISHED."""
     clipped, status = segments.copy(), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
         status[i] = clip_one(clipped[i, 0], clipped[i, 1], MAX_TURNS, (low, high), code_word, cut)
@@ -116,7 +119,7 @@ def code_word_of_planes(p: FloatArray, planes: FloatArray) -> int:
 
 @allocating
 def cut_on_plane(p: FloatArray, q: FloatArray, bit: int, planes: FloatArray) -> Any:
-    """Return the intersection of segment pq with the plane of row `bit`."""
+    """Return the intersection of segment pq with the plane of row number `bit`."""
     normal, offset = planes[bit, :-1], planes[bit, -1]
     at_p, at_q = signed_distance(p, normal, offset), signed_distance(q, normal, offset)
     return p + at_p / (at_p - at_q) * (q - p)
@@ -124,8 +127,8 @@ def cut_on_plane(p: FloatArray, q: FloatArray, bit: int, planes: FloatArray) -> 
 
 @allocating_kernel
 def on_convex(segments: FloatArray, planes: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return clipped segments (n, 2, dim) and status (n,), see `on_box`; planes (m, dim + 1), m <= 62 for the code
-    word."""
+    """Return segments (n, 2, dim) clipped to a convex polyhedron, and a status (n,): REJECTED, ACCEPTED or UNFINISHED.
+    planes (m, dim + 1): rows (normal, offset), m <= 62 for the code word."""
     clipped, status = segments.copy(), np.empty(len(segments), np.int64)
     for i in range(len(segments)):
         ends = clipped[i, 0], clipped[i, 1]
@@ -135,12 +138,12 @@ def on_convex(segments: FloatArray, planes: FloatArray) -> tuple[FloatArray, Int
 
 @allocating_kernel
 def on_sphere(segments: FloatArray, center: FloatArray, radius: float) -> tuple[FloatArray, BoolArray]:
-    """Return clipped segments (n, 2, dim) and kept (n,): by the roots of |p + t (q - p) - c|^2 = r^2, cut to [0, 1].
+    """Return segments (n, 2, dim) clipped to a ball, and (n,) bool, whether anything is left: by the roots of |p + t (q
+    - p) - c|^2 = r^2, cut to [0, 1].
 
-    A segment that is not kept is returned unchanged. What goes wrong: the discriminant cancels for a segment that
-    nearly touches the sphere, far from the origin or far from the sphere, so that it is kept or removed by rounding;
-    the roots lose half of their digits there.
-    """
+    A segment of which nothing is left is returned unchanged. What goes wrong: the discriminant cancels for a segment
+    that nearly touches the sphere, far from the origin or far from the sphere, so that it is kept or removed by
+    rounding; the roots lose half of their digits there."""
     clipped, kept = segments.copy(), np.zeros(len(segments), np.bool_)
     for i in range(len(segments)):
         p, u = segments[i, 0], segments[i, 1] - segments[i, 0]

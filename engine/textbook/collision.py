@@ -32,7 +32,7 @@ BOX_TRIANGLES: IntArray = np.array(
 
 @inline
 def has_vertex_inside(vertices: FloatArray, others: FloatArray, triangles: IntArray) -> bool:
-    """Return whether one of `vertices` is in the polyhedron (others, triangles)."""
+    """Return whether one of `vertices` is in the polyhedron (others, triangles), by the parity of a half-line."""
     ahead = Point3(0.6180339887498949, 0.4142135623730951, 0.6695263146546152)  # no direction that occurs in a mesh
     found = False
     for i in range(len(vertices)):
@@ -65,8 +65,8 @@ def meets(p: Point3, q: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 
 @inline
 def has_edge_through_face(vertices: FloatArray, triangles: IntArray, others: FloatArray, faces: IntArray) -> bool:
-    """Return whether an edge of the first mesh meets a face of the second; an edge is tested once for each of its two
-    faces."""
+    """Return whether an edge of the first mesh (vertices, triangles) meets a face of the second (others, faces); an
+    edge is tested once for each of its two faces."""
     for i in range(len(triangles)):
         for k in range(3):
             p, q = as_point3(vertices, triangles[i, k]), as_point3(vertices, triangles[i, (k + 1) % 3])

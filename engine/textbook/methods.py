@@ -21,7 +21,8 @@ ANGLES: Final = 1e-6
 
 
 def of_points(solid: Any) -> Methods:
-    """Return the methods for points (n, dim): functions that return (n,) bool, whether the solid contains each."""
+    """Return the methods that locate points in this solid, by name: a function from points (n, dim) to (n,) bool,
+    contained or not, and its number of steps for a point."""
     match solid.type:
         case "half_space":
             return {"half-space": (lambda points: solids.in_half_space(points, solid.normal, solid.offset), 1)}
@@ -45,7 +46,7 @@ def of_points(solid: Any) -> Methods:
 
 
 def _of_tree(solid: Any) -> Methods:
-    """Return the method of a CSG tree, with the first method of each operand; {} if an operand has none."""
+    """Return the method of a CSG tree, which asks the first method of each operand; {} if an operand has none."""
     if not all(operands := [list(of_points(operand).values())[:1] for operand in solid.operands]):
         return {}
     leaves: list[Any] = [leaf for ((leaf, _),) in operands]
@@ -64,8 +65,8 @@ def _of_rings(vertices: FloatArray, offsets: Any) -> Methods:
 
 
 def of_segments(region: Any) -> Methods:
-    """Return the methods that clip segments (n, 2, dim): functions that return (n, 2 dim), both ends, NaN if nothing is
-    kept."""
+    """Return the methods that clip segments (n, 2, dim) to this region, by name: a function that returns (n, 2 dim),
+    both ends, NaN if nothing is left, and its number of steps for a segment."""
     kernels: dict[str, tuple[str, Any, tuple[str, ...]]] = {
         "half_space": ("half-space", clip_segments.on_half_space, ("normal", "offset")),
         "aabb": ("Cohen-Sutherland", clip_segments.on_box, ("min", "max")),
@@ -85,8 +86,8 @@ def of_segments(region: Any) -> Methods:
 
 
 def of_polygons(region: Any) -> Methods:
-    """Return the methods for polygons of one ring (n, size, dim): functions that return (n,) bool, whether a part is
-    kept."""
+    """Return the methods that clip polygons of one ring (n, size, dim) to this region, by name: a function that returns
+    (n,) bool, whether a part is left, and its number of steps for a polygon."""
     if region.type not in ("half_space", "convex", "aabb"):
         return {}
     rows = rows_of(region)
@@ -98,7 +99,8 @@ def of_polygons(region: Any) -> Methods:
 
 
 def of_pairs(first: Any, second: Any) -> Methods:
-    """Return the methods that decide if two bodies collide; a step is a face of one against a vertex of the other."""
+    """Return the methods that decide whether two polyhedra collide, by name: a function without arguments, and its
+    number of steps, each a face of one against a vertex of the other."""
     if not first.type == second.type == "polyhedron":
         return {}
     meshes = first.vertices, first.triangles, second.vertices, second.triangles

@@ -22,9 +22,9 @@ from engine.types import BoolArray, FloatArray, IntArray
 
 @allocating_kernel
 def by_half_line(points: FloatArray, vertices: FloatArray, ring_offsets: IntArray) -> BoolArray:
-    """Return (n,) bool: whether a point (n, 2) is in the rings vertices[ring_offsets[r] : ring_offsets[r + 1]]. The
-    half-line runs along x. What goes wrong: where it meets an edge is computed by a division and compared; near an edge
-    rounding decides."""
+    """Return (n,) bool: whether each point (n, 2) is in the rings vertices[ring_offsets[r] : ring_offsets[r + 1]]
+    (even-odd), by the parity of the edges that a half-line along x crosses (crossing number). What goes wrong: where it
+    meets an edge is computed by a division and compared; near an edge rounding decides."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         x, y = points[i]
@@ -58,8 +58,8 @@ def unsigned_angle(ux: float, uy: float, vx: float, vy: float) -> float:
 
 @allocating
 def sum_of_angles(point: FloatArray, vertices: FloatArray, angle: Any) -> float:
-    """Return the sum of angle(u, v) over the edges of a ring, u and v being the vectors from the point to the edge's
-    ends."""
+    """Return the sum of angle(u, v) over the edges of a ring (n, 2), u and v being the vectors from the point to the
+    edge's ends; angle(ux, uy, vx, vy): signed or unsigned."""
     total = 0.0
     for j in range(len(vertices)):
         u, v = vertices[j - 1] - point, vertices[j] - point
@@ -69,8 +69,9 @@ def sum_of_angles(point: FloatArray, vertices: FloatArray, angle: Any) -> float:
 
 @allocating_kernel
 def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
-    """Return (n,) bool for points (n, 2): whether the |signed sum| exceeds half a turn. What goes wrong: it is twelve
-    times slower than sides, and on an edge the angle is half a turn of either sign."""
+    """Return (n,) bool: whether each point (n, 2) is in a ring (m, 2): the magnitude of the sum of signed angles to its
+    edges exceeds half a turn. What goes wrong: it is twelve times slower than sides, and on an edge the angle is half a
+    turn of either sign."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         contained[i] = abs(sum_of_angles(points[i], vertices, signed_angle)) > pi
@@ -79,7 +80,8 @@ def by_signed_angles(points: FloatArray, vertices: FloatArray) -> BoolArray:
 
 @allocating_kernel
 def by_unsigned_angles(points: FloatArray, vertices: FloatArray, tolerance: float) -> BoolArray:
-    """Return (n,) bool for points (n, 2): whether the unsigned sum is at least a full turn - `tolerance` (radians)."""
+    """Return (n,) bool: whether each point (n, 2) is in a convex ring (m, 2): the sum of unsigned angles to its edges
+    is at least a full turn less `tolerance` (radians)."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         contained[i] = sum_of_angles(points[i], vertices, unsigned_angle) >= 2.0 * pi - tolerance

@@ -22,8 +22,8 @@ OUT, IN, CLOSE_TO_AN_EDGE = 0, 1, 2
 
 
 class Hit(NamedTuple):
-    """Intersection of a half-line with a triangle's plane: parameter along the half-line, weights of the second and
-    third vertex; NaN if parallel."""
+    """Intersection of a half-line with a triangle's plane: s, the parameter along the half-line; u, v, the weights of
+    the second and third vertex; NaN if parallel."""
 
     s: float
     u: float
@@ -46,8 +46,8 @@ def intersect(origin: Point3, direction: Point3, a: Point3, b: Point3, c: Point3
 
 @inline
 def parity_of(point: Point3, direction: Point3, vertices: FloatArray, triangles: IntArray, margin: float) -> int:
-    """Return IN or OUT by the parity of the triangles that the half-line meets, edges included. CLOSE_TO_AN_EDGE: it
-    passes an edge by less than `margin`, in barycentric units."""
+    """Return IN or OUT by the parity of the triangles that a half-line meets, edges included (crossing number);
+    CLOSE_TO_AN_EDGE if it passes an edge by less than `margin`, in barycentric units."""
     parity = OUT
     for j in range(len(triangles)):
         a, b, c = triangles[j, 0], triangles[j, 1], triangles[j, 2]
@@ -74,13 +74,13 @@ def by_half_line(points: FloatArray, vertices: FloatArray, triangles: IntArray, 
 def by_other_half_lines(
     points: FloatArray, vertices: FloatArray, triangles: IntArray, directions: FloatArray, margin: float
 ) -> tuple[BoolArray, BoolArray]:
-    """Return contained (n,) and unfinished (n,), True where each of the directions (k, 3) passed close to an edge.
+    """Return (contained, unfinished), each (n,) bool, for points (n, 3) and half-lines in directions (k, 3), tried in
+    turn: unfinished where every one of them passed close to an edge.
 
     "Because of numerical inaccuracies we might have difficulties to count the number of intersections when the half
     line is close to the edges. In such cases, the simplest solution is to find another half line and carry out the test
     with that." What goes wrong: "close" needs a tolerance that the textbook does not name (`margin`); a point on the
-    surface, or a mesh of needles, has no good half-line at all, so the search must be cut off.
-    """
+    surface, or a mesh of needles, has no good half-line at all, so the search must be cut off."""
     contained, unfinished = np.zeros(len(points), np.bool_), np.ones(len(points), np.bool_)
     for i in range(len(points)):
         for j in range(len(directions)):

@@ -28,9 +28,9 @@ Leaf = Callable[[FloatArray], BoolArray]
 
 @allocating_kernel
 def in_implicit(points: FloatArray, powers: IntArray, coefficients: FloatArray) -> BoolArray:
-    """Return (n,) bool for points (n, dim): whether the sum of coefficient x^i y^j z^k is >= 0. powers (t, dim),
-    coefficients (t,). What goes wrong: near the surface f is a small difference of large terms, and rounding decides
-    the sign."""
+    """Return (n,) bool for points (n, dim): whether f(x, y, z), the sum of coefficient x^i y^j z^k over t terms, is >=
+    0. powers (t, dim): i, j, k; coefficients (t,). What goes wrong: near the surface f is a small difference of large
+    terms, and rounding decides the sign."""
     contained = np.zeros(len(points), np.bool_)
     for i in range(len(points)):
         total = 0.0
@@ -80,7 +80,7 @@ def clip_points(points: FloatArray, normal: FloatArray, offset: float) -> FloatA
 
 
 def in_csg_tree(points: FloatArray, tree: Leaf | tuple[str, Any, Any]) -> BoolArray:
-    """Return (n,) bool: whether the tree contains a point; recursive, as deep as the tree. A leaf is a function from
+    """Return (n,) bool: whether the tree contains each point; recursive, as deep as the tree. A leaf is a function from
     points (n, dim) to bools (n,); a node is (operation, first, second), its operation applied to their answers. What
     goes wrong: two values cannot tell "on the surface", so the difference of a closed set keeps or loses its wall."""
     if not isinstance(tree, tuple):
@@ -98,7 +98,7 @@ def in_csg_tree(points: FloatArray, tree: Leaf | tuple[str, Any, Any]) -> BoolAr
 
 @inline
 def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
-    """Return whether p is in the prism over triangle abc, side faces included."""
+    """Return whether p is in the infinite prism over triangle abc along its normal, side faces included."""
     n = cross(minus(b, a), minus(c, a))
     return (
         dot(cross(minus(b, a), minus(p, a)), n) >= 0.0
@@ -109,9 +109,9 @@ def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 
 @allocating_kernel
 def by_products(points: FloatArray, triangle: FloatArray) -> BoolArray:
-    """Return (n,) bool for points (n, 3): whether a point is in the prism over the triangle (3, 3). What goes wrong:
-    near the side faces rounding decides the sign; n underflows for small triangles (all is inside).
-    """
+    """Return (n,) bool for points (n, 3): whether a point is in the infinite prism over the triangle (3, 3), by cross
+    and scalar products. What goes wrong: near the side faces rounding decides the sign; n underflows for small
+    triangles (all is inside)."""
     contained = np.zeros(len(points), np.bool_)
     a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
     for i in range(len(points)):
@@ -146,9 +146,9 @@ def axis_of_largest_area(a: Point3, b: Point3, c: Point3) -> int:
 
 @allocating_kernel
 def by_projection(points: FloatArray, triangle: FloatArray) -> BoolArray:
-    """Return (n,) bool for points (n, 3): whether a point's projection is in that of the triangle (3, 3), for points in
-    its plane. What goes wrong: near an edge rounding decides the sign, less often than in space since fewer terms are
-    added; points off the plane are answered by their projection."""
+    """Return (n,) bool for points (n, 3) in the plane of a triangle (3, 3): whether a point's projection along an axis
+    is in the triangle's. What goes wrong: near an edge rounding decides the sign, less often than in space since fewer
+    terms are added; points off the plane are answered by their projection."""
     contained = np.zeros(len(points), np.bool_)
     corners = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
     axis = axis_of_largest_area(corners[0], corners[1], corners[2])
