@@ -1,5 +1,5 @@
-"""Bounding volume hierarchy (broad phase): a tree of boxes over many small boxes, eight children a node, in flat arrays,
-built by the surface-area heuristic.
+"""Bounding volume hierarchy (broad phase): a tree of boxes over many small boxes, eight children a node, in flat
+arrays, built by the surface-area heuristic.
 
     node     boxes (n_nodes, 6, 8) float32: rows cx cy cz hx hy hz,      child (n_nodes, 8) int32
              centre and half width of each child, one child to a lane

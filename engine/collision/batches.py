@@ -60,8 +60,9 @@ class PairBatches:
     ) -> Callable[[int, int], None]:  # fmt: skip
         """Return a function (start, stop) that fills the UNSETTLED entries of relations[start:stop] with relation codes
         of pairs[start:stop]; they stay UNSETTLED where the kernel cannot decide. A row is a solid under a pose: kinds
-        (n_rows,), its index in `distinct`; poses, one a row, row 0 the identity. pairs (n, 2): two rows each. boolean: an overlap may be given where one body contains the other. detail: an overlap that is
-        not proven to be PO stays UNSETTLED."""
+        (n_rows,), its index in `distinct`; poses, one a row, row 0 the identity. pairs (n, 2): two rows each. boolean:
+        an overlap may be given where one body contains the other. detail: an overlap that is not proven to be PO stays
+        UNSETTLED."""
         (pool, places), flag = self.pool(budget), budget.flag
         kernel = entry_of(relate_outline_pairs if self.is_planar else relate_convex_pairs)
         bodies, options = places[kinds], (detail,) if self.is_planar else (boolean, not detail)
@@ -74,7 +75,8 @@ class PairBatches:
 
 
 def _convex_pool(solids: Sequence[Solid], budget: Budget) -> tuple[Any, IntArray]:
-    """Return the solids that are provably convex in one pool, and by solid its index there, -1 for a solid that is not."""
+    """Return the solids that are provably convex in one pool, and by solid its index there, -1 for a solid that is
+    not."""
     places, convex = np.full(len(solids), -1, np.int64), list[ConvexBody]()
     for kind, solid in enumerate(solids):
         budget.check()

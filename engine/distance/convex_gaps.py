@@ -37,7 +37,8 @@ _POLL_EVERY: Final = 64
 
 
 class Corner(NamedTuple):
-    """A point of the Minkowski difference M = {a - b}: `at` is vertex i of the first body minus vertex j of the second."""
+    """A point of the Minkowski difference M = {a - b}: `at` is vertex i of the first body minus vertex j of the
+    second."""
 
     at: Point3
     i: int
@@ -45,7 +46,8 @@ class Corner(NamedTuple):
 
 
 class Simplex(NamedTuple):
-    """A simplex of the GJK walk, n <= 3 corners of the Minkowski difference; unused ones of a, b, c repeat a used one."""
+    """A simplex of the GJK walk, n <= 3 corners of the Minkowski difference; unused ones of a, b, c repeat a used
+    one."""
 
     a: Corner
     b: Corner

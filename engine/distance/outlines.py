@@ -41,7 +41,8 @@ class Look(NamedTuple):
 
 
 class Line(NamedTuple):
-    """An edge prepared for distances: start a, vector u to its end, share = 1 / |u|^2 (0.0 for an edge without length)."""
+    """An edge prepared for distances: start a, vector u to its end, share = 1 / |u|^2 (0.0 for an edge without
+    length)."""
 
     a: Point2
     u: Point2
@@ -110,7 +111,8 @@ def _retain_near(near: Any, n: int, most: float) -> int:
 
 @inline
 def _gap(boxes: FloatArray, block: int, others: FloatArray, other: int) -> float:
-    """Return the squared distance of box `block` of boxes and box `other` of others, (n, 4) each, in rounded doubles."""
+    """Return the squared distance of box `block` of boxes and box `other` of others, (n, 4) each, in rounded
+    doubles."""
     x = max(boxes[block, 0] - others[other, 2], others[other, 0] - boxes[block, 2], 0.0)
     y = max(boxes[block, 1] - others[other, 3], others[other, 1] - boxes[block, 3], 0.0)
     return float(x * x + y * y)
@@ -166,7 +168,8 @@ def _measure_pair(a: Placed, b: Placed, vertex: int, edge: int, is_first: bool) 
 
 @inline
 def _offset_between(a: Placed, b: Placed, pair: VertexEdge) -> Wide2:
-    """Return the vector from the second body's vertex of a pair to the first's; both features of the pair are vertices."""
+    """Return the vector from the second body's vertex of a pair to the first's; both features of the pair are
+    vertices."""
     return minus2(point(a.points, pair.first), point(b.points, pair.second))
 
 

@@ -240,7 +240,8 @@ def named(view: View, triangle: int, feature: int) -> tuple[int, int, int]:
 
 @inline
 def shift_of(s: Search, start: FloatArray, other: FloatArray) -> Wide3:
-    """Return the translation `other` of the second body less `start` of the first, times the unit, in double-doubles."""
+    """Return the translation `other` of the second body less `start` of the first, times the unit, in
+    double-doubles."""
     unit = s.a.unit
     x, y = Wide(*two_diff(other[0] * unit, start[0] * unit)), Wide(*two_diff(other[1] * unit, start[1] * unit))
     return Wide3(x, y, Wide(*two_diff(other[2] * unit, start[2] * unit)))

@@ -13,8 +13,8 @@ a lattice into itself (`is_lattice_rotation`) rounds nothing: error 0, and so do
                  <= 7.1 u reach + 5.1 u |t| + 4 h
                  <  error = 2^-50 (3 reach + max |t|) + 2^-1060
 
-**Pose frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with their
-margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of two
+**Pose frames.** From the tree of one placed body to the tree of another, the maps that `lanes/boxes.py` takes, with
+their margins. With p = o + s a for tree coordinates a (origin o, scale s a power of two), the placements R p + t of two
 bodies give
 
     a = M b + T,    M = (s_b / s_a) R_a^-1 R_b,    T = (R_a^-1 (R_b o_b + t_b - t_a) - o_a) / s_a
