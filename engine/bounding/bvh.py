@@ -262,7 +262,8 @@ def _collapse_to_eight(
 
 @inline
 def _set_lane(boxes: Float32Array, node: int, lane: int, rows: Float32Array, row: int) -> None:
-    """Store a box (low, -high) in a lane of a node, as centre and enlarged half widths."""
+    """Store the box of a row (low x, y, z, 0, then minus high) in a lane of a node, as centre and enlarged half
+    widths."""
     for axis in range(3):
         low, high = float(rows[row, axis]), -float(rows[row, 4 + axis])
         boxes[node, axis, lane] = 0.5 * (low + high)

@@ -133,8 +133,8 @@ class _Walk:
             return (vectors * vectors).sum(axis=1), unit * Fraction(2) ** exponent
 
     def _farthest_outside(self, center: Rational, square: Fraction) -> int | None:
-        """Return the index of a point outside the exact ball, about the farthest one; None if the ball contains all
-        points."""
+        """Return the index of a point outside the exact ball (square: squared radius), about the farthest one; None if
+        the ball contains all points."""
         rounded = np.array([nearest_float(x) for x in center])
         sizes, unit = self._distances(rounded)
         shift = [(x - Fraction(y)) / unit for x, y in zip(center, rounded.tolist())]

@@ -222,8 +222,7 @@ def bodies_of(
     check: Callable[[], object] | None = None,
 ) -> SceneBodies:  # fmt: skip
     """Return bodies of any type as arrays. solids, poses: of each body; distinct: each solid object once; kinds: index
-    in `distinct` of each body's solid; check: called while another thread computes a
-    box; may raise."""
+    in `distinct` of each body's solid; check: called while another thread computes a box, may raise."""
     own = [own_box(solid, check) for solid in distinct]
     boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
     radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])

@@ -234,7 +234,8 @@ class _MutualLocations(NamedTuple):
 def _mutual_locations(
     a: Outline, b: Outline, solids: tuple[Solid, Solid], poses: result.Poses, budget: Budget
 ) -> _MutualLocations:
-    """Locate two outlines in each other by their arrangement."""
+    """Locate two planar bodies in each other by the arrangement of their outlines; solids, poses: the same bodies, in
+    which isolated points are located."""
     arrangement, _ = arrange_outlines([a, b], budget)
     subdivision = subdivide(arrangement)
     labels, meet = label_faces(subdivision), _boundaries_meet(arrangement)

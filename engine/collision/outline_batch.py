@@ -272,7 +272,7 @@ def relate_placed(
     |---|---|
     | 0 | the relation, or UNSETTLED; if a boundary is not simple it only says whether the bodies meet |
     | 1 | the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that are proven |
-    | 2, 3 | the first edges of either body that meet, -1 for none, or if an undecided pair comes before |
+    | 2, 3 | the first edges of either body that meet, -1 for none; the first body's -1 if they may not be the first |
     | 4 | the class of these two edges, APART for none |
     """
     is_unsure, bits, first, second, kind = False, 0, -1, -1, APART

@@ -119,8 +119,8 @@ def relate_triangles_2d(first: FloatArray, second: FloatArray, relations: Int8Ar
 
 @allocating_kernel
 def relate_triangles_3d(first: FloatArray, second: FloatArray, relations: Int8Array) -> None:
-    """Fill relations (n,) int8 (`Relation` codes) for rows i of two arrays (n, 3, 3) float64; UNSETTLED for triangles
-    without area."""
+    """Fill relations (n,) int8 with DISJOINT or TOUCHING for rows i of two arrays (n, 3, 3) float64 of triangles in
+    space; UNSETTLED for triangles without area, or if exponents are out of range."""
     poses = np.zeros((1, 12))  # nothing here has one
     for item in range(relations.shape[0]):
         t, u = facet_at(first[item], 0, 1, 2), facet_at(second[item], 0, 1, 2)

@@ -282,7 +282,7 @@ class _Batch:
 
     def fill(self, answers: FloatArray, start: int, stop: int, least: Fraction | None) -> None:
         """Fill answers[start:stop], NaN on entry, with the distances under these poses; threads may fill different
-        ranges. least: then 0.0 for nearer bodies, infinity for others, instead of distances."""
+        ranges. least: if given, 0.0 for nearer bodies and infinity for others instead."""
         if self.relate is not None and not self.is_small:
             self.relate(start, stop)
         if self.is_small:

@@ -175,9 +175,10 @@ def _offset_between(a: Placed, b: Placed, pair: VertexEdge) -> Wide2:
 
 @called
 def _are_tied(a: Placed, b: Placed, one: VertexEdge, two: VertexEdge) -> bool:
-    """Return whether two pairs of vertex and edge are provably at equal distances. True if all four ends are vertices,
-    with equal offsets on each axis; or both feet lie within one edge, their vertices on a parallel of it; or within two
-    parallel edges that end in the vertices."""
+    """Return whether two pairs of vertex and edge are provably at equal distances, without rounded coordinates. Three
+    cases are recognised: all four features are vertices, with equal offsets; two vertices of one body over one edge of
+    the other, on a parallel of it; a vertex of either body over an edge of the other, the edges being parallel and
+    ending in these vertices."""
     n, m = len(a.following), len(b.following)
     if a.error + b.error > 0.0:
         return False

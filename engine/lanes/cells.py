@@ -123,9 +123,9 @@ def parity_across(groups: Float32Array, group: int, wx: float, wy: float, wz: fl
 
 
 def planes_of(groups: Rows, group: int, point: Sequence[Lanes]) -> tuple[Lanes, Lanes, Lanes]:
-    """Return (side, least, most) for each of eight triangles at a point x relative to R: n . x - d of its plane, and
-    the least and the largest m . x of the three planes through R and an edge; normals n and m have a largest component
-    of 1."""
+    """Return (side, least, most) for each of eight triangles at a point x relative to the cell's reference point R: n .
+    x - d of its plane, and the least and the largest m . x of the three planes through R and an edge; the normals n and
+    m have a largest component of 1."""
     rows = [load(groups, ROWS * group + row) for row in range(ROWS - 1)]
     side = dot(rows[0:3], point) - rows[3]
     a, b, c = dot(rows[4:7], point), dot(rows[7:10], point), dot(rows[10:13], point)

@@ -344,8 +344,8 @@ def place_triangles(blocks: Rows, node: int, frames: Rows, work: Rows) -> None:
 
 @traced
 def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number, work: Rows) -> int:
-    """Return the mask of the eight triangles in work (`place_triangles`) that may be within distance `most` of the
-    triangle in `lane` of block `node` of the first tree. Unused lanes count as near."""
+    """Return the mask of the eight triangles in work (`place_triangles`) that may be within distance `most`, in units
+    of the first tree, of the triangle in `lane` of block `node` of that tree. Unused lanes count as near."""
     own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
     theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
     d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]

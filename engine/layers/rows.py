@@ -79,7 +79,7 @@ class LayerRows:
     | piece_offsets | int64 | into the rings: a shell, counter-clockwise, before its holes, clockwise |
     | row_offsets | int64 (m + 1,) | into the pieces; none for: no geometry, no common area, or collapsed |
     | n_collapsed | int | rows left out because rounding collapsed them |
-    | touching | | by row where pairs meet without common area; None: not requested |
+    | touching | | lines and points, by row, in which pairs meet without common area; None: not requested |
     """
 
     left: IntArray
@@ -135,14 +135,13 @@ class Limits:
 
 
 def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touching: bool = False) -> LayerRows:
-    """Overlay two layers: every feature of one with every feature of the other that it meets.
+    """Overlay two layers: every feature of one with every feature of the other that it meets. how: a key of `HOWS`.
 
     Boundary: features that meet without common area make no row, unless with_touching. Degenerate input: polygons
     without area likewise; a feature without geometry is a row without pieces where remainders of its layer are
     included. Accuracy: decisions exact, coordinates rounded once. The remainder of a feature is its difference with the
     union of the others, in one arrangement. Cost: n log n for the boxes of both layers together, then that of
-    `overlay_batch`. Raises: InvalidOperationError, NotRepresentableError, DeadlineExceededError, CancelledError.
-    """
+    `overlay_batch`. Raises: InvalidOperationError, NotRepresentableError, DeadlineExceededError, CancelledError."""
     check_how(how)
     of_pairs, of_left, of_right = HOWS[how]
     pairs, rivals = candidate_pairs(left, right, limits, with_rivals=of_left or of_right)

@@ -110,8 +110,8 @@ def is_in_prism(p: Point3, a: Point3, b: Point3, c: Point3) -> bool:
 @allocating_kernel
 def by_products(points: FloatArray, triangle: FloatArray) -> BoolArray:
     """Return (n,) bool for points (n, 3): whether a point is in the infinite prism over the triangle (3, 3), by cross
-    and scalar products. What goes wrong: near the side faces rounding decides the sign; n underflows for small
-    triangles (all is inside)."""
+    and scalar products. What goes wrong: near the side faces rounding decides the sign; the triangle's normal
+    underflows if it is small (all is inside)."""
     contained = np.zeros(len(points), np.bool_)
     a, b, c = as_point3(triangle, 0), as_point3(triangle, 1), as_point3(triangle, 2)
     for i in range(len(points)):

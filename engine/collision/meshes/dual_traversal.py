@@ -173,7 +173,8 @@ def exact_faces(s: Search, i: int, j: int) -> tuple[Facet, Facet, int, int]:
 
 @inline
 def exact_error(s: Search) -> float:
-    """Return the bound on the rounding of posed points that exact signs of `exact_faces` take for their filter."""
+    """Return the bound on the rounding of posed coordinates with which exact signs filter the faces that `exact_faces`
+    gives: 0.0 if those are placed without rounding."""
     return 0.0 if s.place.error == 0.0 else s.place.posed_error
 
 

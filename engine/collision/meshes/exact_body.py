@@ -111,7 +111,8 @@ class ExactBody:
 
 
 def faces_in(arrays: MeshArrays, pose: PoseArrays, low: list[float], high: list[float]) -> IntArray:
-    """Return, ascending, a superset of the triangles of a posed mesh that intersect the closed box low .. high."""
+    """Return, ascending, a superset of the triangles of a mesh, under the only pose in `pose`, that intersect the
+    closed box from low to high."""
     box, hits = np.array([*low, *high]), np.empty(256, np.int64)
     n_hits = entry_of(_faces_in_box)(arrays, pose, box, hits)
     if n_hits > len(hits):

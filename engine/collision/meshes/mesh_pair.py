@@ -205,8 +205,8 @@ class MeshPair:
 
     def patch_sides(self, own: int, patch: IntArray) -> Iterator[Sides]:
         """Yield the `Sides` of body `own` (inside just above, just below, at) at each region of a patch, an array of
-        its faces. If some face is not STATE_STACKED, it separates inside from outside throughout: then one result, with
-        one side inside, is yielded for the whole patch."""
+        its faces. If some face is not STATE_STACKED (covered by another face of its plane), the patch separates inside
+        from outside throughout: then one result, with one side inside, is yielded for all of it."""
         body = self.exact[own]
         with_area = patch[body.mesh.arrays.axis[patch] != NO_AREA]
         for start in range(0, len(with_area), _BLOCK):

@@ -302,14 +302,14 @@ def proves_overlap(first: MeshArrays, i: int, second: MeshArrays, j: int, poses:
 
 
 def states_of(mesh: MeshArrays, faces: IntArray) -> Int8Array:
-    """Return the state of each of `faces` (n,)."""
+    """Return the state (STATE_CLEAN, STATE_CROSSED, STATE_STACKED) of each of `faces` (n,)."""
     states = np.empty(len(faces), np.int8)
     entry_of(_fill_states)(mesh, faces, states)
     return states
 
 
 def state_at(mesh: MeshArrays, face: int) -> int:
-    """Return the state of one face, computed at first use."""
+    """Return the state (STATE_CLEAN, STATE_CROSSED, STATE_STACKED) of one face, computed at first use."""
     state = mesh.state[face]
     return int(states_of(mesh, np.array([face]))[0] if state == STATE_UNKNOWN else state)
 

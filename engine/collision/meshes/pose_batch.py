@@ -96,11 +96,11 @@ def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> No
 
 @called
 def classify_in_detail(s: dual.Search, n: int) -> None:
-    """Replace the class of each of n contacts by its detail; if one is UNDECIDED, all stay as they are.
+    """Replace the class of each of the n contacts in ``s.contacts`` by its detail; if one class is UNDECIDED, all stay.
 
     | detail | meaning |
     |---|---|
-    | NO_SHARED_AREA + bits | the open faces that it may cut (`classify_contact`) |
+    | NO_SHARED_AREA + bits | no common area; the open faces that may be cut: 1 the first body's, 2 the second's |
     | SAME_SIDE, OPPOSITE | STATE_CLEAN faces that share an area, bodies on the same or on opposite sides |
     """
     pairs, kinds, _ = s.contacts

@@ -67,8 +67,8 @@ def with_pose(t: Facet, pose: int = UNPOSED) -> Facet:
 @inline
 def lone_vertex(p: int, q: int, r: int) -> tuple[int, int]:
     """Return the vertex (0, 1, 2) of a triangle that is alone on one closed side of a plane, and that side (1 or -1).
-    p, q, r: sides of the vertices, not all zero, not all on one strict side. The other two lie on the opposite closed
-    side, and not both of them on the plane unless the lone one is off it."""
+    p, q, r: signs of the vertices at the plane, not all zero, not all on one strict side. The other two lie on the
+    opposite closed side, and not both of them on the plane unless the lone one is off it."""
     n_above, n_below = (p > 0) + (q > 0) + (r > 0), (p < 0) + (q < 0) + (r < 0)
     if n_above == 1:
         side, wanted = 1, 1
@@ -191,7 +191,8 @@ def sign_of_four(
 
 @called
 def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
-    """Return the exact signs of the three corners of u at the plane of t: 1, 0, -1 or UNDECIDED each."""
+    """Return the exact signs of the three corners of u at the plane of t: 1, 0, -1 or UNDECIDED each. error: bound on
+    the rounding of a posed coordinate."""
     a = posed_point(poses, t.p)
     v, w = minus(posed_point(poses, t.q), a), minus(posed_point(poses, t.r), a)
     p, q, r = minus(posed_point(poses, u.p), a), minus(posed_point(poses, u.q), a), minus(posed_point(poses, u.r), a)

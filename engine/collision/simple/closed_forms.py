@@ -274,9 +274,10 @@ def scan_sides(mesh: MeshArrays, plane: FloatArray, unsure: IntArray, flag: Flag
 
 
 def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
-    """Return the linear function n . p + d of a half-space in the pose frame of a body, rounded, with bounds. Under a
-    pose of the body a weight is the sum of three products, the offset one of four numbers: seven roundings of 2^-53 of
-    their magnitudes, whose sum is the size, and underflow below 2^-1070. Under its own pose: rationals."""
+    """Return the linear function n . p + d of a half-space in the pose frame of a body, rounded, with sizes that bound
+    its errors (`_Function`). Under a pose of the body a weight is the sum of three products, the offset one of four
+    numbers: seven roundings of 2^-53 of their magnitudes, whose sum is the size, and underflow below 2^-1070. Under its
+    own pose: rationals."""
     normal, offset = space.normal, float(space.offset)
     sizes, size = np.abs(normal), abs(offset)
     if poses[0] is not None:
@@ -291,9 +292,10 @@ def _function_in_frame(space: HalfSpace, poses: result.Poses) -> _Function:
 
 
 def _side_of_box(function: _Function, body: Solid) -> int:
-    """Return the side (1, -1) of a plane on which the box around a body provably lies, 0 if undecided. error: the
-    extremes of dot(n, p) + d over a box are sums of products of its bounds: at most seven roundings of 2^-53 of the sum
-    of magnitudes, and as much for the errors of weights and offset, far below 2^-48 of it."""
+    """Return 1 or -1 if the box around a body provably lies on the positive or negative side of a plane, else 0.
+    function: of the half-space, in the body's frame. error: the extremes of dot(n, p) + d over a box are sums of
+    products of its bounds: at most seven roundings of 2^-53 of the sum of magnitudes, and as much for the errors of
+    weights and offset, far below 2^-48 of it."""
     weights, sizes, offset, size = function
     low, high, _ = own_box(body)
     least, most, reach = offset, offset, 0.0

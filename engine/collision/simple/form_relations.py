@@ -185,7 +185,7 @@ def _name_touching(ranks: Any, turn: FloatArray, their_turn: FloatArray) -> int:
 
 @inline
 def _axis(a: Placed, k: int) -> Point3:
-    """Return the image of axis k under the pose."""
+    """Return the direction of side k of a posed box: column k of its rotation."""
     return Point3(a.turn[0, k], a.turn[1, k], a.turn[2, k])
 
 
@@ -248,8 +248,8 @@ def _relate_boxes(a: Placed, b: Placed) -> int:
 
 @inline
 def _grow_coordinate(e: Any, n: int, a: Placed, axis: int, side: int, factor: float) -> int:
-    """Add ``factor`` (+-1) times a bound of a posed box, or a coordinate of a posed ball's centre, to expansion e.
-    Returns the number of components. side: 0 low, 1 high."""
+    """Add ``factor`` (+-1) times a bound of a posed box on an axis (side 0 low, 1 high), or a coordinate of a posed
+    ball's centre, to expansion e of n components. Returns the new number of components."""
     form, turn, move = a
     if form[IS_BALL] == 0.0:
         n = grow(e, n, factor * bound_at(form, turn, axis, side))
@@ -318,7 +318,8 @@ def _is_within(a: Placed, ball: Placed) -> bool:
 
 @inline
 def _relate_to_ball(a: Placed, ball: Placed) -> int:
-    """Return the relation of a box or ball (first) and a ball (second), exact, or UNSETTLED."""
+    """Return the relation code of a box or ball (first) and a ball (second), exact; UNSETTLED if expansions are not
+    exact or a box is rotated."""
     r, s, is_ball = ball.form[RADIUS], a.form[RADIUS], a.form[IS_BALL] != 0.0
     if not (_are_safe(a) and _are_safe(ball)):
         return UNSETTLED
