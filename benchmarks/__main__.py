@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks import table
 from benchmarks.fields import FIELDS
 
-NAMES = (*FIELDS, "answers", "checkouts", "cold_start", "filed", "hard_cases", "report", "soak", "wire")
+NAMES = (*FIELDS, "answers", "checkouts", "cold_start", "cores", "filed", "hard_cases", "report", "soak", "wire")
 
 
 def about(name: str) -> str:

@@ -8,11 +8,14 @@ Limits on counts stand in the OpenAPI document too (openapi.py puts them there b
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from pydantic import BeforeValidator, ByteSize, Field, SecretStr, TypeAdapter, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+from engine.running.parallel import default_workers
 
 WARM_UP: Final = "warm-up"
 """The name of the thread that compiles."""
@@ -34,8 +37,19 @@ def _lower(value: object) -> object:
 Seconds = Annotated[float, Field(gt=0)]
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+_FEWEST_CORES: Final = 4
+_PROCESS_BYTES: Final = 2 * 2**30
+"""Cores from which on more than one process starts by default, and memory of each: the sum of its limits."""
+
+
+def _processes(root: Path = Path("/sys/fs/cgroup")) -> int:
+    """Return a process a core where there are several and memory for each, else one."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else 0
+    for limit in (root / "memory.max", root / "memory" / "memory.limit_in_bytes"):
+        with suppress(OSError, ValueError):  # there is none, or it is "max"
+            memory = min(memory, int(limit.read_text()))
+    n = min(default_workers(), memory // _PROCESS_BYTES)
+    return n if n >= _FEWEST_CORES else 1
 
 
 class Settings(BaseSettings):
@@ -49,9 +63,10 @@ class Settings(BaseSettings):
     """Address to listen on. Loopback: nobody else's machine calls a service that its owner did not open on purpose."""
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     """Port to listen on; 0 takes a free port (it is printed)."""
-    workers: Count = 1
-    """Processes. One reads and writes JSON on one core at a time, and computes on up to about 8: for many clients start
-    one for each core. Each has a memory of its own; without a store folder they share a temporary one."""
+    workers: Count = Field(default_factory=_processes)
+    """Processes; by default one a core from 4 cores on, with 2 GiB of memory for each, else one. A process reads and
+    writes JSON on one core at a time. Each has a memory of its own; without a store folder they share a temporary
+    one."""
     log_level: Annotated[Literal["debug", "info", "warning", "error"], BeforeValidator(_lower)] = "info"
     """What is logged: debug, info, warning or error."""
     access_log: bool = True
@@ -107,7 +122,7 @@ class Settings(BaseSettings):
     drain_seconds: Seconds = 30.0
     """Time for running requests after SIGTERM; the process ends 2 s later whatever runs. Kubernetes kills 30 s after
     SIGTERM by default, so lower it there."""
-    concurrency: Count = Field(default_factory=lambda: 4 * _cores())
+    concurrency: Count = Field(default_factory=lambda: 4 * default_workers())
     """Requests computed at once. More than cores: long calls run in chunks of 1-3 ms, so short ones slip between."""
     queue_length: Count = 64
     """Requests that may wait for their turn; beyond it the answer is 503 with Retry-After."""

@@ -116,7 +116,7 @@ def collide_poses(
     one_pair.pair_function(first, second)
     if detail:
         one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)
-    poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
+    poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
     n_poses = len(poses.rotations)
     if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
         one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
@@ -167,9 +167,10 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
     return one_pair.collide_pair(first, second, (None, pose), work)
 
 
-def as_poses(rotations: object, translations: object, dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Return checked rotations (n, d, d) and translations (n, d), read-only. translations None: `rotations` are `Pose`
-    objects or matrices (n, d + 1, d + 1)."""
+def as_poses(
+    rotations: object, translations: object, dimension: int, workers: int | None = 1
+) -> tuple[FloatArray, FloatArray]:
+    """Return checked rotations (n, d, d) and translations (n, d), read-only."""
     if translations is None:
         rotations, translations = as_pose_arrays(rotations, dimension)
     turn: Any = rotations
@@ -192,7 +193,7 @@ def as_poses(rotations: object, translations: object, dimension: int) -> tuple[F
             f"rotations and translations must be equally many, got {len(turns)} and {len(moves)}", ("translations",)
         )
     if len(turns):
-        check_rotations(turns)
+        check_rotations(turns, workers=workers)
     return read_only(turns), read_only(moves)
 
 

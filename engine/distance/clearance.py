@@ -250,7 +250,7 @@ def clearance_poses(
         first, second = as_solid(first, "first"), as_solid(second, "second")
     pair_function(first, second)
     least = None if at_least is None else checked_distance(at_least)
-    poses = PoseArrays(*as_poses(rotations, translations, first.dimension), True)
+    poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
     n_poses = len(poses.rotations)
     answers = np.full(n_poses, np.nan if least != 0.0 else np.inf)
     with Budget(deadline, cancel) as budget:

@@ -21,7 +21,7 @@ from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import largest_of, scaled_back
 from engine.running.budget import UNLIMITED, Budget, Cancel
-from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
+from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.geometries import geometry_of
@@ -92,7 +92,9 @@ class ClippedPolygons(Ragged):
 
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
-"""Most coordinates of a batch that is clipped at once: planning chunks would take longer."""
+"""Number of coordinates that are clipped faster than a batch is planned."""
+_MANY: Final = 1 << 20
+"""Number of coordinates from which on several threads look for the largest."""
 _USUAL: Final = (2.0**-100, 2.0**120)
 """Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
 root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does."""
@@ -189,13 +191,13 @@ def clip_polygons(
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
             return few
-    contours = None if plan is None else as_contours(polygons, region.dimension)
+    contours = None if plan is None else as_contours(polygons, region.dimension, workers)
     if plan is not None and contours is not None and is_free and len(contours.vertices) <= _FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:
         with Budget(deadline, cancel) as budget:
             plan = plan_of(region, budget.check)
-            contours = as_contours(polygons, region.dimension) if contours is None else contours
+            contours = as_contours(polygons, region.dimension, workers) if contours is None else contours
             clipped, n_beyond, n_rational = _clip(contours, plan, budget, workers, progress)
     if not report:
         return clipped
@@ -249,17 +251,20 @@ class Batch(NamedTuple):
     status: Int8Array
 
 
-def as_contours(polygons: Any, dimension: int) -> Contours:
-    """Return the rings of all polygons of a call: an array (one ring a polygon), polygons, lists of rings, or GeoJSON.
-    An array is not copied. No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring
-    without vertices; InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element."""
+def as_contours(polygons: Any, dimension: int, workers: int | None = 1) -> Contours:
+    """Return the rings of all polygons of a call: an array (one ring a polygon), a list of polygons or of lists of
+    rings, or GeoJSON. An array is not copied.
+
+    No polygons are allowed. Raises: EmptyGeometryError for a polygon without rings or a ring without vertices;
+    InvalidArrayError, WrongDimensionError, NotFiniteError; each names the element.
+    """
     if isinstance(polygons, np.ndarray):
         array = as_point_groups(polygons, None, dimension, ("polygons",), must_be_finite=False)
         n, size = array.shape[:2]
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
         flat = array.reshape(-1)
-        if not isfinite(largest := _size_of(flat)):
+        if not isfinite(largest := _size_of(flat, workers)):
             check_finite(array, ("polygons",))
         return Contours(dimension, flat, *_equal_rings(n, size), largest)
     if not isinstance(polygons, (list, tuple)):
@@ -296,10 +301,19 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
     return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), _size_of(vertices))
 
 
-def _size_of(vertices: FloatArray) -> float:
+def _size_of(vertices: FloatArray, workers: int | None = 1) -> float:
     """Return `Contours.size`."""
     square = np.vdot(vertices, vertices) if len(vertices) <= _FEW else 0.0
-    return sqrt(square) if _USUAL[0] < square < _USUAL[1] else largest_of(vertices)
+    if _USUAL[0] < square < _USUAL[1]:
+        return sqrt(square)
+    if len(vertices) < _MANY:
+        return largest_of(vertices)
+    sizes: list[float] = []
+    run_chunks(
+        lambda first, last: sizes.append(largest_of(vertices[first:last])), len(vertices), budget=Budget(),
+        first_chunk=_MANY, workers=workers,
+    )  # fmt: skip
+    return float(np.max(sizes, initial=0.0))
 
 
 def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArray:
@@ -376,7 +390,7 @@ def _clip(
         parts[first] = clip_chunk(batch, first, last, budget)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=64)
-    left = np.concatenate([np.zeros((0, d)), *(parts[first] for first in sorted(parts))])
+    left = join_columns([(np.zeros((0, d)),), *((parts[first],) for first in sorted(parts))], budget, workers)[0]
     clipped = _assemble(left, sizes, polygon_offsets, status, may_have_bridges)
     return clipped, int(np.count_nonzero(state)), int(np.count_nonzero(state == OPEN))
 
@@ -412,6 +426,10 @@ def _assemble(
 ) -> ClippedPolygons:
     """Return the clipped polygons; sizes: number of vertices of each ring, 0 for rings that vanished."""
     left = np.flatnonzero(sizes)
+    if len(polygon_offsets) == len(sizes) + 1:  # a ring each
+        contours = np.zeros(len(left), np.int64)
+        ends = polygon_offsets if len(left) == len(sizes) else summed(sizes > 0)
+        return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
     owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
     contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]
     return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)

@@ -273,7 +273,9 @@ def overlay_batch(
         n_few = max(1, _n_vertices(subjects[:_FIRST_CHUNK]) + _n_vertices(clips[:_FIRST_CHUNK]))
         first_chunk = _FIRST_CHUNK * min(64, max(1, _FIRST_VERTICES // n_few))
         run_chunks(task, len(subjects), budget=budget, first_chunk=first_chunk, workers=workers, progress=progress)
-        outcome = first_outcome = concatenate_pairs([parts[start] for start in sorted(parts)] or [NO_PAIRS])
+        outcome = first_outcome = concatenate_pairs(
+            [parts[start] for start in sorted(parts)] or [NO_PAIRS], budget, workers
+        )
         rest = np.zeros(len(subjects), np.int8), np.zeros(len(subjects), np.bool_), dict[int, Overlay]()
         status, is_rounded_again, apart = rest
         ulps, n_rational = 0.5, 0

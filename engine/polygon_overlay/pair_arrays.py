@@ -12,6 +12,8 @@ from engine.errors import RingTooShortError
 from engine.polygon_overlay.compiled.kernel import PairStatus
 from engine.polygon_overlay.compiled.loading import largest_counts
 from engine.polygon_overlay.implicit_rings import one_polygon
+from engine.running.budget import UNLIMITED, Budget
+from engine.running.parallel import join_columns
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import parted, summed
 from engine.types import FloatArray, Int8Array, Int32Array, IntArray, read_only
@@ -76,12 +78,15 @@ def places_of(offsets: IntArray, items: IntArray) -> IntArray:
     return np.arange(ends[-1] if len(ends) else 0) + np.repeat(offsets[items] - (ends - sizes), sizes)
 
 
-def concatenate_pairs(parts: list[PairResults]) -> PairResults:
-    """Concatenate the pairs of at least one part, without evidence."""
+def concatenate_pairs(parts: list[PairResults], budget: Budget = UNLIMITED, workers: int | None = 1) -> PairResults:
+    """Return the pairs of all parts, at least one, without evidence."""
     if len(parts) == 1:
         return parts[0]._replace(evidence=NO_EVIDENCE)
-    outcomes = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[:3])
-    return PairResults(*outcomes, *concatenate_parts([(*part[3:7], NO_EVIDENCE) for part in parts]))
+    rows = [(*part[:5], *(each[1:] - each[:-1] for each in part[5:7])) for part in parts]
+    joined: Any = join_columns(rows, budget, workers)
+    outcomes: list[Any] = joined[:5]
+    ring_offsets, piece_offsets = summed(joined[5]), summed(joined[6])
+    return PairResults._make([*outcomes, ring_offsets, piece_offsets, NO_EVIDENCE])
 
 
 def concatenate_parts(parts: Sequence[Sequence[Any]]) -> list[Any]:

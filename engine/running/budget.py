@@ -6,9 +6,9 @@ import heapq
 import os
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -131,8 +131,6 @@ if hasattr(os, "register_at_fork"):
 
 
 _here = threading.local()
-_BLOCK: Final = 1 << 26
-"""Bytes copied between two polls."""
 _POLL: Final = 0x3FF
 Item = TypeVar("Item")
 
@@ -162,26 +160,6 @@ def polled(items: Iterable[Item]) -> Iterator[Item]:
         if count & _POLL == 0:
             poll()
         yield item
-
-
-def concatenated(parts: Sequence[Any], axis: int = 0) -> Any:
-    """Return arrays of one dtype concatenated along an axis, as numpy does, but poll while gigabytes are copied.
-
-    Raises: what `poll` raises.
-    """
-    n_bytes, n_rows = sum(part.nbytes for part in parts), sum(part.shape[axis] for part in parts)
-    if n_bytes < _BLOCK:
-        return np.concatenate(parts, axis)
-    shape, n = parts[0].shape, 0
-    whole, step = np.empty((*shape[:axis], n_rows, *shape[axis + 1 :]), parts[0].dtype), _BLOCK * n_rows // n_bytes
-    into = np.moveaxis(whole, axis, 0)
-    for rows in (np.moveaxis(part, axis, 0) for part in parts):
-        for first in range(0, len(rows), step):
-            poll()
-            some = rows[first : first + step]
-            into[n : n + len(some)] = some
-            n += len(some)
-    return whole
 
 
 class Budget:

@@ -1,9 +1,21 @@
-"""Splits a batch into chunks of 1-3 ms over a thread pool, within a budget, and reports progress.
+"""Splits a batch into chunks over a thread pool, within a budget, and reports progress.
 
 Kernels are serial and release the interpreter lock, so plain threads run them side by side; two kernels that each start
 threads of their own would abort the process under numba's workqueue layer. Between chunks there is room for other
 requests. Inside a chunk, a kernel whose work per item is not small polls `Budget.flag` (at least every 10 ms) and
 returns early when it is set; slow Python loops call `Budget.check`.
+
+Policy, for a rest of the batch that takes T seconds on one thread:
+
+| question | rule |
+| --- | --- |
+| threads | sqrt(T / 100 us), at most `workers`: starting w threads takes w * 100 us, they save T - T / w |
+| the calling thread | works too; it waits only for chunks that run when no range is left |
+| longest chunk | 1.25 ms for each thread, from 2 to 20 ms: a chunk takes the interpreter lock a fixed number of times |
+| first chunk of each thread | 3/4 of an even share, so that few chunks remain |
+| the others | 1/1.3 of an even share of the rest, not below 1/4 of the longest or a sixth of the first share |
+| other calls use the pool | 2 ms; a thread then goes to the end of the queue after each chunk |
+| pace | CPU time of the last chunk, which does not hold the wait for the interpreter lock as wall time does |
 """
 
 from __future__ import annotations
@@ -11,9 +23,14 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Final, TypedDict
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import lru_cache
+from math import ceil, sqrt
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any, Final, TypedDict
 
 import numpy as np
 
@@ -24,10 +41,16 @@ Progress = Callable[[int], object]
 """Called with the number of items just finished, so that ``tqdm(total=n).update`` fits."""
 
 CHUNK_SECONDS: Final = 0.002
-"""Target duration of a chunk: short enough for fairness between requests, long against 20 us of hand-over."""
+"""Least target duration of a chunk: short enough for fairness between requests, long against 20 us of hand-over."""
 
+_LONGEST: Final = 0.02
+_PER_THREAD: Final = 0.00125
+"""Largest target duration of a chunk, and its part for each thread."""
+_START_SECONDS: Final = 100e-6
+"""Time in which the calling thread starts another."""
 _SMALLEST: Final = 8
 """Least size of the last chunks, as a part of a full one."""
+_cpu_seconds: Final = getattr(time, "thread_time", time.perf_counter)
 
 
 class Options(TypedDict, total=False):
@@ -59,8 +82,41 @@ def is_unlimited(workers: object, deadline: object, cancel: object, progress: ob
 
 
 def default_workers() -> int:
-    """Return the number of cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Return the number of cores this process may use: its affinity, and the quota of its container."""
+    n_cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(n_cores, _quota() or n_cores))
+
+
+@lru_cache(1)
+def _quota(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> int | None:
+    """Return the CPU quota of the control group (version 2 or 1) in cores, rounded up; None if there is none."""
+    try:
+        groups = [line.split(":", 2)[1:] for line in own.read_text().splitlines() if line.count(":") >= 2]
+    except (OSError, ValueError):
+        return None
+    quotas = []
+    for controllers, path in groups:
+        folder = root if not controllers else root / "cpu"
+        if controllers and "cpu" not in controllers.split(","):
+            continue
+        place = folder / path.lstrip("/")
+        for group in [place, *place.parents]:  # a quota of a parent binds too
+            quotas += _quota_of(group, not controllers)
+            if group == folder:
+                break
+    return ceil(min(quotas)) if quotas else None
+
+
+def _quota_of(group: Path, is_unified: bool) -> list[float]:
+    """Return the quota of one control group, or nothing."""
+    try:
+        if is_unified:
+            quota, period = (group / "cpu.max").read_text().split()
+        else:
+            quota, period = ((group / f"cpu.cfs_{name}_us").read_text().strip() for name in ("quota", "period"))
+        return [int(quota) / int(period)] if quota != "max" and int(quota) > 0 else []
+    except (OSError, ValueError):
+        return []
 
 
 _pool: ThreadPoolExecutor | None = None
@@ -99,11 +155,10 @@ def run_chunks(
     """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
 
     The first chunks run in the calling thread and are timed, the very first only if it is long enough: it may load code
-    and data for the others. Later ones are sized to take `CHUNK_SECONDS`. With one worker, or if the rest would take
-    less than twice that, no other thread is started: waiting for one takes up to half a millisecond.
-    Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
+    and data for the others. The rest is shared with as many threads as pay (see the table of this file); with one
+    worker, or if it takes less than two chunks, no other thread is started: waiting for one takes up to half a
+    millisecond. Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
 
-    task: must not call `run_chunks` with more than one worker (the pool is shared and could wait on itself).
     workers: threads at once; None for one per core, 1 for the calling thread only.
     Raises: what `task` raises (the earliest range first), `DeadlineExceededError`, `CancelledError`.
     """
@@ -112,9 +167,10 @@ def run_chunks(
     done, chunk, pace, is_timed = 0, max(1, first_chunk), 0.0, False  # pace: seconds an item
     while done < n_items:
         budget.check()
-        is_worth_it = n_items - done > chunk and (n_items - done) * pace > 2.0 * CHUNK_SECONDS
-        if is_timed and n_workers > 1 and is_worth_it:
-            _run_threaded(task, done, n_items, chunk, n_workers, budget, progress)
+        rest = (n_items - done) * pace
+        if is_timed and n_workers > 1 and n_items - done > chunk and rest > 2.0 * CHUNK_SECONDS:
+            ranges = Ranges(done, n_items, pace, threads_that_pay(rest, n_workers))
+            _run_threaded(task, ranges, budget, progress)
             break
         stop = min(n_items, done + chunk)
         before = time.perf_counter()
@@ -123,105 +179,185 @@ def run_chunks(
         if progress is not None:
             progress(stop - done)
         is_timed = done > 0 or seconds > CHUNK_SECONDS / _SMALLEST
-        chunk, pace = _next_chunk(stop - done, seconds), seconds / (stop - done)
+        chunk, pace = _next_chunk(stop - done, seconds, CHUNK_SECONDS), seconds / (stop - done)
         done = stop
     budget.check()
 
 
-def _next_chunk(n_items: int, seconds: float) -> int:
-    """Return the size of a chunk that should take `CHUNK_SECONDS`, at most eight times the last."""
-    return max(1, int(n_items * min(8.0, CHUNK_SECONDS / max(seconds, 1e-9))))
+def _next_chunk(n_items: int, seconds: float, target: float) -> int:
+    """Return the size of a chunk that should take `target` seconds, at most eight times the last."""
+    return max(1, int(n_items * min(8.0, target / max(seconds, 1e-9))))
 
 
-class _Ranges:
-    """The remaining ranges of a batch. Chunks get smaller towards the end, so that all threads end together."""
+def threads_that_pay(seconds: float, n_workers: int) -> int:
+    """Return how many threads share work of so many seconds: w minimises seconds / w + w * `_START_SECONDS`."""
+    return min(n_workers, max(2, int(sqrt(seconds / _START_SECONDS))))
 
-    def __init__(self, start: int, n_items: int, chunk: int, n_workers: int) -> None:
-        self._start, self._n_items = start, n_items
-        self._chunk, self._n_workers = chunk, n_workers
+
+class Ranges:
+    """The remaining ranges of a batch, and the size of the next; knows no clock."""
+
+    def __init__(self, start: int, n_items: int, pace: float, n_threads: int) -> None:
+        self._start, self.n_items, self.n_threads, self._n_taken = start, n_items, n_threads, 0
+        self._share = (n_items - start) // n_threads
+        self._target = min(_LONGEST, max(CHUNK_SECONDS, n_threads * _PER_THREAD))
+        self._chunk = max(1, int(self._target / max(pace, 1e-12)))
         self._lock = threading.Lock()
 
     @property
     def are_left(self) -> bool:
-        return self._start < self._n_items
+        return self._start < self.n_items
 
-    def take(self) -> tuple[int, int] | None:
-        """Return the next range, None where there is none."""
+    def take(self, is_shared: bool) -> tuple[int, int] | None:
+        """Return the next range, None where there is none; is_shared: other calls use the pool."""
         with self._lock:
             first = self._start
-            if first >= self._n_items:
+            if first >= self.n_items:
                 return None
-            share = max(1, self._chunk // _SMALLEST, (self._n_items - first) // (2 * self._n_workers))
-            self._start = min(self._n_items, first + min(self._chunk, share))
+            most = int(self._chunk * CHUNK_SECONDS / self._target) if is_shared else self._chunk
+            if self._n_taken < self.n_threads:
+                share = 3 * self._share // 4
+            else:
+                least = max(most // 16, min(self._share // 6, most // 4))
+                share = max(least, 10 * (self.n_items - first) // (13 * self.n_threads))
+            self._start, self._n_taken = min(self.n_items, first + max(1, min(most, share))), self._n_taken + 1
             return first, self._start
 
     def took(self, n_items: int, seconds: float) -> None:
-        """Size the next chunks by the duration of one that is done."""
-        self._chunk = _next_chunk(n_items, seconds)
+        """Size the next chunks by the CPU time of one that is done."""
+        self._chunk = _next_chunk(n_items, seconds, self._target)
+
+
+class _Run:
+    """One call whose ranges several threads take; on the first error the flag is set, so that all end soon.
+
+    A thread of the pool wakes the calling thread only to report progress, and when it is the last to end: each time,
+    one waits for the interpreter lock, some 50 us.
+    """
+
+    def __init__(
+        self, task: Callable[[int, int], object], ranges: Ranges, budget: Budget, progress: Progress | None
+    ) -> None:
+        self._task, self._ranges, self._budget, self._progress = task, ranges, budget, progress
+        self._lock, self._n_working, self._is_closed = threading.Lock(), 0, False
+        self.failures: list[tuple[int, BaseException]] = []
+        self._reports: SimpleQueue[int | None] = SimpleQueue()
+        """Numbers of items that other threads finished, if progress is due; None: the last has ended."""
+
+    def _do_next(self) -> int:
+        """Run the next range; return the number of its items, 0 if there is none or the call failed."""
+        taken = None if self.failures else self._ranges.take(_n_calls > 1)
+        if taken is None:
+            return 0
+        first, stop = taken
+        try:
+            before = _cpu_seconds()
+            self._task(first, stop)
+            self._ranges.took(stop - first, _cpu_seconds() - before)
+            self._budget.check()
+        except BaseException as error:  # the caller's, who gets it, and not what follows from a raised flag
+            is_late = self._budget.flag[0] or isinstance(error, (CancelledError, DeadlineExceededError))
+            self.fail(self._ranges.n_items if is_late else first, error)
+            return 0
+        return stop - first
+
+    def fail(self, place: int, error: BaseException) -> None:
+        """Note an error; the one with the least place is raised."""
+        self.failures.append((place, error))
+        self._budget.flag[0] = 1
+
+    def turn(self) -> None:
+        """Run ranges in a thread of the pool; after each, let the other calls' turns go first."""
+        with self._lock:
+            if self._is_closed:
+                return
+            self._n_working += 1
+        work_under(self._budget)
+        while n_done := self._do_next():
+            if self._progress is not None:
+                self._reports.put(n_done)
+            if _n_calls > 1 and self._ranges.are_left:
+                with suppress(RuntimeError):  # the interpreter ends
+                    _shared_pool().submit(self.turn)
+                    break
+        with self._lock:
+            self._n_working -= 1
+            if self._is_closed and not self._n_working:
+                self._reports.put(None)
+
+    def finish(self) -> None:
+        """Work in the calling thread until no range is left, then wait for the ranges that other threads run."""
+        reports = self._reports
+        while n_done := self._do_next():
+            if self._progress is not None:
+                while not reports.empty():
+                    n_done += reports.get() or 0
+                self._progress(n_done)
+        with self._lock:
+            self._is_closed = True
+            if not self._n_working:
+                reports.put(None)
+        while (report := reports.get()) is not None:
+            if self._progress is not None and not self.failures:
+                self._progress(report)
 
 
 def _run_threaded(
-    task: Callable[[int, int], object],
-    start: int,
-    n_items: int,
-    chunk: int,
-    n_workers: int,
-    budget: Budget,
-    progress: Progress | None,
+    task: Callable[[int, int], object], ranges: Ranges, budget: Budget, progress: Progress | None
 ) -> None:
-    """Run `n_workers` threads; on the first error set the flag, wait for running tasks, re-raise.
-
-    A thread takes chunk after chunk by itself: notifying this one after each costs a tenth of the time. It returns
-    after a chunk if another call uses the pool, for fairness, or if `progress` is due.
-    """
+    """Share ranges with other threads; on the first error wait for running tasks, and re-raise it."""
     global _n_calls
-    ranges, pool = _Ranges(start, n_items, chunk, n_workers), _shared_pool()
-    failures: list[tuple[int, BaseException]] = []
-
-    def work() -> int:
-        work_under(budget)
-        n_done = 0
-        while not failures and (next_range := ranges.take()) is not None:
-            first, stop = next_range
-            before = time.perf_counter()
-            try:
-                task(first, stop)
-                ranges.took(stop - first, time.perf_counter() - before)
-                n_done += stop - first
-                budget.check()
-            except BaseException as error:  # the caller's, who gets it, and not what follows from a raised flag
-                is_late = budget.flag[0] or isinstance(error, (CancelledError, DeadlineExceededError))
-                failures.append((n_items if is_late else first, error))
-                budget.flag[0] = 1
-                break
-            if progress is not None or _n_calls > 1:
-                break
-        return n_done
-
-    # where that is every thread of the pool, one more turn waits in its queue, so that none is idle meanwhile
-    n_turns = n_workers + (n_workers >= default_workers())
+    run, pool = _Run(task, ranges, budget, progress), _shared_pool()
     with _pool_lock:
         _n_calls += 1
     try:
-        turns: set[Future[int]] = set()
-        while True:
-            while len(turns) < n_turns and not failures and ranges.are_left:
-                turns.add(pool.submit(work))
-            if not turns:
-                break
-            finished, turns = wait(turns, return_when=FIRST_COMPLETED)
-            for future in finished:
-                if progress is not None and not failures and future.result():
-                    progress(future.result())
+        for _ in range(ranges.n_threads - 1):
+            pool.submit(run.turn)
+        run.finish()
     except BaseException as error:  # of `progress`, or an interrupt: nobody waits for the threads, let them end
-        failures.append((-1, error))
-        budget.flag[0] = 1
+        run.fail(-1, error)
         raise
     finally:
         with _pool_lock:
             _n_calls -= 1
-    if failures:
+    if run.failures:
         try:
-            raise min(failures, key=lambda failure: failure[0])[1]
+            raise min(run.failures, key=lambda failure: failure[0])[1]
         finally:
-            failures.clear()  # each leads to frames that lead here: only a search for cycles would free what they hold
+            run.failures.clear()  # each leads to frames that lead here: a search for cycles would have to free them
+
+
+_FEW_BYTES: Final = 1 << 22
+"""Size of arrays up to which one thread copies them."""
+
+
+def join_columns(
+    parts: Sequence[Sequence[Any]], budget: Budget, workers: int | None, axes: Sequence[int] | None = None
+) -> list[Any]:
+    """Return arrays of parts, at least one, concatenated column by column along ``axes``, by default the first.
+
+    Large ones are copied by several threads, which touch the memory of the result first. Raises: as `Budget.check`.
+    """
+    if len(parts) == 1:
+        return list(parts[0])
+    columns = list(zip(*parts))
+    axes = axes or [0] * len(columns)
+    if sum(array.nbytes for column in columns for array in column) < _FEW_BYTES:
+        return [np.concatenate(column, axis) for column, axis in zip(columns, axes)]
+    ends = [np.cumsum([array.shape[axis] for array in column]) for column, axis in zip(columns, axes)]
+    joined, moved = [], []
+    for column, axis, each in zip(columns, axes, ends):
+        shape = list(column[0].shape)
+        shape[axis] = int(each[-1])
+        joined.append(np.empty(shape, column[0].dtype))
+        moved.append(np.moveaxis(joined[-1], axis, 0))
+
+    def copy(first: int, last: int) -> None:
+        for part in range(first, last):
+            budget.check()
+            for column, axis, into, each in zip(columns, axes, moved, ends):
+                n = column[part].shape[axis]
+                into[each[part] - n : each[part]] = np.moveaxis(column[part], axis, 0)
+
+    run_chunks(copy, len(parts), budget=budget, first_chunk=1, workers=workers)
+    return joined

@@ -24,6 +24,7 @@ from engine.containment.posed_locators import posed_locator
 from engine.errors import EngineError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
 from engine.running.budget import Budget
+from engine.running.parallel import run_chunks
 from engine.scenes.location_tables import LocateTables, Tables, moved_boxes
 from engine.scenes.near_boxes import BodyTree, put_keys
 from engine.scenes.table import Table
@@ -251,11 +252,16 @@ def _address(array: Any) -> int:
     return int(array.__array_interface__["data"][0])
 
 
-def order_of(segments: FloatArray, t: float, where: Any) -> IntArray:
-    """Return an order of segments in which neighbours at parameter t follow each other, for the cache; for few, as
-    given."""
+def order_of(segments: FloatArray, t: float, where: Any, budget: Budget, workers: int | None) -> IntArray:
+    """Return an order of segments in which neighbours at t follow each other, if there are many: their data stays in
+    the cache."""
     n = len(segments)
     if n < _MANY:
         return _AS_GIVEN[:n]
-    entry_of(put_keys)(segments, t, where.together, keys := np.empty(n, np.uint16))
+    keys = np.empty(n, np.uint16)
+
+    def task(first: int, last: int) -> None:
+        entry_of(put_keys)(segments[first:last], t, where.together, keys[first:last])
+
+    run_chunks(task, n, budget=budget, workers=workers, first_chunk=_MANY)
     return read_only(np.argsort(keys, kind="stable"))

@@ -58,8 +58,8 @@ def clip_all(
 ) -> ScenePieces:
     """Return all pieces of segments (n, 2, dim) within the bodies of a scene, sorted."""
     parts = _parts(segments, scene, counts, budget, workers)
-    pieces = merge_parts(parts, segments.shape[2])
-    return sort_pieces(pieces, len(segments), lambda: _exact_ends(segments, scene, budget), budget)
+    pieces = merge_parts(parts, segments.shape[2], budget, workers)
+    return sort_pieces(pieces, len(segments), lambda: _exact_ends(segments, scene, budget), budget, workers)
 
 
 def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exact:
@@ -85,7 +85,7 @@ def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces
     if scene.base.cached("words") is None or type(keep) is not str or keep not in ("all", "first", "any"):
         return None
     segments = read_only(segments)  # of the one kind that kernels are compiled for: this may be their first call
-    n, is_any, order = len(segments), keep == "any", order_of(segments, 0.5, None)
+    n, is_any, order = len(segments), keep == "any", order_of(segments, 0.5, None, UNLIMITED, 1)
     if keep == "all":
         parts, left, is_plain = _cut_near(segments, order, 0, n, scene, UNLIMITED)
         if not is_plain:
@@ -142,9 +142,8 @@ def meets_any(
 def _first_hits(
     segments: FloatArray, scene: Placements, is_any: bool, budget: Budget, workers: int | None
 ) -> tuple[FlagArray, Any]:
-    """Return the state (MET, OPEN, SETTLED) of each segment and, unless `is_any`, the first pieces of those that are
-    MET."""
-    n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget))
+    """Return the state of each segment and, unless `is_any`, the first pieces of those that are MET."""
+    n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget), budget, workers)
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 
     def task(first: int, last: int) -> None:
@@ -179,7 +178,7 @@ def _parts(
 ) -> list[LoosePieces]:
     """Return the pieces of segments within all bodies, unsorted."""
     n, parts, left = len(segments), dict[int, list[LoosePieces]](), dict[int, list[IntArray]]()
-    order = order_of(segments, 0.5, scene.where(budget))
+    order = order_of(segments, 0.5, scene.where(budget), budget, workers)
 
     def task(first: int, last: int) -> None:
         parts[first], left[first], _ = _cut_near(segments, order, first, last, scene, budget)

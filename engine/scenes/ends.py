@@ -15,7 +15,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from engine.compiling.jit import entry_of, inline, kernel
-from engine.running.budget import UNLIMITED, Budget, concatenated
+from engine.running.budget import UNLIMITED, Budget
+from engine.running.parallel import join_columns, run_chunks
 from engine.segment_clipping.exact_pieces import ONE, ZERO, Parameter, compare
 from engine.solids.columns import Columns
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray
@@ -73,16 +74,15 @@ Exact = Callable[[int, int, int], tuple[Parameter, Parameter]]
 """Function of source, body and index of a piece among those of both: returns its exact parameters."""
 
 
-def merge_parts(parts: list[LoosePieces], dimension: int) -> LoosePieces:
-    """Return the pieces of all parts, concatenated."""
+def merge_parts(
+    parts: list[LoosePieces], dimension: int, budget: Budget = UNLIMITED, workers: int | None = 1
+) -> LoosePieces:
+    """Return all pieces, unordered."""
     if len(parts) == 1:
         return parts[0]
     none = np.empty(0, np.int64)
     nothing = LoosePieces(none, none, none, np.empty((2, 0, dimension)), np.empty((0, 2)), np.empty((0, 2), np.int64))
-    if not parts:
-        return nothing
-    each = list(zip(nothing, *parts))
-    return LoosePieces(*(concatenated(each[k], axis=int(k == 3)) for k in range(6)))
+    return LoosePieces(*join_columns([nothing, *parts], budget, workers, (0, 0, 0, 1, 0, 0)))
 
 
 def take_pieces(pieces: LoosePieces, rows: IntArray) -> LoosePieces:
@@ -92,9 +92,10 @@ def take_pieces(pieces: LoosePieces, rows: IntArray) -> LoosePieces:
 
 
 def sort_pieces(
-    pieces: LoosePieces, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED
-) -> ScenePieces:
-    """Return pieces sorted by segment and exact start; caller guarantees those of one segment and body in order."""
+    pieces: LoosePieces, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED,
+    workers: int | None = 1,
+) -> ScenePieces:  # fmt: skip
+    """Return pieces in the exact order of their starts; those of one source and body are in order already."""
     m = len(pieces.source)
     numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, pieces.ends.shape[2]))
     out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)
@@ -102,9 +103,13 @@ def sort_pieces(
     given = pieces.source, pieces.body, pieces.are_long, pieces.ends[0], pieces.ends[1], pieces.t, pieces.faces
     is_tied = np.zeros(n_sources, np.bool_)
     arrays = tuple(map(np.ascontiguousarray, given))
-    are_exact = entry_of(sort_rounded)(arrays, offsets, order, ranks, is_tied, out, budget.flag)
-    budget.check()
-    if not are_exact:
+    entry_of(group_by_source)(arrays[0], offsets, order)
+
+    def task(first: int, last: int) -> None:
+        entry_of(sort_rounded)(arrays, offsets, order, ranks, is_tied, out, first, last, budget.flag)
+
+    run_chunks(task, n_sources, budget=budget, workers=workers)
+    if is_tied.any():
         rows, some = np.flatnonzero(is_tied[out[0]]), take_pieces(pieces, np.flatnonzero(is_tied[pieces.source]))
         for array, looked_at in zip(out, _sort_exactly(some, exact())):
             array[rows] = looked_at
@@ -147,17 +152,11 @@ def _sort_exactly(pieces: LoosePieces, exact: Exact) -> tuple[Any, ...]:
 
 
 @kernel
-def sort_rounded(
-    given: Any, offsets: IntArray, order: IntArray, ranks: IntArray, is_tied: BoolArray, out: Any, flag: FlagArray
-) -> bool:
-    """Fill `out`, the arrays of `ScenePieces`, in the order of rounded parameters; return whether that order is exact.
+def group_by_source(source: IntArray, offsets: IntArray, order: IntArray) -> None:
+    """Set offsets (n + 2,), zeros before, to the first piece of each of n sources, and order (4 m,) to their ends.
 
-    given: the arrays before the last, and `are_long`. is_tied: (n,) zeros, set for sources with an undecided order: of
-    ends that round alike, those of one piece may be known to differ or to be equal, and the segment's own are equal.
-    Work space: offsets (n + 2,) zeros, for n sources; order (4 m,), ranks (m, 2). Polls `flag`.
+    The ends, 2 * piece + side, of the pieces of source i are order[2 offsets[i] : 2 offsets[i + 1]] afterwards.
     """
-    source, body, are_long, start, end, t, faces = given
-    are_exact = True
     for piece in range(source.size):
         offsets[source[piece] + 2] += 1
     for item in range(2, offsets.size):
@@ -166,7 +165,21 @@ def sort_rounded(
         place = offsets[source[piece] + 1]
         offsets[source[piece] + 1] += 1
         order[2 * place], order[2 * place + 1] = 2 * piece, 2 * piece + 1
-    for item in range(offsets.size - 2):
+
+
+@kernel
+def sort_rounded(
+    given: Any, offsets: IntArray, order: IntArray, ranks: IntArray, is_tied: BoolArray, out: Any, begin: int, end: int,
+    flag: FlagArray,
+) -> None:  # fmt: skip
+    """Fill the rows of `out`, the arrays of `ScenePieces`, of sources begin .. end - 1 in order of rounded parameters.
+
+    given: the arrays before the last, and `are_long`. is_tied: (n,) zeros, set for sources whose order is undecided: of
+    ends that round alike, those of one piece may be known to differ or to be equal, and the segment's own are equal.
+    offsets, order: of `group_by_source`. ranks: (m, 2), scratch. Polls `flag`.
+    """
+    source, body, are_long, start, stop, t, faces = given
+    for item in range(begin, end):
         if flag[0]:
             break
         first, last = 2 * offsets[item], 2 * offsets[item + 1]
@@ -180,21 +193,18 @@ def sort_rounded(
             elif piece == before and are_long[piece] != UNDECIDED:
                 rank += are_long[piece]
             elif faces[before, other] >= 0 or faces[piece, side] >= 0:
-                is_tied[item], are_exact = True, False
+                is_tied[item] = True
             ranks[piece, side] = rank
             if side == 0:
                 order[2 * source.size + n_starts] = piece
                 n_starts += 1
-    for place in range(source.size):
-        if flag[0]:
-            break
-        piece = order[2 * source.size + place]
-        out[0][place], out[1][place] = source[piece], body[piece]
-        for k in range(start.shape[1]):
-            out[2][place, k], out[3][place, k] = start[piece, k], end[piece, k]
-        for k in range(2):
-            out[4][place, k], out[5][place, k], out[6][place, k] = t[piece, k], faces[piece, k], ranks[piece, k]
-    return are_exact
+        for place in range(offsets[item], offsets[item + 1]):
+            piece = order[2 * source.size + place]
+            out[0][place], out[1][place] = source[piece], body[piece]
+            for k in range(start.shape[1]):
+                out[2][place, k], out[3][place, k] = start[piece, k], stop[piece, k]
+            for k in range(2):
+                out[4][place, k], out[5][place, k], out[6][place, k] = t[piece, k], faces[piece, k], ranks[piece, k]
 
 
 @inline

@@ -19,7 +19,7 @@ from engine.containment.locators import Counts
 from engine.containment.methods.filters import in_space
 from engine.containment.prepared import tree_of
 from engine.running.budget import Budget
-from engine.running.parallel import Progress, run_chunks
+from engine.running.parallel import Progress, join_columns, run_chunks
 from engine.scenes.location_tables import LocateTables, locate_in_body
 from engine.scenes.near_boxes import Where, bodies_in, scratch_at, scratch_for
 from engine.scenes.placements import Placements
@@ -129,12 +129,27 @@ def locate_pairs(
         located[pair], _ = locate_in_body(tables, bodies[pair], is_flat, p, scratch.stack, flag)
 
 
+@kernel
+def split_keys(
+    keys: IntArray, start: int, n_bodies: int, located: Int8Array, bodies: IntArray, n_hits: IntArray
+) -> None:
+    """Split the keys of `locate_near` of points from ``start`` on: located, bodies by key, n_hits (zeros) by point."""
+    for k in range(keys.size):
+        pair = keys[k] >> 2
+        located[k], bodies[k] = keys[k] & 3, pair % n_bodies
+        n_hits[pair // n_bodies - start] += 1
+
+
+_NO_KEYS: Final = np.zeros(0, np.int8), np.zeros(0, np.int64), np.zeros(0, np.int64)
+"""The columns of `split_keys` without keys."""
+
+
 def locate_all(
     points: FloatArray, scene: Placements, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[SceneLocations, Accuracy]:
     """Return the bodies that contain each of some checked points, and the accuracy report."""
     budget.check()
-    n, n_bodies, parts = len(points), len(scene.base.solids), dict[int, IntArray]()
+    n, n_bodies, parts = len(points), len(scene.base.solids), dict[int, tuple[Any, ...]]()
     if not n_bodies:
         none = SceneLocations(np.zeros(n + 1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.bool_))
         return none, Accuracy("exact", None, n, 0, 0, "box_grid")
@@ -156,23 +171,26 @@ def locate_all(
             budget.take(_BYTES * n_keys)
             blocks.append(keys[:n_keys] if is_sorted else np.sort(keys[:n_keys]))
             beyond.append(n_beyond)
-        parts[start] = np.concatenate(blocks)
+        keys = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        columns = np.empty(len(keys), np.int8), np.empty(len(keys), np.int64), np.zeros(stop - start, np.int64)
+        entry_of(split_keys)(keys, start, n_bodies, *columns)
+        parts[start] = columns
         query_counts.append(counted)
 
     run_chunks(task, n, budget=budget, workers=workers, progress=progress)
-    keys = np.concatenate([np.zeros(0, np.int64), *(parts[start] for start in sorted(parts))])
+    joined: Any = join_columns([_NO_KEYS, *(parts[start] for start in sorted(parts))], budget, workers)
     if query_counts and len(tables.sizes):
         has_new = _build_trees(scene, np.sum(query_counts, axis=0), budget, workers)
-    located = (keys & 3).astype(np.int8)
-    owners, bodies = np.divmod(keys >> 2, n_bodies)
+    located, bodies, n_hits = joined
     left = np.flatnonzero(located == UNDECIDED)
     counts, is_exact = Counts(0, 0), scene.base.is_exact
     if len(left):
+        owners = np.repeat(np.arange(n), n_hits)
         located[left], counts = _locate_exactly(points, owners[left], bodies[left], scene, has_new, budget, workers)
         is_hit = located >= 0
-        located, owners, bodies = located[is_hit], owners[is_hit], bodies[is_hit]
+        located, bodies, n_hits = located[is_hit], bodies[is_hit], np.bincount(owners[is_hit], minlength=n)
     offsets = np.zeros(n + 1, np.int64)
-    np.cumsum(np.bincount(owners, minlength=n), out=offsets[1:])
+    np.cumsum(n_hits, out=offsets[1:])
     decisions: Literal["exact", "float64"] = "exact" if is_exact else "float64"
     n_beyond = min(n, sum(beyond) + counts.beyond)
     accuracy = Accuracy(decisions, None, n, n_beyond, min(n, counts.rational), "box_grid")

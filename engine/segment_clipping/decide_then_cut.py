@@ -20,7 +20,7 @@ import numpy as np
 from engine.compiling.jit import entry_of
 from engine.predicates.rational import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
-from engine.running.parallel import Progress, run_chunks
+from engine.running.parallel import Progress, default_workers, run_chunks
 from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, in_order_of_source
 from engine.segment_clipping.profiles import clip_exactly
 from engine.solids.base import Solid
@@ -39,7 +39,10 @@ _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
 """Scratch of the small batch path, for one call at a time."""
 _NO_FLAG: Final = UNLIMITED.flag
 _PER_BLOCK: Final = 1 << 12
-"""Segments decided before their pieces are filled."""
+_PER_SHARED_BLOCK: Final = 1 << 14
+_FEW_THREADS: Final = 4
+"""Segments that are decided before their pieces are filled: few are still in the cache then; many keep the interpreter
+lock free where more than a few threads need it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,9 +135,11 @@ def _clip(
     segments: FloatArray, region: Solid, method: Method, scene: Scaled, most_open: int, budget: Budget,
     workers: int | None, progress: Progress | None,
 ) -> Clipped | None:  # fmt: skip
-    """Return the pieces of a batch; None if more than `most_open` segments need the exact fallback."""
-    batch = _Batch(method, scene, budget)
+    """Return the pieces; None if more than `most_open` items are left to the exact fallback."""
+    n_threads = default_workers() if workers is None else workers
+    batch = _Batch(method, scene, budget, _PER_BLOCK if n_threads <= _FEW_THREADS else _PER_SHARED_BLOCK)
     run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress)
+    run_chunks(batch.fill_rest(), batch.n_waiting, budget=budget, workers=workers, first_chunk=1)
     n_open = sum(map(len, batch.open_items))
     if n_open:
         check_finite(segments, ("segments",))  # kernels leave open what is not
@@ -149,26 +154,45 @@ def _clip(
 
 
 class _Batch:
-    """Clips chunks of a batch and writes each piece to its final row, after those of all earlier chunks. Rows are
-    assigned in the order of the chunks: a chunk that is decided early waits, and the thread that decides the chunk
-    before it also fills it. Rows are allocated for a piece of every segment; unused ones cost address space only."""
+    """Clips chunks of a batch and writes each piece to its final row, behind those of all earlier chunks.
 
-    def __init__(self, method: Method, scene: Scaled, budget: Budget) -> None:
+    Rows are assigned in the order of the blocks: a block that is decided early waits until those before it are, and is
+    filled by whichever thread decides a block next, or by `fill_rest` at the end. Rows are allocated for a piece of
+    every segment; unused ones cost address space only.
+    """
+
+    def __init__(self, method: Method, scene: Scaled, budget: Budget, per_block: int) -> None:
         n, _, dimension = scene.points.shape
         self.pieces = allocate_pieces(n, dimension)
         self.open_items: list[IntArray] = []
         self.unsure_rows: list[IntArray] = []
         self.n_rows = self.n_beyond = 0
-        self._method, self._scene, self._flag = method, scene, budget.flag
+        self._method, self._scene, self._flag, self._per_block = method, scene, budget.flag, per_block
         self._waiting: dict[int, tuple[int, Int32Array, Int32Array, int]] = {}
         self._lock, self._next = Lock(), 0
 
     def clip(self, first: int, last: int) -> None:
-        """Clip segments first .. last - 1, in blocks that are still in the cache when their pieces are filled."""
-        for begin in range(first, last, _PER_BLOCK):
-            self._decide(begin, min(begin + _PER_BLOCK, last))
-            while (chunk := self._next_to_fill()) is not None:
-                self._fill(*chunk)
+        """Clip segments first .. last - 1 in blocks, which are still in the cache when their pieces are filled."""
+        for begin in range(first, last, self._per_block):
+            self._decide(begin, min(begin + self._per_block, last))
+            for _ in range(2):  # its own, and one that waits: the last to decide must not fill all others' alone
+                if (block := self._next_to_fill()) is not None:
+                    self._fill(*block)
+
+    @property
+    def n_waiting(self) -> int:
+        """The number of blocks that are decided and not filled."""
+        return len(self._waiting)
+
+    def fill_rest(self) -> Callable[[int, int], None]:
+        """Return the task that fills the blocks that wait, all of which are decided."""
+
+        def fill(first: int, last: int) -> None:
+            for _ in range(first, last):
+                if (block := self._next_to_fill()) is not None:
+                    self._fill(*block)
+
+        return fill
 
     def _decide(self, first: int, last: int) -> None:
         """Decide segments first .. last - 1, and add the chunk to those waiting to be filled."""

@@ -10,7 +10,8 @@ import numpy as np
 
 from engine.compiling.jit import inline, merged
 from engine.predicates.cut_point import T_BOUND, point_at
-from engine.running.budget import concatenated
+from engine.running.budget import UNLIMITED, Budget
+from engine.running.parallel import join_columns
 from engine.types import FloatArray
 
 Triple = tuple[float, float, float]
@@ -46,10 +47,9 @@ def allocate_pieces(m: int, dimension: int) -> Pieces:
     return Pieces(np.empty(m, np.int64), np.empty((2, m, dimension)), np.empty((m, 2)), np.empty((m, 2), np.int64))
 
 
-def joined(parts: Sequence[Pieces]) -> Pieces:
-    """Concatenate several sets of pieces."""
-    source, ends, t, faces = zip(*parts)
-    return Pieces(concatenated(source), concatenated(ends, axis=1), concatenated(t), concatenated(faces))
+def joined(parts: Sequence[Pieces], budget: Budget = UNLIMITED, workers: int | None = 1) -> Pieces:
+    """Return several sets of pieces, at least one, concatenated."""
+    return Pieces(*join_columns(parts, budget, workers, (0, 1, 0, 0)))
 
 
 def first_of(pieces: Pieces, m: int) -> Pieces:

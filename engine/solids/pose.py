@@ -11,6 +11,8 @@ import numpy as np
 from engine.compiling.jit import entry_of, kernel
 from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.predicates.rational import cross, determinant, scaled_integers
+from engine.running.budget import Budget
+from engine.running.parallel import run_chunks
 from engine.solids.base import Immutable
 from engine.solids.checks import (
     as_floats,
@@ -245,6 +247,7 @@ def check_rotations(
     *,
     one: bool = False,
     limit: Fraction = TOLERANCE,
+    workers: int | None = 1,
 ) -> None:
     """Raise for the first matrix of ``(n, d, d)`` finite float64 that is no rotation.
 
@@ -257,8 +260,16 @@ def check_rotations(
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
     sure = (_TOLERANCE if limit is TOLERANCE else float(limit)) - _UNSURE
     is_suspect = np.empty(len(rotations), np.bool_)
-    n_suspects = entry_of(find_suspects)(read_only(rotations), sure, is_suspect)
-    for index in np.flatnonzero(is_suspect) if n_suspects else ():
+    matrices = read_only(rotations)
+
+    def task(first: int, last: int) -> None:
+        entry_of(find_suspects)(matrices[first:last], sure, is_suspect[first:last])
+
+    if one:
+        task(0, len(rotations))
+    else:
+        run_chunks(task, len(rotations), budget=Budget(), workers=workers)
+    for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = _exact_defect(matrix)

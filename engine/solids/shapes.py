@@ -73,7 +73,7 @@ def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
         if kind == "Feature" or not isinstance(members, (list, tuple)):
             raise InvalidArrayError(f"{spell(where)} must be a list of polygons, got {type(values).__name__}", where)
         values = [Polygon([]) if each is None else each for each in members]  # a null geometry of a Feature: the same
-    if all(isinstance(each, Solid) for each in values):
+    if all(issubclass(kind, Solid) for kind in set(map(type, values))):
         return values
     return [as_solid(each, *where, number) for number, each in enumerate(values)]
 

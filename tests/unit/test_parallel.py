@@ -1,12 +1,16 @@
-"""The chunking pool: every item once, whatever the workers; deadline, cancel, errors, forked children."""
+"""The chunking pool: every item once, whatever the workers; deadline, cancel, errors, forked children; the policy by
+simulation, without a clock."""
 
 from __future__ import annotations
 
 import gc
+import heapq
 import multiprocessing
 import threading
 import time
 import weakref
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +18,7 @@ import pytest
 from engine.errors import CancelledError, DeadlineExceededError, InvalidInputError
 from engine.running import parallel
 from engine.running.budget import Budget, Cancel
-from engine.running.parallel import check_options, is_unlimited, run_chunks
+from engine.running.parallel import Ranges, check_options, is_unlimited, join_columns, run_chunks, threads_that_pay
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, None])
@@ -84,7 +88,9 @@ def test_two_calls_take_fair_turns(has_progress: bool) -> None:
 
     def run(name: str, n_items: int) -> None:
         def task(start: int, stop: int) -> None:
-            time.sleep(1e-5 * (stop - start))
+            end = time.thread_time() + 1e-5 * (stop - start)  # chunks are sized by CPU time
+            while time.thread_time() < end:
+                pass
             done[name].append(stop - start)
 
         reported: list[int] = []
@@ -137,8 +143,13 @@ def test_what_takes_less_than_a_chunk_stays_in_the_calling_thread(
 ) -> None:
     monkeypatch.setattr(parallel, "CHUNK_SECONDS", seconds)
     seen: set[int] = set()
+
+    def task(_start: int, _stop: int) -> None:
+        seen.add(threading.get_ident())
+        time.sleep(0.002)  # or the calling thread does all before another has begun
+
     with Budget() as budget:
-        run_chunks(lambda *_: seen.add(threading.get_ident()), 10_000, budget=budget, first_chunk=100, workers=2)
+        run_chunks(task, 10_000, budget=budget, first_chunk=100, workers=2)
     assert (seen == {threading.get_ident()}) is is_alone
 
 
@@ -234,3 +245,92 @@ def test_what_may_be_answered_at_once(workers: object, is_any: bool) -> None:
     assert not is_unlimited(workers, 1.0, None, None)
     assert not is_unlimited(workers, None, Cancel(), None)
     assert not is_unlimited(workers, None, None, print)
+
+
+def _simulate(n_cores: int, n_items: int, pace: Callable[[int], float], lock_seconds: float) -> tuple[float, int]:
+    """Return the makespan, and the number of chunks, of a batch on so many cores with one interpreter lock.
+
+    pace: seconds of kernel by item, constant in each thousandth of the batch. lock_seconds: held for each chunk.
+    """
+    costs = np.array([pace(k * n_items // 1000) for k in range(1000)])
+    summed = np.concatenate([[0.0], np.cumsum(costs * (n_items / 1000))])
+    cost_up_to = lambda item: float(np.interp(item * 1000 / n_items, np.arange(1001), summed))  # noqa: E731
+    ranges = Ranges(0, n_items, pace(0), threads_that_pay(n_items * pace(0), n_cores))
+    free_at = lock_free = 0.0
+    threads = [(k * 50e-6, k) for k in range(ranges.n_threads)]  # they start one after another
+    heapq.heapify(threads)
+    n_chunks = n_done = 0
+    end = 0.0
+    while threads:  # bound: each turn takes a range or ends a thread
+        now, thread = heapq.heappop(threads)
+        taken = ranges.take(is_shared=False)
+        if taken is None:
+            end = max(end, now)
+            continue
+        first, stop = taken
+        assert first == n_done
+        n_done, n_chunks = stop, n_chunks + 1
+        free_at = max(now, lock_free) + lock_seconds
+        lock_free = free_at
+        seconds = cost_up_to(stop) - cost_up_to(first)
+        ranges.took(stop - first, seconds + lock_seconds)
+        heapq.heappush(threads, (free_at + seconds, thread))
+    assert n_done == n_items
+    return end, n_chunks
+
+
+@pytest.mark.parametrize("n_cores", [2, 8, 32, 64])
+@pytest.mark.parametrize(
+    "pace",
+    [lambda _: 1e-7, lambda k: 2e-8 if k < 500_000 else 2e-7, lambda k: 2e-7 if k < 100_000 else 2e-8],
+    ids=["even", "slow_end", "slow_start"],
+)
+def test_simulated_threads_share_work_evenly_and_hold_the_lock_seldom(
+    n_cores: int, pace: Callable[[int], float]
+) -> None:
+    n_items = 1_000_000 * n_cores
+    one = sum(pace(k * n_items // 1000) for k in range(1000)) * n_items / 1000
+    end, n_chunks = _simulate(n_cores, n_items, pace, lock_seconds=60e-6)
+    assert end < 1.25 * one / n_cores + n_cores * 50e-6 + 0.01  # a chunk at the end
+    assert n_chunks * 60e-6 < 0.4 * end + 60e-6 * 3 * n_cores  # nobody waits long for the lock
+
+
+@pytest.mark.parametrize("n_cores", [2, 8, 32, 64])
+def test_simulated_small_work_is_never_slower_than_one_thread(n_cores: int) -> None:
+    for milliseconds in (4, 6, 10, 20, 50):
+        n_items = 10_000 * milliseconds
+        end, _ = _simulate(n_cores, n_items, lambda _: 1e-7, lock_seconds=60e-6)
+        assert end < 1e-3 * milliseconds
+
+
+@pytest.mark.parametrize(
+    ("files", "groups", "cores"),
+    [
+        ({"cpu.max": "max 100000"}, "0::/", None),
+        ({"cpu.max": "150000 100000"}, "0::/", 2),
+        ({"cpu.max": "max 100000", "a/cpu.max": "400000 100000", "a/b/cpu.max": "max 100000"}, "0::/a/b", 4),
+        ({"cpu/box/cpu.cfs_quota_us": "300000", "cpu/box/cpu.cfs_period_us": "100000"}, "4:cpu,cpuacct:/box", 3),
+        ({"cpu/cpu.cfs_quota_us": "-1", "cpu/cpu.cfs_period_us": "100000"}, "4:cpu,cpuacct:/", None),
+        ({"cpu.max": "nonsense"}, "0::/", None),
+        ({}, "", None),
+    ],
+)
+def test_a_quota_of_the_container_counts_as_cores(
+    tmp_path: Path, files: dict[str, str], groups: str, cores: int | None
+) -> None:
+    for name, text in files.items():
+        (tmp_path / "cgroup" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "cgroup" / name).write_text(text + "\n")
+    (tmp_path / "own").write_text(groups + "\n")
+    assert parallel._quota.__wrapped__(tmp_path / "cgroup", tmp_path / "own") == cores
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 16])
+def test_columns_join_as_numpy_concatenates(workers: int) -> None:
+    rng = np.random.default_rng(4)
+    parts = [(rng.random((n, 3)), rng.random((2, n, 3)), rng.integers(0, 9, n)) for n in (7, 0, 60_000, 1, 90_000)]
+    joined = join_columns(parts, Budget(), workers, (0, 1, 0))
+    for array, column, axis in zip(joined, zip(*parts), (0, 1, 0), strict=True):
+        expected = np.concatenate(column, axis)
+        assert array.dtype == expected.dtype
+        assert np.array_equal(array, expected)

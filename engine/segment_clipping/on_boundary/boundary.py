@@ -74,7 +74,7 @@ def clip_on_boundary(
     run_chunks(chunk, len(segments), budget=budget, workers=workers, progress=progress, first_chunk=least)
     pieces, left = zip(*(chunks[first] for first in sorted(chunks)))
     n_left = sum(map(len, left))
-    return joined(pieces), n_left, n_left
+    return joined(pieces, budget, workers), n_left, n_left
 
 
 def clip_chunk(
