@@ -43,6 +43,7 @@ from engine.polygon_overlay.overlay import filled, overlay, union_all
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
 from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of solids)
 from engine.running.budget import Cancel
+from engine.running.parallel import default_workers
 from engine.scenes.collide_scene import ScenePairs, collide_scene
 from engine.scenes.ends import ScenePieces
 from engine.scenes.locate import SceneLocations
@@ -75,6 +76,7 @@ __all__ = [
     "ScenePieces", "SegmentPieces", "Solid", "Sphere", "Surface", "TooComplexError", "TooDeepError", "Triangle",
     "UnsupportedPairError", "UnsupportedSolidError", "Witness", "WrongDimensionError", "ZeroNormalError", "__version__",
     "bounds", "clearance", "clearance_poses", "clip_lines", "clip_polygons", "clip_segments", "collide",
-    "collide_poses", "collide_scene", "collide_triangles", "compare", "contains", "filled", "layers", "locate",
-    "locate_scene", "overlay", "overlay_batch", "polygons", "read_mesh", "release", "solid_types", "union_all", "warm",
+    "collide_poses", "collide_scene", "collide_triangles", "compare", "contains", "default_workers", "filled",
+    "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons", "read_mesh", "release", "solid_types",
+    "union_all", "warm",
 ]  # fmt: skip

@@ -15,7 +15,7 @@ from typing import Annotated, Final, Literal
 from pydantic import BeforeValidator, ByteSize, Field, SecretStr, TypeAdapter, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from engine.running.parallel import default_workers
+from engine import default_workers
 
 WARM_UP: Final = "warm-up"
 """The name of the thread that compiles."""
@@ -123,7 +123,7 @@ class Settings(BaseSettings):
     """Time for running requests after SIGTERM; the process ends 2 s later whatever runs. Kubernetes kills 30 s after
     SIGTERM by default, so lower it there."""
     concurrency: Count = Field(default_factory=lambda: 4 * default_workers())
-    """Requests computed at once. More than cores: long calls run in chunks of 1-3 ms, so short ones slip between."""
+    """Requests computed at once. More than cores: long calls run in chunks of 2-20 ms, so short ones slip between."""
     queue_length: Count = 64
     """Requests that may wait for their turn; beyond it the answer is 503 with Retry-After."""
     inline_bytes: Annotated[int, BeforeValidator(_bytes), Field(ge=0)] = 2048

@@ -1,7 +1,7 @@
 """Thread pool of the service: a bounded queue before a few threads, and the context of one call.
 
 A request is one job: decode, convert, compute, encode, all in one thread, so there is one hand-over. Long engine calls
-run in chunks of 1-3 ms over the engine's own pool, so short requests slip between the chunks of long ones.
+run in chunks of 2-20 ms over the engine's own pool, so short requests slip between the chunks of long ones.
 """
 
 from __future__ import annotations

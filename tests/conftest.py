@@ -14,6 +14,7 @@ from engine.warmup import SHARES
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
+os.environ.setdefault("GEOMETRY_WORKERS", "1")  # services that tests start have one process unless a test asks for more
 WHOLE_SUITE = 4000
 """Tests from which on a run will need nearly every kernel."""
 

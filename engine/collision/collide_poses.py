@@ -94,7 +94,7 @@ def collide_poses(
     Boundary, degenerate input, accuracy: as `collide`. Empty arrays give an empty answer.
 
     Cost: the structures of both solids are built once; most poses are decided in compiled code, in parallel chunks of
-    about 2 ms. A pose costs the pairs of faces near each other.
+    2 to 20 ms. A pose costs the pairs of faces near each other.
 
     References
     ----------

@@ -93,8 +93,6 @@ class ClippedPolygons(Ragged):
 _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
 """Number of coordinates that are clipped faster than a batch is planned."""
-_MANY: Final = 1 << 20
-"""Number of coordinates from which on several threads look for the largest."""
 _USUAL: Final = (2.0**-100, 2.0**120)
 """Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
 root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does."""
@@ -191,13 +189,13 @@ def clip_polygons(
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
             return few
-    contours = None if plan is None else as_contours(polygons, region.dimension, workers)
+    contours = None if plan is None else as_contours(polygons, region.dimension)
     if plan is not None and contours is not None and is_free and len(contours.vertices) <= _FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:
         with Budget(deadline, cancel) as budget:
             plan = plan_of(region, budget.check)
-            contours = as_contours(polygons, region.dimension, workers) if contours is None else contours
+            contours = as_contours(polygons, region.dimension) if contours is None else contours
             clipped, n_beyond, n_rational = _clip(contours, plan, budget, workers, progress)
     if not report:
         return clipped
@@ -251,7 +249,7 @@ class Batch(NamedTuple):
     status: Int8Array
 
 
-def as_contours(polygons: Any, dimension: int, workers: int | None = 1) -> Contours:
+def as_contours(polygons: Any, dimension: int) -> Contours:
     """Return the rings of all polygons of a call: an array (one ring a polygon), a list of polygons or of lists of
     rings, or GeoJSON. An array is not copied.
 
@@ -264,7 +262,7 @@ def as_contours(polygons: Any, dimension: int, workers: int | None = 1) -> Conto
         if n and not size:
             raise EmptyGeometryError("polygons[0] has no vertices; leave it out", ("polygons", 0))
         flat = array.reshape(-1)
-        if not isfinite(largest := _size_of(flat, workers)):
+        if not isfinite(largest := _size_of(flat)):
             check_finite(array, ("polygons",))
         return Contours(dimension, flat, *_equal_rings(n, size), largest)
     if not isinstance(polygons, (list, tuple)):
@@ -301,19 +299,10 @@ def as_contours(polygons: Any, dimension: int, workers: int | None = 1) -> Conto
     return Contours(dimension, vertices, summed([len(ring) for ring in rings]), summed(counts), _size_of(vertices))
 
 
-def _size_of(vertices: FloatArray, workers: int | None = 1) -> float:
+def _size_of(vertices: FloatArray) -> float:
     """Return `Contours.size`."""
     square = np.vdot(vertices, vertices) if len(vertices) <= _FEW else 0.0
-    if _USUAL[0] < square < _USUAL[1]:
-        return sqrt(square)
-    if len(vertices) < _MANY:
-        return largest_of(vertices)
-    sizes: list[float] = []
-    run_chunks(
-        lambda first, last: sizes.append(largest_of(vertices[first:last])), len(vertices), budget=Budget(),
-        first_chunk=_MANY, workers=workers,
-    )  # fmt: skip
-    return float(np.max(sizes, initial=0.0))
+    return sqrt(square) if _USUAL[0] < square < _USUAL[1] else largest_of(vertices)
 
 
 def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArray:

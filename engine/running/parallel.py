@@ -82,7 +82,28 @@ def is_unlimited(workers: object, deadline: object, cancel: object, progress: ob
 
 
 def default_workers() -> int:
-    """Return the number of cores this process may use: its affinity, and the quota of its container."""
+    """Return the number of cores this process may use, the most threads that a call takes by default.
+
+    Returns
+    -------
+    int
+        The cores of its affinity, at most the CPU quota of its container (control groups 1 and 2) rounded up; at
+        least 1.
+
+    Notes
+    -----
+    The quota is read once a process.
+
+    References
+    ----------
+    Linux kernel documentation, Control Group v2, CPU interface files.
+
+    Examples
+    --------
+    >>> from engine import default_workers
+    >>> default_workers() >= 1
+    True
+    """
     n_cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(n_cores, _quota() or n_cores))
 
