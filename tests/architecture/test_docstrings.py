@@ -15,8 +15,8 @@ import engine
 from engine import layers
 
 SECTIONS = ("Parameters", "Returns", "Raises", "Notes", "References", "Examples")
-CALLS = ("warm", "release")
-"""They answer no question of geometry: nothing to return, nothing to cite."""
+CALLS = ("warm", "release", "default_workers")
+"""They answer no question of geometry: nothing to raise, nothing to cite."""
 PUBLIC = {
     name: getattr(engine, name) for name in engine.__all__ if name not in ("layers", "solid_types", "__version__")
 }

@@ -252,7 +252,15 @@ ASKED: dict[str, dict[str, Any]] = {
 }
 """A good question of everything that is public, options left out that many have: those are below."""
 SHARED = {"workers", "deadline", "cancel", "progress", "report", *FLAGS, "others", "options"}
-ELSEWHERE = {"release", "warm", "layers.overlay", "layers.dissolve", "layers.sjoin", "layers.FeatureRows"}
+ELSEWHERE = {
+    "default_workers",
+    "release",
+    "warm",
+    "layers.overlay",
+    "layers.dissolve",
+    "layers.sjoin",
+    "layers.FeatureRows",
+}
 """Without arguments; looked at below; of frames: tests/unit/layers/test_frames.py; an answer."""
 
 

@@ -15,7 +15,7 @@ from engine import errors
 from engine.compiling.jit import entry_of, kernel
 from engine.errors import CancelledError, InvalidInputError
 from engine.running import budget
-from engine.running.budget import Budget, Cancel, concatenated, polled
+from engine.running.budget import Budget, Cancel, polled
 
 
 @kernel
@@ -106,18 +106,3 @@ def test_a_loop_ends_within_a_thousand_turns() -> None:
             taken.extend(items)
     assert taken == list(range(2_048))
     assert list(polled("abc")) == ["a", "b", "c"]
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_arrays_are_put_one_after_another_by_parts(axis: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    draw = np.random.default_rng(axis)
-    shapes = [(3, n, 2) if axis else (n, 3) for n in (5, 0, 1, 40, 7)]
-    parts = [draw.random(shape) for shape in shapes]
-    whole = np.concatenate(parts, axis)
-    assert np.array_equal(concatenated(parts, axis), whole)
-    monkeypatch.setattr(budget, "_BLOCK", 200)
-    assert np.array_equal(concatenated(parts, axis), whole)
-    cancel = Cancel()
-    cancel.set()
-    with pytest.raises(CancelledError), Budget(cancel=cancel):
-        concatenated(parts, axis)
