@@ -14,6 +14,7 @@ Policy, for a rest of the batch that takes T seconds on one thread:
 | longest chunk | 1.25 ms for each thread, from 2 to 20 ms: a chunk takes the interpreter lock a fixed number of times |
 | first chunk of each thread | 3/4 of an even share, so that few chunks remain |
 | the others | 1/1.3 of an even share of the rest, not below 1/4 of the longest or a sixth of the first share |
+| tasks in order, up to 4 threads | half an even share of the rest, at most 2 ms |
 | other calls use the pool | 2 ms; a thread then goes to the end of the queue after each chunk |
 | pace | CPU time of the last chunk, which does not hold the wait for the interpreter lock as wall time does |
 """
@@ -50,6 +51,8 @@ _START_SECONDS: Final = 100e-6
 """Time in which the calling thread starts another."""
 _SMALLEST: Final = 8
 """Least size of the last chunks, as a part of a full one."""
+FEW_THREADS: Final = 4
+"""Number of threads up to which short ranges do not wait for the interpreter lock."""
 _cpu_seconds: Final = getattr(time, "thread_time", time.perf_counter)
 
 
@@ -172,6 +175,7 @@ def run_chunks(
     first_chunk: int = 1024,
     workers: int | None = None,
     progress: Progress | None = None,
+    in_order: bool = False,
 ) -> None:
     """Call ``task(start, stop)`` until the ranges cover ``0 .. n_items``, each item once.
 
@@ -180,7 +184,8 @@ def run_chunks(
     worker, or if it takes less than two chunks, no other thread is started: waiting for one takes up to half a
     millisecond. Tasks write to disjoint slices, so the result does not depend on `workers` or on the sizes chosen.
 
-    workers: threads at once; None for one per core, 1 for the calling thread only.
+    workers: threads at once; None for one per core, 1 for the calling thread only. in_order: a task continues what the
+    range before began, so that ranges stay short where there are few threads.
     Raises: what `task` raises (the earliest range first), `DeadlineExceededError`, `CancelledError`.
     """
     check_options(workers, progress)
@@ -190,7 +195,7 @@ def run_chunks(
         budget.check()
         rest = (n_items - done) * pace
         if is_timed and n_workers > 1 and n_items - done > chunk and rest > 2.0 * CHUNK_SECONDS:
-            ranges = Ranges(done, n_items, pace, threads_that_pay(rest, n_workers))
+            ranges = Ranges(done, n_items, pace, threads_that_pay(rest, n_workers), in_order)
             _run_threaded(task, ranges, budget, progress)
             break
         stop = min(n_items, done + chunk)
@@ -218,7 +223,8 @@ def threads_that_pay(seconds: float, n_workers: int) -> int:
 class Ranges:
     """The remaining ranges of a batch, and the size of the next; knows no clock."""
 
-    def __init__(self, start: int, n_items: int, pace: float, n_threads: int) -> None:
+    def __init__(self, start: int, n_items: int, pace: float, n_threads: int, in_order: bool = False) -> None:
+        self._are_short = in_order and n_threads <= FEW_THREADS
         self._start, self.n_items, self.n_threads, self._n_taken = start, n_items, n_threads, 0
         self._share = (n_items - start) // n_threads
         self._target = min(_LONGEST, max(CHUNK_SECONDS, n_threads * _PER_THREAD))
@@ -235,8 +241,10 @@ class Ranges:
             first = self._start
             if first >= self.n_items:
                 return None
-            most = int(self._chunk * CHUNK_SECONDS / self._target) if is_shared else self._chunk
-            if self._n_taken < self.n_threads:
+            most = int(self._chunk * CHUNK_SECONDS / self._target) if is_shared or self._are_short else self._chunk
+            if self._are_short:
+                share = max(most // _SMALLEST, (self.n_items - first) // (2 * self.n_threads))
+            elif self._n_taken < self.n_threads:
                 share = 3 * self._share // 4
             else:
                 least = max(most // 16, min(self._share // 6, most // 4))

@@ -104,12 +104,16 @@ def sort_pieces(
     is_tied = np.zeros(n_sources, np.bool_)
     arrays = tuple(map(np.ascontiguousarray, given))
     entry_of(group_by_source)(arrays[0], offsets, order)
+    are_exact: list[bool] = []
 
     def task(first: int, last: int) -> None:
-        entry_of(sort_rounded)(arrays, offsets, order, ranks, is_tied, out, first, last, budget.flag)
+        are_exact.append(entry_of(sort_rounded)(arrays, offsets, order, ranks, is_tied, out, first, last, budget.flag))
 
-    run_chunks(task, n_sources, budget=budget, workers=workers)
-    if is_tied.any():
+    if budget is UNLIMITED:
+        task(0, n_sources)
+    else:
+        run_chunks(task, n_sources, budget=budget, workers=workers)
+    if not all(are_exact):
         rows, some = np.flatnonzero(is_tied[out[0]]), take_pieces(pieces, np.flatnonzero(is_tied[pieces.source]))
         for array, looked_at in zip(out, _sort_exactly(some, exact())):
             array[rows] = looked_at
@@ -171,14 +175,15 @@ def group_by_source(source: IntArray, offsets: IntArray, order: IntArray) -> Non
 def sort_rounded(
     given: Any, offsets: IntArray, order: IntArray, ranks: IntArray, is_tied: BoolArray, out: Any, begin: int, end: int,
     flag: FlagArray,
-) -> None:  # fmt: skip
+) -> bool:  # fmt: skip
     """Fill the rows of `out`, the arrays of `ScenePieces`, of sources begin .. end - 1 in order of rounded parameters.
 
     given: the arrays before the last, and `are_long`. is_tied: (n,) zeros, set for sources whose order is undecided: of
     ends that round alike, those of one piece may be known to differ or to be equal, and the segment's own are equal.
-    offsets, order: of `group_by_source`. ranks: (m, 2), scratch. Polls `flag`.
+    offsets, order: of `group_by_source`. ranks: (m, 2), scratch. Returns whether no source is tied. Polls `flag`.
     """
     source, body, are_long, start, stop, t, faces = given
+    are_exact = True
     for item in range(begin, end):
         if flag[0]:
             break
@@ -193,7 +198,7 @@ def sort_rounded(
             elif piece == before and are_long[piece] != UNDECIDED:
                 rank += are_long[piece]
             elif faces[before, other] >= 0 or faces[piece, side] >= 0:
-                is_tied[item] = True
+                is_tied[item], are_exact = True, False
             ranks[piece, side] = rank
             if side == 0:
                 order[2 * source.size + n_starts] = piece
@@ -205,6 +210,7 @@ def sort_rounded(
                 out[2][place, k], out[3][place, k] = start[piece, k], stop[piece, k]
             for k in range(2):
                 out[4][place, k], out[5][place, k], out[6][place, k] = t[piece, k], faces[piece, k], ranks[piece, k]
+    return are_exact
 
 
 @inline

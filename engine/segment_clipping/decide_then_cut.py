@@ -20,7 +20,7 @@ import numpy as np
 from engine.compiling.jit import entry_of
 from engine.predicates.rational import exponent_of, scaled_back, shifted
 from engine.running.budget import UNLIMITED, Budget
-from engine.running.parallel import Progress, default_workers, run_chunks
+from engine.running.parallel import FEW_THREADS, Progress, default_workers, run_chunks
 from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, in_order_of_source
 from engine.segment_clipping.profiles import clip_exactly
 from engine.solids.base import Solid
@@ -40,7 +40,6 @@ _spare: list[tuple[Int32Array, Int32Array, Int32Array, IntArray]] = []
 _NO_FLAG: Final = UNLIMITED.flag
 _PER_BLOCK: Final = 1 << 12
 _PER_SHARED_BLOCK: Final = 1 << 14
-_FEW_THREADS: Final = 4
 """Segments that are decided before their pieces are filled: few are still in the cache then; many keep the interpreter
 lock free where more than a few threads need it."""
 
@@ -137,9 +136,10 @@ def _clip(
 ) -> Clipped | None:  # fmt: skip
     """Return the pieces; None if more than `most_open` items are left to the exact fallback."""
     n_threads = default_workers() if workers is None else workers
-    batch = _Batch(method, scene, budget, _PER_BLOCK if n_threads <= _FEW_THREADS else _PER_SHARED_BLOCK)
-    run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress)
-    run_chunks(batch.fill_rest(), batch.n_waiting, budget=budget, workers=workers, first_chunk=1)
+    batch = _Batch(method, scene, budget, _PER_BLOCK if n_threads <= FEW_THREADS else _PER_SHARED_BLOCK)
+    run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress, in_order=True)
+    if batch.waiting:
+        run_chunks(batch.fill_rest, len(batch.waiting), budget=budget, workers=workers, first_chunk=1)
     n_open = sum(map(len, batch.open_items))
     if n_open:
         check_finite(segments, ("segments",))  # kernels leave open what is not
@@ -168,7 +168,8 @@ class _Batch:
         self.unsure_rows: list[IntArray] = []
         self.n_rows = self.n_beyond = 0
         self._method, self._scene, self._flag, self._per_block = method, scene, budget.flag, per_block
-        self._waiting: dict[int, tuple[int, Int32Array, Int32Array, int]] = {}
+        self.waiting: dict[int, tuple[int, Int32Array, Int32Array, int]] = {}
+        """Decided blocks that are not filled, by first segment: last segment, items, planes, number of items."""
         self._lock, self._next = Lock(), 0
 
     def clip(self, first: int, last: int) -> None:
@@ -179,20 +180,11 @@ class _Batch:
                 if (block := self._next_to_fill()) is not None:
                     self._fill(*block)
 
-    @property
-    def n_waiting(self) -> int:
-        """The number of blocks that are decided and not filled."""
-        return len(self._waiting)
-
-    def fill_rest(self) -> Callable[[int, int], None]:
-        """Return the task that fills the blocks that wait, all of which are decided."""
-
-        def fill(first: int, last: int) -> None:
-            for _ in range(first, last):
-                if (block := self._next_to_fill()) is not None:
-                    self._fill(*block)
-
-        return fill
+    def fill_rest(self, first: int, last: int) -> None:
+        """Fill as many of the blocks that wait as the range has numbers; all blocks are decided."""
+        for _ in range(first, last):
+            if (block := self._next_to_fill()) is not None:
+                self._fill(*block)
 
     def _decide(self, first: int, last: int) -> None:
         """Decide segments first .. last - 1, and add the chunk to those waiting to be filled."""
@@ -207,16 +199,16 @@ class _Batch:
             self.n_beyond += n_beyond
             if n_open:
                 self.open_items.append(still[:n_open].astype(np.int64))
-            self._waiting[first] = last, items, planes, n_accepted
+            self.waiting[first] = last, items, planes, n_accepted
 
     def _next_to_fill(self) -> tuple[int, Int32Array, Int32Array, int] | None:
         """Return first row, segments, planes and number of rows of the next chunk in order; None if it is still
         undecided."""
         with self._lock:
-            if self._next not in self._waiting:
+            if self._next not in self.waiting:
                 return None
             row = self.n_rows
-            self._next, items, planes, n_accepted = self._waiting.pop(self._next)
+            self._next, items, planes, n_accepted = self.waiting.pop(self._next)
             self.n_rows += n_accepted
             return row, items, planes, n_accepted
 
