@@ -181,7 +181,8 @@ def _as_items(items: Any, dimension: int, n_axes: int) -> FloatArray:
 
 
 def _in_parts(ask: Callable[..., Any], n_steps: int, budget: Budget, items: FloatArray) -> Any:
-    """Return the concatenated answers of a method for parts of the items; the deadline is polled in between."""
+    """Return the concatenated answers of `ask` for consecutive parts of items (n, ...); the deadline is polled in
+    between. n_steps: steps that `ask` takes for one item, which decides the size of the parts."""
     size, answers = max(1, STEPS // max(n_steps, 1)), []
     for start in range(0, max(len(items), 1), size):
         budget.check()
@@ -190,7 +191,9 @@ def _in_parts(ask: Callable[..., Any], n_steps: int, budget: Budget, items: Floa
 
 
 def _differences(exact: Any, plain: Any) -> tuple[IntArray, IntArray]:
-    """Return the indices of items whose decisions differ, and of those where only coordinates differ."""
+    """Return the indices of items whose decisions differ between two answers, and of those where only coordinates
+    differ. exact, plain: decisions (n,), which have no coordinates; or coordinates (n, k), where a row with NaN means
+    that nothing is left."""
     if exact.ndim == 1:
         return np.flatnonzero(exact != plain), np.empty(0, np.int64)
     is_left, as_plain = ~np.isnan(exact).any(axis=1), ~np.isnan(plain).any(axis=1)

@@ -95,9 +95,9 @@ def crossing(first: Line, second: Line) -> Homogeneous:
 def arrange(
     nodes: NodeTable, segments: Sequence[tuple[int, int]], masks: Sequence[Any], budget: Budget | None = None
 ) -> Arrangement:
-    """Return the arrangement of `segments`, given as pairs of node indices; nodes for crossings are added to `nodes`.
-    masks: of each segment the sources that it bounds: the bits of an integer, or a frozenset. Segments of zero length
-    are left out. Cost: the box sweep, 5 us per crossing, 10 us per pair that the filter leaves open."""
+    """Return the arrangement of `segments`, pairs of node numbers; the nodes of crossings are added to `nodes`. masks:
+    of each segment the set of sources that it bounds, as the bits of an integer or a frozenset. Segments of zero length
+    are left out. Cost: the sweep over boxes, 5 us a crossing, 10 us a pair that the filter leaves open."""
     budget = budget or Budget()
     merged: dict[tuple[int, int], list[Any]] = {}
     for count, ((start, end), mask) in enumerate(zip(segments, masks)):
@@ -120,8 +120,9 @@ def arrange(
 def _intersect_all(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], budget: Budget
 ) -> tuple[dict[int, set[int]], int]:
-    """Return the nodes in the interior of each segment (segments without any are left out), and the number of pairs
-    decided in integers."""
+    """Return, by number of a segment, the set of nodes in its interior where it meets others (segments without any have
+    no entry), and the number of pairs decided in integers. ends: the two nodes of each segment, smaller first; lines:
+    the line through them. Crossings are added to `nodes`."""
     on_segment: dict[int, set[int]] = {}
     if not ends:
         return on_segment, 0
@@ -152,7 +153,8 @@ def _intersect_all(
 
 
 def _orientation(a: FloatArray, b: FloatArray, c: FloatArray) -> Int8Array:
-    """Return the signs of orient2d for rows of points, UNDECIDED where the error bound does not prove the sign."""
+    """Return the signs of orient2d(a, b, c) for the rows of three arrays (n, 2), UNDECIDED where the error bound does
+    not prove the sign."""
     left = (a[:, 0] - c[:, 0]) * (b[:, 1] - c[:, 1])
     right = (a[:, 1] - c[:, 1]) * (b[:, 0] - c[:, 0])
     turn = left - right
@@ -190,8 +192,8 @@ def classify_pairs(coordinates: FloatArray, segments: IntArray, pairs: IntArray,
 def _intersect_pair(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], i: int, j: int, on_segment: dict[int, set[int]]
 ) -> None:
-    """Add to on_segment[i] and on_segment[j] the common nodes of segments i and j that are interior to the segment;
-    exact. A crossing becomes a new node."""
+    """Add to on_segment[i] the nodes in the interior of segment i that lie on segment j too, and vice versa; exact.
+    ends, lines: of all segments, as in `_intersect_all`. A crossing becomes a new node."""
     points, (a, b), (c, d) = nodes.points, ends[i], ends[j]
     line_i, line_j = lines[i], lines[j]
     side_c, side_d = side(line_i, points[c]), side(line_i, points[d])
@@ -223,7 +225,9 @@ def _split(
     nodes: NodeTable, ends: list[tuple[int, int]], lines: list[Line], merged: list[list[Any]],
     on_segment: dict[int, set[int]], n_exact: int, budget: Budget,
 ) -> Arrangement:  # fmt: skip
-    """Cut every segment at the nodes in its interior, and merge equal edges of several segments."""
+    """Return the arrangement of distinct segments, each cut into edges at the nodes in its interior; equal edges of
+    several segments become one. ends, lines, on_segment, n_exact: as in `_intersect_all`. merged: by segment its
+    `masks` and `cover` (see `Arrangement`), which its edges inherit."""
     by_place = cmp_to_key(nodes.compare)
     edges: dict[tuple[int, int], list[Any]] = {}
     carriers: list[Line] = []
@@ -251,8 +255,8 @@ def arrange_rings(
     coordinates: FloatArray, ring_offsets: Sequence[int], ring_masks: Sequence[Any] | None, budget: Budget | None = None
 ) -> Arrangement:
     """Return the arrangement of closed rings. coordinates: (n_vertices, 2) float64, ring after ring, no first vertex
-    repeated. ring_offsets: n_rings + 1 numbers. ring_masks: the mask of each ring's edges; None: an edge's mask is the
-    frozenset with the index of its first vertex."""
+    repeated. ring_offsets: where each ring begins, and n_vertices last. ring_masks: the set of sources that each ring
+    bounds, as in `arrange`; None: the mask of an edge is the frozenset with the number of its first vertex."""
     nodes, numbers = float_nodes(coordinates, budget)
     segments: list[tuple[int, int]] = []
     masks: list[Any] = [] if ring_masks is not None else [frozenset((k,)) for k in range(len(numbers))]
@@ -271,7 +275,8 @@ _HALF = Fraction(1, 2)
 
 
 class _Segment:
-    """A segment with integer coordinates in a fraction `1 / unit` of the lattice spacing."""
+    """A segment with integer coordinates: `ends` is ax, ay, bx, by with ax <= bx, in units of 1 / `unit` of the lattice
+    spacing."""
 
     def __init__(self, start: Point, end: Point) -> None:
         (ax, ay), (bx, by) = (start, end) if start[0] <= end[0] else (end, start)
@@ -279,8 +284,8 @@ class _Segment:
         self.ends = [value.numerator * (self.unit // value.denominator) for value in (ax, ay, bx, by)]
 
     def passes(self, pixel: Pixel) -> bool:
-        """Return whether the segment meets a half-open pixel: their boxes meet, and the pixel has corners on both sides
-        of its line."""
+        """Return whether the segment meets the half-open pixel about a lattice point: their boxes meet, and the pixel
+        has corners on both sides of the segment's line."""
         ax, ay, bx, by = self.ends
         left, low = ((2 * centre - 1) * (self.unit // 2) for centre in pixel)
         right, high = left + self.unit, low + self.unit
@@ -335,8 +340,9 @@ def snap_rings(
 
 
 def _candidates(hot: Sequence[Pixel], centres: np.ndarray, start: Point, end: Point) -> list[int]:
-    """Return the indices in `hot` of the pixels near the box and the line of a segment, all that it may pass among
-    them. hot: sorted lattice points; centres: the same as floats."""
+    """Return the indices in `hot` of the pixels that the segment from start to end may pass, with some that it does
+    not. hot: the centres of hot pixels, sorted, in units of the spacing; centres: the same as a float64 array (n, 2).
+    """
     (x0, x1), (y0, y1) = (sorted((floor(a), floor(b))) for a, b in zip(start, end))
     first, last = bisect_left(hot, (x0 - 1, y0 - 1)), bisect_left(hot, (x1 + 2, y1 + 3))
     a, b = np.array(start, np.float64), np.array(end, np.float64)

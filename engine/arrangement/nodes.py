@@ -65,7 +65,8 @@ class NodeTable:
         self._up, self._down = max(exponent, 0), max(-exponent, 0)
 
     def add(self, point: Homogeneous) -> int:
-        """Return the index of `point`, which must be `reduced`; a new point is appended."""
+        """Return the number of `point`, which must be `reduced` and in units of 2**exponent; it is appended if it is
+        new."""
         number = self._index.get(point)
         if number is None:
             x, y, w = point
@@ -74,7 +75,7 @@ class NodeTable:
         return number
 
     def add_float(self, point: Homogeneous, x: float, y: float) -> int:
-        """Return the index of `point` as `add` does; its coordinates are exactly the doubles `x` and `y`."""
+        """Return the number of `point` as `add` does; x, y: its coordinates, which are doubles."""
         number = self._index.get(point)
         if number is None:
             is_first = self._n_floats == len(self.points)
@@ -112,7 +113,7 @@ class NodeTable:
         return Fraction(x << self._up, w << self._down), Fraction(y << self._up, w << self._down)
 
     def displacement(self, number: int) -> float:
-        """Return the distance between a point and its rounded coordinates, rounded up."""
+        """Return the distance between point `number` and its rounded coordinates, rounded up; 0.0 if they are equal."""
         if number < self._n_floats:
             return 0.0
         x, y, w = self.points[number]

@@ -41,9 +41,10 @@ from engine.types import BoolArray, FloatArray, IntArray
 
 @dataclass(slots=True)
 class Piece:
-    """One connected region: a shell and the holes in it; a ring is the list of half-edges that leave its corners. The
-    first corner of a ring is the lexicographically smallest (x, then y). evidence: union of the evidence of the
-    region's faces; hole_evidence: for each hole, that of the region on the other side of its ring."""
+    """One connected region: a shell and its holes. A ring is the list of the half-edges that leave its corners, the
+    lexicographically smallest corner (x, then y) first. The evidence of a face is a set of source rings that the caller
+    gives it; evidence: the union over the region's faces; hole_evidence: for each hole, the union over the region on
+    the other side of its ring."""
 
     shell: list[int] = field(default_factory=list)
     holes: list[list[int]] = field(default_factory=list)
@@ -54,9 +55,9 @@ class Piece:
 def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequence[frozenset[int]]) -> list[Piece]:
     """Return the connected regions of the faces marked `inside`, in lexicographic order of their shells.
 
-    inside, evidence: by face; face 0 must be marked 0, outside; faces of different marks belong to different regions.
-    Shells run counter-clockwise, holes clockwise and in lexicographic order: the result does not depend on the order of
-    the input.
+    inside, evidence: by face its mark and its evidence (`Piece`). Mark 0 is outside, as face 0 must be; faces of
+    different marks belong to different regions. Shells run counter-clockwise, holes clockwise and in lexicographic
+    order: the result does not depend on the order of the input.
     """
     arrangement, faces = subdivision.arrangement, subdivision.faces
     bounds = [inside[left] != inside[right] for left, right in polled(zip(faces[0::2], faces[1::2]))]
@@ -97,7 +98,8 @@ def trace_pieces(subdivision: Subdivision, inside: Sequence[int], evidence: Sequ
 
 
 def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int, int]:
-    """Return the lexicographic rank (x, then y) of each node with boundary edges."""
+    """Return the lexicographic rank (x, then y) of each node with boundary edges. fans: by node its boundary
+    half-edges."""
     nodes = arrangement.nodes
     used = sorted((node for node, fan in enumerate(polled(fans)) if fan), key=nodes.xs.__getitem__)
     in_order: list[int] = []
@@ -112,8 +114,8 @@ def _ranks(arrangement: Arrangement, fans: Sequence[Sequence[int]]) -> dict[int,
 
 
 def _simple_rings(arrangement: Arrangement, following: Sequence[int], starts: Sequence[int]) -> list[list[int]]:
-    """Return the cycles through `starts` as lists of half-edges, cut into simple rings where a cycle visits a node
-    twice. following: the half-edge after each half-edge."""
+    """Return the cycles through the half-edges `starts`, each cut into simple rings where it visits a node twice; a
+    ring is the list of its half-edges. following: by half-edge the next one of its cycle."""
     seen = [False] * len(following)
     rings: list[list[int]] = []
     for start in polled(starts):
@@ -143,7 +145,8 @@ def _corners(
     arrangement: Arrangement, fans: Sequence[Sequence[int]], rank: dict[int, int], ring: list[int]
 ) -> tuple[list[int], bool]:
     """Return the half-edges that leave the corners of a simple ring, from the lexicographically first corner on, and
-    whether the ring is a shell (counter-clockwise)."""
+    whether the ring is a shell (counter-clockwise). A corner is a node where the ring turns or more than two boundary
+    edges meet. fans: by node its boundary half-edges; rank: of `_ranks`; ring: its half-edges."""
     lines = arrangement.lines
     corners: list[int] = []
     first, is_shell = -1, False
@@ -165,7 +168,8 @@ _PRECISIONS = (160, 640)  # bits of the largest term that are used; the second f
 
 @dataclass(frozen=True, slots=True)
 class ExactRings:
-    """Rings of exact vertices; a coordinate is ``x / w * 2**exponent``. Areas of clockwise rings are negative."""
+    """Closed rings of exact vertices (x, y, w); a coordinate is ``x / w * 2**exponent``. Areas of clockwise rings are
+    negative."""
 
     rings: tuple[tuple[Homogeneous, ...], ...]
     exponent: int
@@ -175,7 +179,8 @@ class ExactRings:
         return len(self.rings)
 
     def exact_rings(self) -> ExactRings:
-        """Return self; the class for rings of an overlay has a method of this name that computes them."""
+        """Return self: `ImplicitRings`, used in the same places, has a method of this name that computes the vertices.
+        """
         return self
 
     def some(self, rings: Sequence[int]) -> ExactRings:
@@ -183,14 +188,15 @@ class ExactRings:
         return ExactRings(tuple(self.rings[ring] for ring in rings), self.exponent)
 
     def places(self) -> list[list[tuple[Fraction, Fraction]]]:
-        """Return the coordinates of each ring's vertices."""
+        """Return, by ring, the coordinates of its vertices as fractions."""
         up, down = max(self.exponent, 0), max(-self.exponent, 0)
         return [
             [(Fraction(x << up, w << down), Fraction(y << up, w << down)) for x, y, w in ring] for ring in self.rings
         ]
 
     def _terms(self) -> list[tuple[int, int]]:
-        """Return fractions (numerator, denominator) whose sum is twice the area in units of ``4**exponent``."""
+        """Return fractions (numerator, denominator) whose sum is twice the area of all rings, in units of
+        ``4**exponent``."""
         whole = 0
         rest: list[tuple[int, int]] = []
         for ring in self.rings:
@@ -212,7 +218,8 @@ class ExactRings:
         return np.array([self.some(range(a, b)).nearest_area() for a, b in pairwise(groups.tolist())], np.float64)
 
     def nearest_area(self) -> float:
-        """Return the double nearest to the exact area. Raises `NotRepresentableError` beyond the largest double."""
+        """Return the double nearest to the exact area of all rings together. Raises `NotRepresentableError` beyond the
+        largest double."""
         terms = self._terms()
         for low, high, shift in _bounds(terms):
             with suppress(NotRepresentableError):  # case: a bound is beyond the doubles, and the area may be none
@@ -235,7 +242,8 @@ def _is_positive(terms: Sequence[tuple[int, int]]) -> bool:
 
 
 def _bounds(terms: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
-    """Yield (low, high, shift) with low <= 2**shift * (sum of the fractions) <= high, first coarse, then finer."""
+    """Yield bounds (low, high, shift) on a sum of fractions (numerator, denominator), low <= 2**shift * sum <= high, in
+    integers: a coarse pair first, then finer ones."""
     longest = max(abs(numerator).bit_length() - denominator.bit_length() for numerator, denominator in terms)
     for precision in _PRECISIONS:
         low = sum(_floor(numerator, denominator, precision - longest) for numerator, denominator in terms)
@@ -243,17 +251,19 @@ def _bounds(terms: Sequence[tuple[int, int]]) -> Iterator[tuple[int, int, int]]:
 
 
 def _floor(numerator: int, denominator: int, shift: int) -> int:
-    """Return floor(numerator / denominator * 2**shift)."""
+    """Return floor(numerator / denominator * 2**shift); shift may be negative."""
     return (numerator << shift) // denominator if shift >= 0 else numerator // (denominator << -shift)
 
 
 def _nearest(numerator: int, denominator: int, exponent: int) -> float:
-    """Return the double nearest to numerator / denominator * 2**exponent."""
+    """Return the double nearest to numerator / denominator * 2**exponent, integers of any length and sign of exponent.
+    Raises `NotRepresentableError` beyond the largest double."""
     return nearest_quotient(numerator << max(exponent, 0), denominator << max(-exponent, 0))
 
 
 def _sum(terms: Iterable[tuple[int, int]]) -> tuple[int, int]:
-    """Return a sum of fractions as one fraction, not reduced; in pairs, so that numbers of like length are added."""
+    """Return the sum of fractions (numerator, denominator) as one such fraction, not reduced. Terms are added in pairs,
+    level by level, so that the numbers added are of similar length."""
     level: Sequence[tuple[int, int]] = list(terms)
     while len(level) > 1:  # bound: each turn halves the list
         odd = level[-1:] if len(level) % 2 else []

@@ -28,8 +28,8 @@ from engine.running.budget import poll, polled
 
 @dataclass(frozen=True, slots=True)
 class Subdivision:
-    """The faces of an arrangement. around: by node its outgoing half-edges, counter-clockwise, from straight down on.
-    faces: by half-edge the face left of it; face 0 is the unbounded one. n_faces: number of faces."""
+    """The faces of an arrangement. around: by node its outgoing half-edges, counter-clockwise, beginning straight down.
+    faces: by half-edge the face to its left; face 0 is the unbounded one. n_faces: number of faces."""
 
     arrangement: Arrangement
     around: list[list[int]]
@@ -38,14 +38,15 @@ class Subdivision:
 
 
 def turn_of(first: Line, second: Line) -> int:
-    """Return the sign of the turn from the direction of `first` to that of `second`; 0 for parallel lines."""
+    """Return the sign of the turn from the direction of `first` to that of `second`: 1 left, -1 right, 0 for parallel
+    lines."""
     # The direction of (a, b, .) is (b, -a); the cross product of two of them is a q - b p with its sign.
     value = second[1] * first[0] - first[1] * second[0]
     return (value > 0) - (value < 0)
 
 
 def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
-    """Return by node its outgoing half-edges, counter-clockwise, from straight down on."""
+    """Return, by node, its outgoing half-edges counter-clockwise, beginning straight down."""
     lines = arrangement.lines
 
     # Lines run right or straight up, so all outgoing half-edges of even number lie within one half turn, the odd ones
@@ -67,7 +68,8 @@ def half_edges_around(arrangement: Arrangement) -> list[list[int]]:
 
 
 def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[int]:
-    """Return by half-edge the next half-edge around the face left of it; -1 for half-edges not in `around`."""
+    """Return, by half-edge, the next half-edge around the face to its left; -1 for half-edges not in `around`. around:
+    by node its outgoing half-edges, counter-clockwise."""
     following = [-1] * n_half_edges
     for fan in polled(around):
         before = fan[-1] if fan else -1
@@ -78,7 +80,8 @@ def next_half_edges(around: Sequence[Sequence[int]], n_half_edges: int) -> list[
 
 
 def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
-    """Return by half-edge the index of its cycle under the permutation `following`, and the number of cycles."""
+    """Return, by half-edge, the number of its cycle under the permutation `following` (by half-edge the next one), and
+    the number of cycles."""
     cycle = [-1] * len(following)
     n_cycles = 0
     for start in polled(range(len(following))):
@@ -125,11 +128,11 @@ def _first_nodes(arrangement: Arrangement) -> list[int]:
 
 
 def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, winds: bool = False) -> list[Any]:
-    """Return by face the exclusive or of the masks of the edges on a path from infinity to that face (label
-    propagation).
+    """Return the label of each face by a flood fill from the unbounded face: the exclusive or of the masks of the edges
+    crossed on the way.
 
     masks: by edge; None: those of the arrangement. Bit k of a label: the face lies in source k (even-odd), if each
-    source is a set of closed rings. winds: masks are numbers, rings along each edge minus rings against it, and labels
+    source is a set of closed rings. winds: masks are numbers, rings along an edge minus rings against it, and labels
     are winding numbers.
     """
     masks = subdivision.arrangement.masks if masks is None else masks
@@ -153,9 +156,9 @@ def label_faces(subdivision: Subdivision, masks: Sequence[Any] | None = None, wi
 
 
 class EdgesBelow:
-    """The edges of an arrangement, for vertical rays down from a node, moved right by an infinitesimal step. Arrays of
-    rounded coordinates exclude most edges (rounding is monotone), integers decide. The ray meets an edge with tail.x <=
-    x < head.x, so no vertical edge."""
+    """The edges of an arrangement, for vertical rays from a node down, moved right by an infinitesimal step. Arrays of
+    rounded coordinates exclude most edges (rounding is monotone), integers decide the others. A ray at x can meet the
+    edges with tail.x <= x < head.x, so no vertical edge."""
 
     __slots__ = ("_arrangement", "_high", "_low", "_x_max", "_x_min")
 
@@ -167,8 +170,8 @@ class EdgesBelow:
         self._low, self._high = np.minimum(ys[tails], ys[heads]), np.maximum(ys[tails], ys[heads])
 
     def find(self, node: int) -> int:
-        """Return the first edge below `node`, -1 if there is none; the node must not lie on an edge that does not end
-        in it."""
+        """Return the first edge below node number `node`, -1 if there is none. The node must not lie in the interior of
+        an edge."""
         nodes, lines = self._arrangement.nodes, self._arrangement.lines
         tails, heads = self._arrangement.tails, self._arrangement.heads
         x, y, point = nodes.xs[node], nodes.ys[node], nodes.points[node]
@@ -188,7 +191,7 @@ class EdgesBelow:
 
 
 def _is_above(first: Line, second: Line, point: Homogeneous) -> bool:
-    """Return whether line `first` is above line `second` at x just right of `point`; both are directed to the right."""
+    """Return whether line `first` is above line `second` just right of `point`; both are directed to the right."""
     # On a x + b y + c w = 0 with b > 0 and w = 1: y = -(a x + c) / b, and the slope is -a / b.
     height = (first[0] * point[0] + first[2] * point[2]) * second[1]
     other = (second[0] * point[0] + second[2] * point[2]) * first[1]

@@ -8,7 +8,7 @@ from engine.compiling.jit import merged
 
 
 class UnionFind:
-    """Disjoint sets of 0 .. n - 1, with path halving; the root of a set is its smallest member."""
+    """Disjoint sets of the numbers 0 .. n - 1, by path halving; the root of a set is its smallest member."""
 
     __slots__ = ("parent",)
 
