@@ -167,7 +167,8 @@ class OverlayBatch(Ragged):
 
     @property
     def ragged(self) -> tuple[FloatArray, tuple[IntArray, IntArray, IntArray]]:
-        """Coordinates, and offsets of rings, polygons and pairs, rings closed: for `shapely.from_ragged_array`."""
+        """Coordinates (n, 2), and offsets of rings into them, of pieces into rings, of pairs into pieces; rings are
+        closed by their first vertex, as `shapely.from_ragged_array` takes them."""
         positions, offsets = closed_rings(self.vertices, self.ring_offsets)
         return positions, (offsets, self.piece_offsets, self.pair_offsets)
 
@@ -179,7 +180,7 @@ class OverlayBatch(Ragged):
 
 def _polygons_in(solids: Any, name: str) -> Sequence[Solid]:
     """Return polygons as a tuple, or unchanged if they are a selection of arrays; other shapes are read
-    (`shapes.as_solid`)."""
+    (`shapes.as_solid`). name: of the argument, for errors."""
     return solids if isinstance(solids, PolygonSelection) else tuple(polygons_in(solids, name))
 
 
@@ -299,8 +300,9 @@ def _resolve(
     outcome: PairResults, rest: tuple[Int8Array, BoolArray, dict[int, Overlay]], subjects: Sequence[Solid],
     clips: Sequence[Solid], operation: Operation, workers: int | None, budget: Budget,
 ) -> tuple[PairResults, float, int]:  # fmt: skip
-    """Return the results of all pairs, valid after rounding; `Accuracy.coordinates_ulp`; and the number of rational
-    decisions. rest: `OverlayBatch.status`, `_is_rounded_again` and `_apart`, filled here."""
+    """Return the results of all pairs, valid after rounding; the largest displacement as `Accuracy.coordinates_ulp`;
+    and the number of edge pairs decided in rationals. outcome: of the kernel, with pairs that are OPEN or MAY_CROSS;
+    rest: the fields status, `_is_rounded_again` and `_apart` of the `OverlayBatch`, filled here."""
     status, is_rounded_again, apart = rest
     valid: dict[int, ValidPairs] = {}
     alone: dict[int, tuple[Overlay, int, int]] = {}
@@ -340,7 +342,7 @@ def _resolve(
 
 
 def join_batches(batches: Sequence[OverlayBatch]) -> OverlayBatch:
-    """Concatenate the pairs of at least one batch."""
+    """Concatenate the pairs of at least one batch, all of one operation."""
     apart: dict[int, Overlay] = {}
     n_pairs = 0
     for part in batches:

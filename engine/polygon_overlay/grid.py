@@ -45,9 +45,9 @@ HALF_DIAGONAL: Final = nextafter(0.5**0.5, 1.0)
 
 
 class Grid(NamedTuple):
-    """Multiples of ``base ** power``, base 2 or 10; spacing: the nearest double. into, back: a divisor and two factors
-    that convert coordinates to units and back. A power of two may be no double, so it is split into two factors; the
-    first is exact."""
+    """The multiples of ``base ** power``, base 2 or 10; spacing: the double nearest to that. into, back: (divisor,
+    factor, factor) that convert coordinates to multiples and back (`scale`). A power of two may be no double, so it is
+    split into two factors; the first product is exact."""
 
     base: int
     power: int
@@ -56,8 +56,8 @@ class Grid(NamedTuple):
     back: tuple[float, float, float]
 
     def to_units(self, vertices: FloatArray) -> FloatArray:
-        """Return coordinates in units of the grid; for powers of ten rounded to doubles. Raises if the grid is too
-        fine."""
+        """Return coordinates in units of the grid, exact for powers of two, rounded for powers of ten. Raises
+        `InvalidInputError` if the grid is finer than 2^-51 of the largest coordinate."""
         near_integer = _ROUNDED if self.base == 10 else 0.0  # multiples, rounded twice, are whole numbers again
         units = np.empty_like(vertices)
         if not entry_of(scale)(vertices, *self.into, near_integer, _LEAST, units) < _MOST:
@@ -69,8 +69,8 @@ class Grid(NamedTuple):
         return read_only(units)
 
     def to_coordinates(self, units: FloatArray) -> tuple[FloatArray, float]:
-        """Return the doubles nearest to whole multiples of the grid, and their largest magnitude. Raises beyond the
-        range."""
+        """Return the doubles nearest to whole multiples of the grid, and their largest magnitude. Raises
+        `NotRepresentableError` beyond the largest double."""
         places = np.empty_like(units)
         largest = entry_of(scale)(units, *self.back, 0.0, 0.0, places)
         if not largest < inf:
@@ -82,7 +82,7 @@ _LARGEST: Final = float(np.finfo(np.float64).max)
 
 
 def grid_of(size: object) -> Grid:
-    """Return the grid of a spacing; raise unless it is a power of two or of ten."""
+    """Return the `Grid` of a spacing. Raises `InvalidInputError` unless it is a power of two or of ten."""
     if isinstance(size, (int, float, np.floating)) and not isinstance(size, bool) and 0 < size <= _LARGEST:
         if (grid := _grid_of(float(size))) is not None:
             return grid
@@ -130,7 +130,8 @@ class _SnappedRings(NamedTuple):
 
 
 def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArray, budget: Budget) -> _SnappedRings:
-    """Snap valid rings (read-only arrays) to integer points; raises as `Budget.check`."""
+    """Snap valid rings to integer points. vertices (n, 2), offsets of rings into them, and of pieces into rings are
+    read-only arrays. Raises as `Budget.check`."""
     n = len(vertices)
     n_most, n_rings = max(64, n), len(offsets) - 1
     pixels, corners, starts = np.empty((n, 2)), np.empty(n, np.int32), np.empty(n_rings + 1, np.int64)
@@ -155,9 +156,9 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
 
 
 def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | None = None) -> PairResults:
-    """Return the valid rings of one pair, snapped to integer points, as kernel output with status DONE or MAY_CROSS.
-    MAY_CROSS: the rings must be arranged again. Displacement is 0 if no vertex moved. Each row of sources is twice the
-    vertex whose edge continues there. known: the result of `snap_vertices` for these rings."""
+    """Return the valid rings of one pair snapped to integer points: status DONE, or MAY_CROSS where they must be
+    arranged again. Displacement is 0.0 if no vertex moved, else half a cell's diagonal. A row of sources is (v, v), v
+    the vertex whose edge continues there. known: the result of `snap_vertices` for these rings, if computed."""
     vertices, offsets = rings.vertices, rings.ring_offsets
     on_grid = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
     edges = np.arange(len(vertices)) if on_grid.edges is None else on_grid.edges.astype(np.int64)
@@ -171,9 +172,9 @@ def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | 
 
 
 def snapped_overlay(pair: PairResults, snapped: _SnappedRings, grid: Grid, start: int) -> Overlay | None:
-    """Return the overlay of a pair in the units of its input, if snapping keeps its topology; else None. None also if
-    doubles may not distinguish its multiples. start: the first vertex of the clip. Equal to the result of
-    `make_valid_after_rounding` and `from_units`."""
+    """Return the overlay of a pair in the coordinates of its input, from its rings in units of the grid as they are
+    snapped; None if snapping changes their topology, or doubles may not distinguish multiples. start: number of the
+    clip's first vertex. The result equals that of `make_valid_after_rounding` and `from_units`."""
     if not snapped.keeps_topology:
         return None
     # by powers of ten a vertex and an edge come nearer by less than half a cell, below 2^51 cells
@@ -194,8 +195,9 @@ def snapped_overlay(pair: PairResults, snapped: _SnappedRings, grid: Grid, start
 def _route_through_pixels(
     vertices: FloatArray, pixels: FloatArray, offsets: IntArray, passages: Int32Array
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return rings routed through the pixels that their edges pass, without repeated points, and by vertex its input
-    edge. passages (m, 2): edge, and vertex whose pixel it passes. pixels: by vertex."""
+    """Route rings through the pixels that their edges pass; return the vertices, by vertex the input edge that
+    continues there, and the offsets of rings; repeated points are left out. pixels: by input vertex its integer point.
+    passages (m, 2): an edge, and a vertex whose pixel it passes."""
     edges, others = passages.T
     ways = np.sign(vertices[next_in_rings(offsets)[edges]] - vertices[edges])
     along = (ways * pixels[others]).sum(axis=1)  # order: an edge that rises passes no pixel further left or below
@@ -213,7 +215,7 @@ def _route_through_pixels(
 
 
 def _sources_along(edges: IntArray) -> Any:
-    """Return the sources (n, 2) int32 of vertices from which rings continue along these edges."""
+    """Return the sources (n, 2) int32 of vertices from which rings continue along these edges: each edge twice."""
     return np.repeat(edges.astype(np.int32), 2).reshape(-1, 2)
 
 
@@ -231,7 +233,8 @@ def _are_distinguishable(units: FloatArray, offsets: IntArray) -> bool:
 
 
 def _displacement(displacement: float, grid: Grid, largest: float) -> float:
-    """Return a displacement in cells as a distance, with the rounding of coordinates up to ``largest`` added."""
+    """Return a displacement in cells of the grid as a distance, rounded up, with the rounding of coordinates added.
+    largest: the largest coordinate."""
     moved = grid.spacing * displacement
     if grid.base == 10 and largest > 0.0:  # units are rounded, and what they stand for
         moved += 2.0 * ulp(largest)
@@ -239,8 +242,9 @@ def _displacement(displacement: float, grid: Grid, largest: float) -> float:
 
 
 def from_units(result: Overlay, grid: Grid, start: int, again: Any, budget: Budget) -> Overlay:
-    """Return an overlay in units of the grid as one in the units of its input, with its own rings as exact rings.
-    start: the first vertex of the clip. again: function that arranges rounded rings."""
+    """Return an overlay in units of the grid as one in the coordinates of its input, with its own rings as exact rings.
+    start: number of the clip's first vertex. again: function (rings, budget) that arranges rounded rings, to test
+    whether they stay valid. Raises `NotRepresentableError` if not."""
     vertices, largest = grid.to_coordinates(read_only(result.vertices))
     if grid.base == 10 and not _are_distinguishable(result.vertices, result.ring_offsets):
         rings = one_pair(vertices, result.ring_offsets, result.piece_offsets, 0.0, 0, status=PairStatus.MAY_CROSS)

@@ -31,7 +31,8 @@ NO_RINGS: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, 
 
 
 def edges_along(sources: npt.NDArray[np.signedinteger]) -> IntArray:
-    """Return, by vertex of a ring, the input edge (by its first vertex) along which the ring continues."""
+    """Return, by vertex of a ring, the input edge (number of its first vertex) along which the ring continues. sources:
+    (n, 2), see `overlay_pairs`."""
     return np.where(sources[:, 1] < LEFT_OUT, LEFT_OUT - 1 - sources[:, 1], sources[:, 0]).astype(np.int64)
 
 
@@ -45,7 +46,8 @@ def areas_of(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray,
     sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray,
 ) -> tuple[FloatArray, int]:  # fmt: skip
-    """Return the areas by `sum_areas`, and how many of them are NaN, not certified."""
+    """Return the areas (n,) of groups of rings by `sum_areas`, NaN where no nearest double is certified, and the number
+    of NaN. Arguments as there."""
     areas = np.empty(len(groups) - 1)
     sum_them = entry_of(sum_areas)
     return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas)
@@ -64,9 +66,9 @@ def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArr
 
 
 class ImplicitRings(NamedTuple):
-    """Exact rings whose vertices are input vertices or crossings, computed on request. sources: (n, 2) integers, see
-    `overlay_pairs`; vertices of `clip` are numbered after those of `subject`. offsets: (n_rings + 1,) int64, where each
-    ring begins."""
+    """Exact rings whose vertices are input vertices or crossings of input edges, computed on request. sources: (n, 2)
+    integers, by vertex (see `overlay_pairs`); vertices of `clip` are numbered after those of `subject`. offsets:
+    (n_rings + 1,) int64 of rings into sources."""
 
     subject: RingArrays
     clip: RingArrays
@@ -85,8 +87,8 @@ class ImplicitRings(NamedTuple):
         check_sources(self.sources, len(self.subject.vertices) + len(self.clip.vertices))
 
     def certified_areas(self, groups: IntArray) -> tuple[FloatArray, int]:
-        """Return the summed areas of rings groups[k] .. groups[k + 1] - 1, (n,) float64 nearest doubles, NaN if not
-        certified. And the number of NaN."""
+        """Return, for each k, the double nearest to the total area of rings groups[k] .. groups[k + 1] - 1, (n,)
+        float64, NaN where that is not certified; and the number of NaN."""
         items = one_polygon(len(self.subject.offsets) - 1), one_polygon(len(self.clip.offsets) - 1)
         return areas_of(self.subject, items[0], self.clip, items[1], self.sources, self.offsets, groups)
 
@@ -100,7 +102,7 @@ class ImplicitRings(NamedTuple):
         return areas
 
     def are_shells(self) -> BoolArray:
-        """Return, by ring, whether its exact area is positive, even if no double represents it."""
+        """Return, by ring, whether its exact area is positive, even if that is too small or large for a double."""
         areas, n_uncertified = self.certified_areas(np.arange(self.n_rings + 1))
         is_shell = areas > 0.0
         if n_uncertified:
@@ -109,13 +111,13 @@ class ImplicitRings(NamedTuple):
         return is_shell
 
     def some(self, rings: Sequence[int]) -> ExactRings:
-        """Return the rings with the given numbers as exact integers."""
+        """Return the rings with the given numbers, with exact vertices in integers."""
         sources = [self.sources[self.offsets[ring] : self.offsets[ring + 1]] for ring in rings]
         offsets = np.cumsum([0, *map(len, sources)])
         return self._replace(sources=np.concatenate(sources), offsets=offsets).exact_rings()
 
     def exact_rings(self) -> ExactRings:
-        """Return the rings in integers."""
+        """Return all rings, with exact vertices in integers."""
         vertices = np.concatenate([self.subject.vertices, self.clip.vertices])
         offsets = np.concatenate([self.subject.offsets, self.clip.offsets[1:] + len(self.subject.vertices)])
         firsts = np.unique(np.append(self.sources[:, 0], self.sources[self.sources[:, 1] >= 0, 1])).astype(np.int64)
@@ -136,7 +138,8 @@ class ImplicitRings(NamedTuple):
 
 
 def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
-    """Return rings of doubles as implicit rings over themselves."""
+    """Return rings of doubles (vertices (n, 2), offsets of rings) as `ImplicitRings` whose input they are themselves.
+    """
     own = RingArrays(read_only(vertices), read_only(offsets))
     n, few = len(vertices), _FEW_IDENTITY_SOURCES
     sources = few[:n] if n <= len(few) else _identity_sources(n)
@@ -144,7 +147,7 @@ def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
 
 
 def _identity_sources(n: int) -> npt.NDArray[np.int32]:
-    """Return the sources (n, 2) of n input vertices in order."""
+    """Return the sources (n, 2) int32 of the input vertices 0 .. n - 1: rows (v, -1)."""
     sources = np.full((n, 2), -1, np.int32)
     sources[:, 0] = np.arange(n)
     return read_only(sources)

@@ -36,7 +36,8 @@ def overlay_exactly(
     is_on_grid: bool = False,
 ) -> tuple[Overlay, int]:  # fmt: skip
     """Return the overlay of checked rings (either side may be empty), and the number of edge pairs decided exactly.
-    is_on_grid: snap the result to integer points."""
+    nesting: fill rule, if not that of two polygons. is_on_grid: coordinates are in units of a grid; snap the result to
+    integer points."""
     subdivision, inside = _label_arrangement(subject, clip, SELECTED[operation], budget, nesting)
     arrangement = subdivision.arrangement
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces)
@@ -55,8 +56,8 @@ def overlay_exactly(
 
 
 def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[PairResults, IntArray]:
-    """Return the faces of two polygons grouped by label, in the kernel's form for `EACH_PART`, and by vertex the number
-    of its exact point."""
+    """Return the regions in the subject alone, in the clip alone and in both, in the kernel's form for `EACH_PART`, and
+    by vertex the number of its exact point."""
     subdivision, inside = _label_arrangement(subject, clip, range(4), budget)
     pieces = trace_pieces(subdivision, inside, [frozenset((part,)) for part in inside])
     result = round_pieces(subdivision.arrangement, pieces)
@@ -69,7 +70,8 @@ def _label_arrangement(
     subject: RingArrays, clip: RingArrays, selected: Sequence[int], budget: Budget, nesting: Nesting = UNNAMED
 ) -> tuple[Subdivision, list[int]]:
     """Return the subdivision of checked rings, and for each face the part of the result that it belongs to, or 0.
-    selected: the part for each label 0 .. 3 (bit 0: in the subject, bit 1: in the clip)."""
+    selected: by label 0 .. 3 (bit 0: in the subject, bit 1: in the clip) the part; nesting: fill rule, if not that of
+    two polygons."""
     vertices = np.concatenate([subject.vertices, clip.vertices])
     offsets = [*subject.offsets.tolist(), *(clip.offsets[1:] + len(subject.vertices)).tolist()]
     arrangement = arrange_rings(vertices, offsets, None, budget)
@@ -104,7 +106,8 @@ def _odd_sources(sources: Iterable[int]) -> _Sources:
 
 
 def _windings(arrangement: Arrangement, vertices: FloatArray, offsets: Sequence[int]) -> list[int]:
-    """Return, by edge of the arrangement, the number of input edges along it minus the number against it."""
+    """Return, by edge of the arrangement, the number of input edges that run along it minus the number that run against
+    it. vertices, offsets: the rings of the input."""
     places = list(map(tuple, vertices.tolist()))
     along = [0] * len(places)
     for start, stop in itertools.pairwise(offsets):
@@ -119,8 +122,8 @@ def rings_of(pieces: Iterable[Piece]) -> list[list[int]]:
 
 
 def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResults:
-    """Return the pieces with all nodes rounded to nearest doubles; DONE if none moves, else MAY_CROSS. Each row of
-    sources is twice the lowest edge along which the ring continues; vertices and crossings are alike."""
+    """Return the pieces with all nodes rounded to nearest doubles: status DONE if none moves, else MAY_CROSS. A row of
+    sources is (e, e), e the lowest input edge along which the ring continues, at vertices and crossings alike."""
     rings, nodes = rings_of(pieces), arrangement.nodes
     half_edges = [half_edge for ring in rings for half_edge in ring]
     used = [arrangement.origin(half_edge) for half_edge in polled(half_edges)]
@@ -135,7 +138,7 @@ def round_pieces(arrangement: Arrangement, pieces: Sequence[Piece]) -> PairResul
 
 def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResults:
     """Arrange the rounded rings of one pair exactly and trace the pieces: a face is inside if it is inside a shell and
-    in none of that shell's holes (rule AGAIN)."""
+    in none of that shell's holes (rule AGAIN). The result has evidence rows (ring, rounded ring it comes from)."""
     ends = rings.piece_offsets.tolist()
     holes_of = {shell: frozenset(range(shell + 1, end)) for shell, end in itertools.pairwise(ends)}
     sizes = np.repeat(ring_sizes(rings)[rings.piece_offsets[:-1]], np.diff(rings.piece_offsets)).tolist()
@@ -146,7 +149,8 @@ def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResult
 
     @functools.cache
     def classify(label: _Sources) -> tuple[bool, _Sources]:
-        """Return whether a face is inside, and its shells, or the innermost holes if it is outside."""
+        """Return whether a face is inside, and its evidence: the shells that make it so, or the innermost holes that it
+        lies in if it is outside. label: the rings that contain it."""
         inside = frozenset(ring for ring in label if ring in holes_of and not label & holes_of[ring])
         holes = [] if inside else [ring for ring in label if ring not in holes_of]
         least = min((sizes[hole] for hole in holes), default=0.0)

@@ -165,7 +165,8 @@ def check_operation(operation: str) -> None:
 
 
 def polygons_in(solids: Sequence[Solid], name: str) -> Sequence[Solid]:
-    """Return polygons, other shapes read; raise for anything that is no polygon, naming its index."""
+    """Return a sequence of polygons, other shapes read (`as_solids`). name: of the argument, for errors. Raises
+    UnsupportedSolidError for what is no polygon, with its index."""
     read = as_solids(solids, name)
     if set(map(type, read)) - {Polygon}:
         for k, each in enumerate(read):
@@ -174,7 +175,8 @@ def polygons_in(solids: Sequence[Solid], name: str) -> Sequence[Solid]:
 
 
 def rings_of(solid: object, *where: str | int) -> RingArrays:
-    """Return the rings of a polygon; raise for anything else."""
+    """Return the rings of a polygon. where: the path of the argument, for errors. Raises UnsupportedSolidError for
+    anything else."""
     if not isinstance(solid, Polygon):
         kind = solid.type if isinstance(solid, Solid) else type(solid).__name__
         raise UnsupportedSolidError(
@@ -189,9 +191,9 @@ def overlay_rings(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     grid: float | None = None,
 ) -> tuple[Overlay, int, int]:  # fmt: skip
-    """Return the overlay of checked rings (either side may be empty), edge pairs decided exactly, and those in
-    rationals. nesting: of the subject's rings, for a rule other than even-odd; then there is no clip, and the operation
-    is "union"."""
+    """Return the overlay of checked rings (either side may be empty), the number of edge pairs decided exactly, and of
+    those decided in rationals. nesting: of the subject's rings, for a rule other than even-odd; then there is no clip,
+    and the operation is "union". grid: spacing to which the result is snapped."""
     units = None if grid is None else grid_of(grid)
     first, second = subject, clip
     if units is not None:
@@ -218,7 +220,8 @@ def ulps_moved(result: Overlay) -> float:
 
 
 def accuracy_of(ulps: float, n_edges: int, n_exact: int, n_rational: int) -> Accuracy:
-    """Return the accuracy report of one or many overlays; ulps: the largest displacement."""
+    """Return the accuracy report of one or many overlays. ulps: the largest displacement, in units in the last place;
+    n_exact, n_rational: edge pairs decided exactly, and in rationals."""
     return Accuracy(
         decisions="exact", coordinates_ulp=ulps, n_items=n_edges, n_beyond_filter=n_exact, n_rational=n_rational,
         method="arrangement",
@@ -358,7 +361,8 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
 def _arrange_all(
     polygons: Sequence[Solid], rule: Rule, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
-    """Return the overlay of the rings of all polygons by a fill rule, each polygon a source."""
+    """Return the overlay of the rings of all polygons by a fill rule, each polygon a source of its own, and the
+    accuracy report. grid: spacing to which the result is snapped."""
     rings, sources, starts = _rings_of_all(polygons)
     nesting = Nesting(sources, np.zeros(0), int(rule))
     result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)

@@ -29,7 +29,7 @@ class PairResults(NamedTuple):
     | status | int8 (pairs,) | DONE, OPEN or MAY_CROSS |
     | counts | int64 (pairs, 4) | pieces, rings, vertices, exactly decided edge pairs |
     | displacement | float64 (pairs,) | largest displacement by rounding |
-    | vertices, sources | float64, int32 (n, 2) | of all pairs that are not OPEN |
+    | vertices, sources | float64, int32 (n, 2) | of all pairs that are not OPEN; sources as in `overlay_pairs` |
     | ring_offsets, piece_offsets | int64 | into the vertices, into the rings |
     | evidence | int64 (m, 2) | rounded rings: a ring, and a ring it comes from |
     """
@@ -54,7 +54,8 @@ def one_pair(
     vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, displacement: float, n_exact: int,
     sources: Int32Array | None = None, status: int = PairStatus.DONE,
 ) -> PairResults:  # fmt: skip
-    """Return the result of one pair; without sources these are zero."""
+    """Return the result of one pair. displacement: the largest by rounding; n_exact: edge pairs decided exactly;
+    sources: None for zeros."""
     counts = np.array([[len(piece_offsets) - 1, len(ring_offsets) - 1, len(vertices), n_exact]])
     sources = np.zeros((len(vertices), 2), np.int32) if sources is None else sources
     outcome = np.array([status], np.int8), counts, np.array([displacement])
@@ -90,7 +91,8 @@ def concatenate_pairs(parts: list[PairResults], budget: Budget = UNLIMITED, work
 
 
 def concatenate_parts(parts: Sequence[Sequence[Any]]) -> list[Any]:
-    """Concatenate tuples (vertices, sources, ring offsets, piece offsets, evidence)."""
+    """Concatenate tuples (vertices, sources, ring offsets, piece offsets, evidence) field by field; offsets are
+    shifted."""
     vertices, sources, ring_offsets, piece_offsets, evidence = zip(*parts, strict=True)
     offsets = concatenate_offsets(ring_offsets), concatenate_offsets(piece_offsets)
     return [np.concatenate(vertices), np.concatenate(sources), *offsets, np.concatenate(evidence)]
@@ -102,12 +104,12 @@ def concatenate_offsets(offsets: Sequence[IntArray]) -> IntArray:
 
 
 def ring_of_vertices(offsets: IntArray) -> IntArray:
-    """Return, by vertex, the number of its ring."""
+    """Return, by vertex, the number of its ring. offsets: of rings into vertices."""
     return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
 
 
 def ring_sizes(rings: PairResults) -> FloatArray:
-    """Return, by ring, the width plus the height of its box, halved."""
+    """Return, by ring, half the sum of width and height of its box."""
     starts = rings.ring_offsets[:-1]
     if not len(starts):
         return np.zeros(0)
@@ -142,7 +144,7 @@ class PolygonArrays(NamedTuple):
         )
 
     def merged(self, groups: IntArray) -> PolygonArrays:
-        """Return one polygon for each group: the rings of polygons groups[k] .. groups[k + 1] - 1."""
+        """Return one polygon for each group k, with the rings of polygons groups[k] .. groups[k + 1] - 1."""
         return self._replace(polygon_offsets=read_only(self.polygon_offsets[groups]))
 
     def sizes(self) -> IntArray:

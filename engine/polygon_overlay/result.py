@@ -80,8 +80,9 @@ _Place = tuple[Fraction, Fraction]
 
 
 class Lost(NamedTuple):
-    """Parts of an exact result that rounding removed: pieces by their shells, and holes, by ring numbers.
-    piece_offsets: of the exact result. unit: factor from the exact rings' coordinates to the caller's."""
+    """Parts of an exact result that rounding removed. exact: its rings; piece_offsets: of its pieces into rings;
+    pieces: the ring numbers of the shells of lost pieces; holes: the ring numbers of lost holes; unit: factor from the
+    coordinates of ``exact`` to the caller's."""
 
     exact: Exact
     piece_offsets: IntArray
@@ -90,7 +91,7 @@ class Lost(NamedTuple):
     unit: Fraction = Fraction(1)
 
     def shells(self) -> list[list[tuple[float, float]]]:
-        """Return the shells of lost pieces, as rounded vertices."""
+        """Return the shells of lost pieces, as lists of rounded vertices in the coordinates of ``exact``."""
         places = self.exact.some(self.pieces).places()
         return [[(nearest(x), nearest(y)) for x, y in ring] for ring in places]
 
@@ -124,7 +125,8 @@ class Lost(NamedTuple):
 
 
 def _first_vertex(ring: ExactRings) -> tuple[list[_Place], tuple[float, float]]:
-    """Return the vertices of a ring rotated to begin with the smallest (x, then y), and that vertex rounded."""
+    """Return the vertices of the only ring in `ring`, rotated to begin with the smallest (x, then y), and that vertex
+    rounded."""
     (places,) = ring.places()
     k = places.index(min(places))
     x, y = places[k]
@@ -298,7 +300,8 @@ class Overlay(ByValue):
 def build_overlay(
     vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray, exact: Exact, **fields: Any
 ) -> Overlay:
-    """Make an `Overlay` of read-only arrays; counts of the exact result default to those of the arrays."""
+    """Make an `Overlay` of read-only arrays; fields: others of its fields. If n_pieces_exact is missing there, the
+    exact result has as many pieces and holes as the arrays."""
     fields.update(vertices=vertices, ring_offsets=ring_offsets, piece_offsets=piece_offsets, exact=exact)
     if "n_pieces_exact" not in fields:
         fields["n_pieces_exact"], fields["n_holes_exact"] = (

@@ -40,9 +40,13 @@ Arranger = Callable[[PairResults, Budget], PairResults]
 def make_valid_after_rounding(
     first: PairResults, exact: Exact, rearrange: Arranger, may_snap: bool, budget: Budget, snap: Arranger | None = None
 ) -> Overlay | None:
-    """Arrange the rounded rings of a pair until they are valid; None if ``rearrange`` cannot, or snapping is needed but
-    not possible. exact: the rings that ``first`` is rounded from. rearrange: arranges rounded rings, with evidence.
-    may_snap: the rings are those of ``exact``, not scaled. snap: moves valid rings to integer points (grid.py)."""
+    """Arrange the rounded rings of a pair until they are valid; return None if ``rearrange`` leaves it OPEN, or
+    snapping is needed and not possible.
+
+    first: the rings rounded once; exact: the rings that they are rounded from; rearrange: arranges rounded rings, with
+    evidence; may_snap: coordinates of ``first`` are those of ``exact``, not scaled; snap: moves valid rings to integer
+    points (grid.py), for results on a grid.
+    """
     rings, displacement = first, float(first.displacement[0])
     rounds = int(displacement > 0.0)
     edges = own_edges = edges_along(first.sources)
@@ -83,8 +87,9 @@ def make_valid_after_rounding(
 
 
 def _changes(first: PairResults, rings: PairResults, origins: IntArray, exact: Exact) -> dict[str, Any]:
-    """Return the counts of joined, parted and lost pieces and holes of a pair, as fields of `Overlay`. origins: rows
-    (ring of `rings`, ring of `first` that it comes from)."""
+    """Return, as fields of `Overlay`, how many pieces and holes of a pair rounding joined and parted, and which it
+    removed. first: the rings before, rounded once; rings: the valid ones; origins: rows (ring of `rings`, ring of
+    `first` that it comes from)."""
     is_shell, was_shell = _shells(rings), _shells(first)
     of_shells = is_shell[origins[:, 0]]
     pieces, pieces_joined, pieces_parted = count_changes(was_shell, origins[of_shells], int(is_shell.sum()))
@@ -106,8 +111,8 @@ def _shells(pair: PairResults) -> BoolArray:
 
 
 def _compose_origins(evidence: IntArray, origins: IntArray) -> IntArray:
-    """Return rows (ring, original ring): the evidence (ring, ring of the round before) composed with that round's
-    origins."""
+    """Return rows (ring, original ring), sorted and unique: evidence (ring, ring of the round before) composed with
+    origins (ring of the round before, original ring)."""
     offsets = np.searchsorted(origins[:, 0], np.arange(evidence[:, 1].max(initial=-1) + 2))
     sizes = np.diff(offsets)[evidence[:, 1]]
     through = origins[places_of(offsets, evidence[:, 1]), 1]
@@ -115,14 +120,17 @@ def _compose_origins(evidence: IntArray, origins: IntArray) -> IntArray:
 
 
 def build_valid_overlay(rings: PairResults, first: PairResults, exact: Exact, **fields: Any) -> Overlay:
-    """Make the `Overlay` of valid rings; first: the rings before rounding; fields: what became of their parts."""
+    """Make the `Overlay` of valid rings. first: the rings rounded once, as many as the exact ones; exact: those;
+    fields: counts of the parts that changed, and others of its fields."""
     n_pieces, n_rings = first.counts[0, :2].tolist()
     arrays = read_only(rings.vertices), read_only(rings.ring_offsets), read_only(rings.piece_offsets)
     return build_overlay(*arrays, exact, n_pieces_exact=n_pieces, n_holes_exact=n_rings - n_pieces, **fields)
 
 
 def _snap_exact_rings(first: PairResults, exact: Exact, budget: Budget) -> tuple[PairResults, float]:
-    """Return the exact rings snapped to the lattice of the largest coordinate's ulp, and half a pixel's diagonal."""
+    """Return the exact rings snapped to the lattice whose spacing is the ulp of the largest coordinate, as a result
+    with status MAY_CROSS, and half a pixel's diagonal, the bound on their displacement. first: the same rings, rounded.
+    """
     spacing = ulp(float(np.abs(first.vertices).max()))
     snapped, along = snap_rings(exact.some(range(first.counts[0, 1])).places(), frexp(spacing)[1] - 1, budget)
     vertices = np.array([vertex for ring in snapped for vertex in ring])
@@ -133,7 +141,8 @@ def _snap_exact_rings(first: PairResults, exact: Exact, budget: Budget) -> tuple
 
 
 def n_moved(images: FloatArray, vertices: FloatArray, are_whole: bool = False) -> int:
-    """Return how many of `vertices` are not among ``images``; are_whole: all vertices are integers."""
+    """Return how many of `vertices` (n, 2) are not among ``images`` (m, 2), the correctly rounded exact vertices.
+    are_whole: all vertices are integers, which saves time."""
     if are_whole:  # order: few images are, and a search among all takes longer than an overlay
         images = images[(images == np.rint(images)).all(axis=1)]
     known, places = (np.ascontiguousarray(each).view(np.complex128).ravel() for each in (images, vertices))
@@ -141,11 +150,11 @@ def n_moved(images: FloatArray, vertices: FloatArray, are_whole: bool = False) -
 
 
 def count_changes(is_exact: BoolArray, origins: IntArray, n_parts: int) -> tuple[list[int], int, int]:
-    """Return the numbers of lost exact parts, the number of joins, and the number of partings.
+    """Return which exact parts are lost, the number of joins, and the number of partings.
 
-    is_exact: which rings of the exact result are such parts. origins: rows (output part, exact part it comes from).
-    n_parts: output parts. Linked by origins, a group of e exact and o output parts counts e - 1 joins and o - 1
-    partings; an output part without origin counts as parted.
+    is_exact: by ring of the exact result, whether it is a part of the kind in question (shell or hole). origins: rows
+    (output part, exact part it comes from). n_parts: number of output parts. Linked by origins, a group of e exact and
+    o output parts counts e - 1 joins and o - 1 partings; an output part without origin counts as parted.
     """
     survivors = np.unique(origins[:, 1])
     is_lost = is_exact.copy()
@@ -163,8 +172,8 @@ def count_changes(is_exact: BoolArray, origins: IntArray, n_parts: int) -> tuple
 
 
 class ValidPairs(NamedTuple):
-    """Pairs that are valid after rounding: their numbers (n,) int64; their rings, pair after pair; ulps: the largest
-    displacement of a vertex, in units in the last place of the largest coordinate."""
+    """Pairs that are valid after rounding. pairs: their numbers (n,) int64; rings: their results, pair after pair;
+    ulps: the largest displacement of a vertex, in units in the last place of the pair's largest coordinate."""
 
     pairs: IntArray
     rings: PairResults
@@ -209,8 +218,8 @@ def make_pairs_valid(first: PairResults, rearrange: Arranger, budget: Budget) ->
 
 
 def _ulps_moved(first: PairResults, pairs: IntArray, valid: PairResults, doubtful: IntArray) -> float:
-    """Return `ValidPairs.ulps` of ``valid``, which are ``pairs`` of ``first``; doubtful: pairs that may have new
-    vertices."""
+    """Return `ValidPairs.ulps` of ``valid``, the results of ``pairs`` of ``first`` after further rounds. doubtful:
+    indices into ``pairs`` of those that may have new vertices; the others have 0.5."""
     ulps = 0.5
     for k in range(len(doubtful)):
         before, now = take_pairs(first, pairs[doubtful[k : k + 1]]), take_pairs(valid, doubtful[k : k + 1])

@@ -72,8 +72,8 @@ _FEW_CONTACTS: Final = 1024
 def run_kernel(
     subjects: PolygonArrays, clips: PolygonArrays, selected: FlagArray, budget: Budget, nesting: Nesting = UNNAMED
 ) -> PairResults:
-    """Overlay polygons pair by pair by the compiled kernel; raises as `Budget.check`. selected: the part of the result
-    for each label 0 .. 3, one of `SELECTED_ARRAYS` or `EACH_PART`. nesting: fill rule for the rings of subjects, each a
+    """Overlay polygons pair by pair by the compiled kernel; raises as `Budget.check`. selected: by label 0 .. 3 the
+    part of the result, one of `SELECTED_ARRAYS` or `EACH_PART`. nesting: fill rule for the rings of subjects, each a
     source of its own."""
     n_vertices, n_rings = map(sum, zip(subjects.largest_counts(), clips.largest_counts(), strict=True))
     is_plain = len(subjects.polygon_offsets) == 2 and nesting.rule == Rule.PAIR and selected[3] < 2
@@ -89,9 +89,12 @@ def run_blocks(
     subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], selected: FlagArray, budget: Budget,
     nesting: Nesting = UNNAMED, size: int = 0, max_active: float = _MOST,
 ) -> PairResults | None:  # fmt: skip
-    """Overlay polygons pair by pair; with a ``size``, one pair reduced by blocks of so many edges. In that case None if
-    a fraction ``max_active`` or more of the edges is active, or the pair is not DONE: doubtful rounded rings are
-    arranged again with all their vertices. largest: the largest numbers of vertices and rings of a pair."""
+    """Overlay polygons pair by pair. largest: the largest numbers of vertices and rings of a pair.
+
+    size: if not 0, there is one pair, reduced by blocks of so many edges; None is returned if a fraction ``max_active``
+    or more of the edges is active, or the pair is not DONE: doubtful rounded rings are arranged with all their
+    vertices.
+    """
     n, (n_vertices, n_rings) = len(subjects.polygon_offsets) - 1, largest
     first, second = RingArrays(*subjects[:2]), RingArrays(*clips[:2])
     outcomes = Outcomes(np.empty(n, np.int8), np.empty((n, 4), np.int64), np.empty(n))
@@ -134,7 +137,8 @@ def run_blocks(
 
 
 def _expand(part: list[Any], n_left_out: int, subject: RingArrays, clip: RingArrays, budget: Budget) -> list[Any]:
-    """Return vertices, sources and ring offsets of a part with its n_left_out omitted vertices inserted."""
+    """Return vertices, sources and ring offsets of the kernel's output ``part``, with its n_left_out omitted vertices
+    inserted."""
     n = len(part[0]) + n_left_out
     expanded = [np.empty((n, 2)), np.empty((n, 2), np.int32), np.empty_like(part[2])]
     entry_of(expand_rings)(*part[:3], subject.vertices, clip.vertices, budget.flag, *expanded)
@@ -156,9 +160,9 @@ def overlay_compiled(
     subject: RingArrays, clip: RingArrays, operation: Operation, budget: Budget, nesting: Nesting = UNNAMED,
     grid: Grid | None = None,
 ) -> tuple[Overlay, int] | None:  # fmt: skip
-    """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN. grid: the
-    coordinates are in its units. A scene outside the kernel's range is scaled into it by a power of two, if that is
-    exact."""
+    """Return the overlay of one pair and the number of exactly decided edge pairs; None if it is OPEN. grid:
+    coordinates are in its units, and the result is snapped to it. A scene outside the kernel's range is scaled into it
+    by a power of two, if that is exact."""
     pair, exponent = _run_pair(subject, clip, operation, budget, nesting), 0
     if pair.status[0] == OPEN:
         exponent = exponent_of(subject.vertices, clip.vertices)
@@ -212,13 +216,15 @@ def rebuild_from_rounded_rings(rings: PairResults, budget: Budget) -> PairResult
 
 
 def as_overlay(vertices: FloatArray, piece_offsets: IntArray, displacement: float, exact: ImplicitRings) -> Overlay:
-    """Make an `Overlay` whose rounded rings have the topology of the exact ones; all arrays are read-only."""
+    """Make an `Overlay` whose rounded rings, all in read-only arrays, have the topology of the exact ones.
+    displacement: the largest by rounding, 0.0 if none."""
     fields = {"largest_displacement": displacement, "rounds": int(displacement > 0.0)}
     return build_overlay(vertices, exact.offsets, piece_offsets, exact, **fields)
 
 
 def overlay_few(subject: Polygon, clip: Polygon, selected: FlagArray) -> Overlay | None:
-    """Return the overlay of two small polygons, without a deadline; None if they are large, or not DONE."""
+    """Return the overlay of two small polygons, without a deadline; None if they are large, or the pair is not DONE.
+    selected: by label the part of the result."""
     first, second = RingArrays(subject.vertices, subject.ring_offsets), RingArrays(clip.vertices, clip.ring_offsets)
     if len(first.vertices) + len(second.vertices) > FEW_VERTICES:
         return None
@@ -260,7 +266,8 @@ def overlay_few(subject: Polygon, clip: Polygon, selected: FlagArray) -> Overlay
 def _fields(
     subject: RingArrays, clip: RingArrays, vertices: bytes, sources: bytes, rings: tuple[bytes, bytes] | None
 ) -> dict[str, Any]:
-    """Return, as a dict, the fields of an `Overlay` from the kernel's output arrays, given as bytes."""
+    """Return the fields of an `Overlay` by name. vertices, sources: the kernel's arrays as bytes; rings: offsets of
+    rings and of pieces as bytes, None for a single ring."""
     places = np.frombuffer(vertices).reshape(-1, 2)
     ring_offsets, piece_offsets = one_polygon(len(places)), one_polygon(1)
     if rings is not None:

@@ -48,8 +48,9 @@ _BLOCK: Final = 1024
 
 
 class Touching(NamedTuple):
-    """Lines and points of many pairs of polygons. lines, points: the pair of each line and point. vertices (n, 2)
-    float64 of all lines, offsets of lines into them; places (n_points, 2) float64."""
+    """Lines and points at which many pairs of polygons touch. lines, points: by line and by point the number of its
+    pair. vertices (n, 2) float64: of all lines, polyline after polyline; offsets: of lines into them; places:
+    (n_points, 2) float64."""
 
     lines: IntArray
     vertices: FloatArray
@@ -97,11 +98,13 @@ def touching(
 
 
 def _may_touch(arranged: PairResults) -> BoolArray:
-    """Return, by pair, False if it provably has no common line or isolated point.
+    """Return, by pair, False if it provably has no common line or isolated point. arranged: the pairs with parts 1
+    (first alone), 2 (second alone), 3 (both).
 
-    That is where floats prove every sign and edges cross only in pairs of one each. At such a crossing two edges are
-    named by three of the four wedges. Else either a third edge is named, at most twice; or, where so many edges pass
-    that opposite wedges are in one part, any two are named an even number of times.
+    False where floats prove every sign and edges cross only in pairs of one each. At such a crossing the same two edges
+    are sources of three boundary vertices, in three of the four wedges. Otherwise a third edge passes, and a pair of
+    edges occurs at most twice; or, where so many edges pass that opposite wedges are in one part, an even number of
+    times.
     """
     pairs = np.repeat(np.arange(len(arranged.status)), arranged.counts[:, 2])
     is_crossing = arranged.sources[:, 1] >= 0
@@ -114,8 +117,8 @@ def _may_touch(arranged: PairResults) -> BoolArray:
 
 
 def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
-    """Return, by vertex, a number that vertices at one point of one pair share; pairs: by ring. Valid rounded rings
-    have no two exact points with the same doubles."""
+    """Return, by vertex, a number that is equal for vertices at one point of one pair. pairs: by ring its pair. Valid
+    rounded rings have no two exact points with the same doubles."""
     keys = *arranged.vertices.T, np.repeat(pairs, np.diff(arranged.ring_offsets))
     order = np.lexsort(keys)
     is_new = np.zeros(len(order), np.bool_)
@@ -128,7 +131,8 @@ def _number_places(arranged: PairResults, pairs: IntArray) -> IntArray:
 
 
 def _extract(arranged: PairResults, parts: IntArray, pairs: IntArray, places: IntArray) -> Touching:
-    """Return the lines and points of arranged rings; parts, pairs: by ring; places: by vertex its point's number."""
+    """Return the lines and points at which two polygons touch, from their arranged rings. parts, pairs: by ring its
+    part (1: first alone, 2: second alone, 3: both) and its pair; places: by vertex the number of its point."""
     rings, after = ring_of_vertices(arranged.ring_offsets), next_in_rings(arranged.ring_offsets)
     n_places = int(places.max(initial=0)) + 1
     part = parts[rings]
@@ -150,8 +154,9 @@ def _extract(arranged: PairResults, parts: IntArray, pairs: IntArray, places: In
 def _order_lines(
     offsets: IntArray, rings: IntArray, is_line: BoolArray, goes_on: BoolArray
 ) -> tuple[IntArray, IntArray]:
-    """Return the edges of lines, by their first vertices, line after line, and the index of the first edge of each
-    line. goes_on: by vertex, whether at most two edges of lines meet there."""
+    """Return the edges of lines, named by their first vertices, line after line; and the index of the first edge of
+    each line. offsets: of rings; rings: by vertex its ring; is_line: by vertex, whether its edge is part of a line;
+    goes_on: by vertex, whether exactly two edges of lines meet there."""
     sizes = np.diff(offsets)
     is_head = is_line & ~(is_line[np.arange(len(rings)) - 1] & goes_on)
     firsts = offsets[:-1]
@@ -179,8 +184,9 @@ Place = tuple[float, float]
 
 
 def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touching:
-    """Return the lines and points to which rounding collapsed closed rings, given as (pair, vertices). A ring at one
-    place is a point; else its edges, split at other vertices on them, each once, joined to lines."""
+    """Return the lines and points to which rounding collapsed closed rings, given as (pair, vertices). A ring whose
+    vertices are all equal is a point; of others the edges, split at vertices of the ring that lie on them, each taken
+    once, are joined to lines."""
     lines: list[tuple[int, list[Place]]] = []
     points: list[tuple[int, Place]] = []
     for pair, ring in rings:
@@ -197,7 +203,8 @@ def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touch
 
 
 def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
-    """Return the edges of a ring split at its vertices (exact), each once, sorted."""
+    """Return the edges of a ring, split at its vertices that lie on them (exact), each once, as sorted pairs of points.
+    """
     places = np.array(sorted(set(ring)))
     edges: set[tuple[Place, Place]] = set()
     for start, end in zip(ring, ring[1:] + ring[:1]):
@@ -215,7 +222,8 @@ def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
 
 
 def _join_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
-    """Return polylines of edges, joined at each point where exactly two edges meet."""
+    """Return the polylines that edges (pairs of points) form when they are joined at each point where exactly two meet.
+    """
     neighbours: dict[Place, list[Place]] = {}
     for start, end in edges:
         neighbours.setdefault(start, []).append(end)

@@ -68,7 +68,8 @@ Faces = namedtuple("Faces", "cycle joined regions inside state fan")
 
 @merged
 def _following(chains: Chains, stars: Stars, half: int) -> int:
-    """Return the half-chain after ``half`` around the face to its left (numbers 2 c, 2 c + 1: see chains.py)."""
+    """Return the half-chain that comes after ``half`` around the face to its left. Half-chain 2 c runs along chain c, 2
+    c + 1 back."""
     across = across_end(chains, half)
     if across >= 0:
         return to_the_left(across, half)
@@ -78,8 +79,8 @@ def _following(chains: Chains, stars: Stars, half: int) -> int:
 
 @inline
 def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int, stop: FlagArray) -> int:
-    """Number the cycles of half-chains around faces: write the cycle of each half-chain, -1 unless it represents
-    itself. Returns the number of cycles."""
+    """Number the cycles of half-chains around faces: fill ``cycle``, by half-chain the number of its cycle, or -1 where
+    another chain represents its chain. Returns the number of cycles."""
     cycle[: 2 * n_chains] = -1
     n_cycles = 0
     for first in range(2 * n_chains):
@@ -100,8 +101,8 @@ def number_cycles(chains: Chains, stars: Stars, cycle: Int32Array, n_chains: int
 
 @inline
 def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
-    """Return whether a ray from vertex v straight up meets edge e before edge f. The ray runs an infinitesimal step to
-    the right of v; caller guarantees that it meets both. Exact."""
+    """Return whether the ray from vertex v straight up, an infinitesimal step to the right of v, meets edge e before
+    edge f. Exact. Caller guarantees that it meets both."""
     x = edges.x
     a, b = (e, edges.after[e]) if x[e] < x[edges.after[e]] else (edges.after[e], e)
     c, d = (f, edges.after[f]) if x[f] < x[edges.after[f]] else (edges.after[f], f)
@@ -114,8 +115,9 @@ def _is_nearer(edges: Edges, v: int, e: int, f: int) -> bool:
 
 @inline
 def _compare_heights(edges: Edges, v: int, a: int, b: int, c: int, d: int) -> int:
-    """Return the exact sign of ``height(ab) - height(cd)`` at the x of vertex v; caller guarantees x_a < x_b, x_c <
-    x_d. ``height(ab) = -orient(a, b, v) / (x_b - x_a)``, above v."""
+    """Return the exact sign of ``height(ab) - height(cd)``, the heights above vertex v at which the vertical line
+    through v meets edges ab and cd: ``height(ab) = -orient(a, b, v) / (x_b - x_a)``. a, b, c, d: vertices; caller
+    guarantees x_a < x_b, x_c < x_d."""
     x = edges.x
     first, second, total = workspace(16), workspace(16), workspace(128)  # 2 * 16 * 2 components for each product
     n, m = exact_weight(edges, a, b, v, first), exact_weight(edges, c, d, v, second)
@@ -146,10 +148,9 @@ def _test_edge(edges: Edges, v: int, e: int, nearest: int) -> int:
 
 @inline
 def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -> int:
-    """Return the first edge that a ray from vertex v straight up meets, a step to the right of v, or NOTHING. tree:
-    over the boxes of n edges, box k that of edge ``names[k]``. Caller guarantees that v is the last vertex (x, then y)
-    of its component, so that no edge of it passes to the right of v.
-    """
+    """Return the first edge that a ray from vertex v straight up, an infinitesimal step to the right of v, meets among
+    n edges, or NOTHING. tree: over the boxes of these edges, box k that of edge ``names[k]``. Caller guarantees that v
+    is the last vertex (x, then y) of its component, so that no edge of it passes to the right of v."""
     nearest = NOTHING
     n_leaves = leaves_of(n)
     nodes, stack, x, y = tree.nodes, tree.stack, edges.x[v], edges.y[v]
@@ -172,9 +173,8 @@ def edge_above(edges: Edges, tree: BoxTree, names: Int32Array, v: int, n: int) -
 
 @inline
 def half_below(edges: Edges, events: Events, along: Along, points: Int32Array, chains: Chains, e: int, v: int) -> int:
-    """Return the half-chain along edge e whose left face lies below e, a step to the right of vertex v. points:
-    union-find forest of equal points.
-    """
+    """Return the half-chain along edge e that has the face below e to its left, at the place just right of vertex v; of
+    coinciding ones, the representative. points: union-find forest of equal points."""
     x = edges.x
     runs_right = x[e] < x[edges.after[e]]
     chain, before = chains.at[e], NOTHING
@@ -209,8 +209,9 @@ by ring its component.
 def _find_components(
     edges: Edges, tops: IntArray, rings: IntArray, n: int, components: Components, boxes: FloatArray
 ) -> int:
-    """Group rings into connected components: fill ``components`` and the box of each component; return their number.
-    tops: by ring its last vertex (x, then y). rings: union-find forest of connected rings. n: number of vertices."""
+    """Group rings into connected components: fill ``components``, and ``boxes`` with the box of each component; return
+    the number of components. tops: by ring its last vertex (x, then y). rings: union-find forest of rings that touch.
+    n: number of vertices."""
     x, y, highest, number = edges.x, edges.y, components.highest, components.number
     n_components, at = 0, 0
     while at < n:  # bound: each turn passes one ring
@@ -236,7 +237,8 @@ def _find_components(
 
 @inline
 def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree) -> None:
-    """Set _ENCLOSES on each component whose box contains the box of component k, and _IS_UNKNOWN on k if any is."""
+    """Set _ENCLOSES on each component whose box contains the box of component k, and _IS_UNKNOWN on k if there is one.
+    n: number of components; tree: over their boxes."""
     stack, n_leaves, boxes, state = tree.stack, leaves_of(n), tree.boxes, components.state
     stack[0, 0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -258,8 +260,8 @@ def _mark_enclosing_boxes(components: Components, k: int, n: int, tree: BoxTree)
 
 @inline
 def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, names: Int32Array) -> int:
-    """Write to ``names`` the edges of all components marked _ENCLOSES, and to ``tree.boxes`` their boxes; return how
-    many."""
+    """Write to ``names`` those of the n edges whose component is marked _ENCLOSES (but for RUN edges), and to
+    ``tree.boxes`` their boxes; return how many they are."""
     x, y, boxes = edges.x, edges.y, tree.boxes
     m = 0
     for e in range(n):
@@ -275,9 +277,9 @@ def _gather_edges(edges: Edges, components: Components, n: int, tree: BoxTree, n
 
 @inline
 def join_faces(w: Any, names: Int32Array, sizes: tuple[int, int, int], stop: FlagArray) -> None:
-    """Unite, in ``faces.joined``, the outer cycle of each component with a cycle of the face that the component lies
-    in. w: the `Workspace`; its tree is overwritten, but for the marks. names: scratch by point. sizes: the numbers of
-    vertices, cycles and RUN edges."""
+    """Unite, in ``faces.joined`` and ``faces.regions``, the outer cycle of each component of rings with a cycle of the
+    face that the component lies in. w: the `Workspace`; its tree is overwritten, but for the marks. names: scratch, one
+    entry a point. sizes: the numbers of vertices, cycles and RUN edges."""
     n, n_cycles, n_runs = sizes
     given, tree, faces, components, stars = w.given, w.tree, w.faces, w.components, w.stars
     for i in range(n_cycles + 1):

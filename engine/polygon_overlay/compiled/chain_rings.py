@@ -70,8 +70,8 @@ on it."""
 
 @inline
 def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) -> None:
-    """Write the bits BOUNDS and INSIDE of each half-chain to ``faces.state``, from the parts of its two faces
-    (``inside``)."""
+    """Fill ``faces.state`` with the bits BOUNDS and INSIDE of each half-chain, from ``faces.inside``, the parts of the
+    result to which the faces on its two sides belong."""
     cycle, inside, state = faces.cycle, faces.inside, faces.state
     for chain in range(n_chains):
         if chain & POLL == 0 and stop[0]:
@@ -87,9 +87,9 @@ def mark_boundary(chains: Chains, faces: Faces, n_chains: int, stop: FlagArray) 
 def join_regions(
     chains: Chains, stars: Stars, faces: Faces, is_named: bool, sizes: tuple[int, int, int], stop: FlagArray
 ) -> None:
-    """Unite faces that no boundary chain separates into regions, and count the boundary chains of nodes in
-    ``faces.fan``. ``faces.state`` is the result of `mark_boundary`. is_named: unite faces outside the result too.
-    sizes: the numbers of chains, simple nodes and all nodes."""
+    """Unite faces that no boundary chain separates, in ``faces.regions``, and count in ``faces.fan`` the boundary
+    chains at each node that is not simple. ``faces.state`` is filled by `mark_boundary`. is_named: unite faces outside
+    the result too, for provenance. sizes: the numbers of chains, simple nodes and all nodes."""
     n_chains, n_simple, n_nodes = sizes
     cycle, state = faces.cycle, faces.state
     for chain in range(n_chains):
@@ -120,8 +120,8 @@ def _is_forked(chains: Chains, faces: Faces, half: int) -> bool:
 
 @merged
 def _next_boundary_edge(chains: Chains, stars: Stars, faces: Faces, half: int) -> tuple[int, bool]:
-    """Return the boundary half-chain that follows ``half`` around the region to its left, and whether rings meet there.
-    The second result is `_is_forked` of the first."""
+    """Return the boundary half-chain that follows ``half`` around the region to its left, and whether rings meet in the
+    node between the two: more than two boundary chains do (`_is_forked`)."""
     state, across = faces.state, across_end(chains, half)
     if across >= 0:
         left, ahead = to_the_left(across, half), half + 2 - 4 * (half & 1)
@@ -138,7 +138,8 @@ def _next_boundary_edge(chains: Chains, stars: Stars, faces: Faces, half: int) -
 
 @merged
 def emit_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets: int) -> int:
-    """Append a point to ``rings`` at index ``at`` if the boundary turns there; return the index after it."""
+    """Write a point to ``rings`` at index ``at`` if turns is True; return the next index. point, edge, meets: what is
+    written to the fields of these names (`Rings`). turns: the boundary turns there."""
     if not turns:
         return at
     rings.point[at], rings.edge[at], rings.meets[at] = point, edge, meets
@@ -147,8 +148,8 @@ def emit_point(rings: Rings, at: int, point: int, edge: int, turns: bool, meets:
 
 @merged
 def emit_vertex(edges: Edges, marks: FlagArray, v: int, edge: int, rings: Rings, at: int) -> int:
-    """Append input vertex v, from which the boundary follows ``edge``, if the boundary turns at v; return the next
-    index."""
+    """Write input vertex v to ``rings`` at index ``at`` if the boundary turns at v; return the next index. edge: the
+    edge at v along which the boundary continues. marks: by edge its bits BENT and RUN."""
     turns = marks[v] & BENT != 0 or orient(edges, edges.before[v], v, edges.after[v]) != 0
     return emit_point(rings, at, v, edge, turns, marks[edge] & RUN)
 
@@ -158,8 +159,9 @@ def _emit_ring(
     edges: Edges, chains: Chains, points: Int32Array, state: FlagArray, marks: FlagArray, path: Int32Array, first: int,
     last: int, rings: Rings, n_points: int, sizes: tuple[int, int, int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Append the points where the ring of half-chains ``path[first:last]`` turns; return the number of points after
-    that. sizes: the numbers of chains, nodes, vertices and simple nodes."""
+    """Append to ``rings`` the points at which a boundary ring turns, after the n_points there; return their number
+    then. The ring is that of the half-chains ``path[first:last]``. points: by node its point; state: by half-chain its
+    bits; marks: by edge its bits BENT and RUN. sizes: the numbers of chains, nodes, vertices and simple nodes."""
     _, _, n, n_simple = sizes
     edge = leaving_edge(chains, path[last - 1] ^ 1)
     for k in range(first, last):
@@ -188,9 +190,9 @@ def walk_rings(
 ) -> tuple[int, int]:  # fmt: skip
     """Trace the boundary rings of all regions inside; return the numbers of rings and points, written to ``rings``.
 
-    is_named: record in ``flood`` the regions on the other side of each ring, too. marks: by edge, BENT if the boundary
-    certainly turns at its first vertex, RUN if it replaces several. sizes: the numbers of chains, nodes, vertices and
-    simple nodes.
+    is_named: also record in ``flood`` the regions on the other side of each ring. marks: by edge, BENT if the ring
+    certainly turns at the edge's first vertex, RUN if the edge replaces several. sizes: the numbers of chains, nodes,
+    vertices and simple nodes.
     """
     n_chains, n_nodes, _, _ = sizes
     state, path, place = faces.state, walk.path, walk.place
@@ -236,8 +238,8 @@ def walk_rings(
 def has_only_proper_crossings(
     given: Given, events: Events, contacts: Contacts, n_rings: int, selected: FlagArray
 ) -> bool:
-    """Return whether two simple rings meet in proper crossings only and `walk_crossings` applies to the ``selected``
-    labels."""
+    """Return whether `walk_crossings` may trace the result: two simple rings of different polygons, all of whose
+    contacts are proper crossings proven by floats, and an odd number of the labels 1, 2, 3 is in ``selected``."""
     if (
         n_rings != 2
         or contacts.n_exact > 0
@@ -263,8 +265,9 @@ def _follow_to_crossing(
     edges: Edges, events: Events, along: Along, place: Int32Array, marks: FlagArray, event: int, is_forward: bool,
     rings: Rings, n: int, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Append a crossing, and the vertices of its ring up to the next crossing; return that crossing's event and the
-    number of points. event: on the edge that the walk follows. place: by event its index in ``along.order``."""
+    """Append to ``rings``, after its n points, a crossing and the vertices of its ring up to the next crossing; return
+    the event of that next crossing and the new number of points. event: that of the first crossing on the edge that the
+    walk follows. is_forward: the walk follows the ring's direction. place: by event its index in ``along.order``."""
     edge, at = events.edge[event], place[event]
     n = emit_point(rings, n, events.point[event], edge, True, 0)
     step = 1 if is_forward else -1
@@ -284,9 +287,9 @@ def walk_crossings(
     given: Given, events: Events, along: Along, place: Int32Array, marks: FlagArray, selected: FlagArray,
     n_crossings: int, rings: Rings, stop: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Trace the boundary rings of two simple rings that only cross properly; return the numbers of rings and points.
-    Crossing c has the events 2 c, on its first edge, and 2 c + 1. place: scratch by event. ``events.turn`` is
-    overwritten."""
+    """Trace the boundary rings of two simple rings that only cross properly (`has_only_proper_crossings`); return the
+    numbers of rings and points, written to ``rings``. Crossing c has the events 2 c, on its first edge, and 2 c + 1, on
+    its second. place: scratch, one entry an event. ``events.turn`` is overwritten."""
     edges, ring = given.edges, given.edges.ring
     for k in range(2 * n_crossings):
         place[along.order[k]] = k

@@ -63,13 +63,14 @@ chains are united; dx, dy: the directions of one star's half-chains, float64."""
 
 @merged
 def is_representative(chains: Chains, chain: int) -> bool:
-    """Return whether a chain represents itself, so coincides with no chain of a lower number."""
+    """Return whether a chain represents itself: no chain of a lower number coincides with it."""
     return chains.representative[chain] == 2 * chain
 
 
 @merged
 def representative_of(chains: Chains, half: int) -> int:
-    """Return the half-chain that stands for ``half`` and all half-chains that coincide with it."""
+    """Return the half-chain that represents ``half`` and all half-chains that coincide with it: that of the lowest
+    chain."""
     return chains.representative[half >> 1] ^ (half & 1)
 
 
@@ -81,21 +82,22 @@ def origin(chains: Chains, half: int) -> int:
 
 @merged
 def across_end(chains: Chains, half: int) -> int:
-    """Return ``chains.across`` of the node where half-chain ``half`` ends: negative unless that node is simple."""
+    """Return ``chains.across`` at the node where half-chain ``half`` ends: which chain of the other ring leaves there,
+    and to which side; negative unless that node is simple."""
     return chains.across[((half ^ 1) + 1) >> 1]
 
 
 @merged
 def to_the_left(across: int, half: int) -> int:
-    """Return the half-chain that leaves a simple node to the left of ``half``, which ends there. across: `across_end`
-    of ``half``."""
+    """Return the half-chain that leaves a simple node to the left of ``half``, which arrives there. across:
+    `across_end` of ``half``."""
     return (across & ~1) - 1 + ((across ^ half) & 1)
 
 
 @merged
 def place_before(chains: Chains, stars: Stars, at: int, half: int) -> int:
-    """Return the index in ``stars.half`` of the half-chain before index ``at``, cyclically, around the origin of
-    ``half``."""
+    """Return the index in ``stars.half`` of the next half-chain clockwise from that at index ``at``. half: any
+    half-chain that leaves the same node."""
     node = origin(chains, half)
     return (at if at > stars.starts[node] else stars.ends[node]) - 1
 
@@ -109,7 +111,8 @@ def leaving_edge(chains: Chains, half: int) -> int:
 
 @merged
 def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
-    """Return the node at a point, made now if there is none, and the number of nodes then."""
+    """Return the node at a point, and the number of nodes then: a node is made, number n_nodes, if the point has none.
+    """
     if stars.node_of[point] < 0:
         stars.node_of[point] = n_nodes
         stars.point[n_nodes], stars.starts[n_nodes], stars.ends[n_nodes] = point, NOT_YET, 0
@@ -119,7 +122,8 @@ def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
 
 @merged
 def _link_crossing(events: Events, chains: Chains, stars: Stars, point: int, crossing: int, chain: int, e: int) -> None:
-    """Record that chain ``chain`` leaves a simple node along edge e; the second call at a node fills ``across``."""
+    """Record that chain ``chain`` leaves the simple node of crossing ``crossing``, point ``point``, along edge e. The
+    second such call for a node fills ``chains.across`` of both chains."""
     other = stars.node_of[point]
     if other < 0:  # here for the first time
         stars.node_of[point] = chain
@@ -138,11 +142,12 @@ def build_chains(
     given: Given, events: Events, along: Along, unions: Unions, chains: Chains, stars: Stars, loose: Int32Array,
     sizes: tuple[int, int, int], stop: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
-    """Cut every ring at its nodes into chains, from its top vertex on; return the numbers of nodes, chains and loose
-    half-chains.
+    """Cut every ring at its nodes into chains, beginning at its top, the last vertex (x, then y); return the numbers of
+    nodes, of chains, and of half-chains in ``loose``.
 
-    ``unions.is_node`` includes the tops; ``stars.node_of`` is -1 everywhere. ``loose`` receives the half-chains that
-    leave nodes with a star; ``stars.starts`` of these is NOT_YET. sizes: the numbers of vertices, rings and crossings.
+    On entry ``unions.is_node`` includes the tops, and ``stars.node_of`` is -1 everywhere. loose: filled with the
+    half-chains that leave nodes with a star, whose ``stars.starts`` is NOT_YET. sizes: the numbers of vertices, rings
+    and crossings.
     """
     edges, (n, n_rings, n_crossings) = given.edges, sizes
     n_nodes, n_chains, n_loose = n_crossings, 0, 0
@@ -195,7 +200,8 @@ def build_chains(
 
 @inline
 def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
-    """Return 0 if an edge (reversed if is_back) points up or to the left, 1 if it points down or to the right."""
+    """Return 0 if an edge, or its reverse if is_back is 1, points left (dx < 0) or straight up, else 1: right or
+    straight down."""
     x, y = edges.x, edges.y
     a, b = edge, edges.after[edge]
     if is_back:
@@ -207,8 +213,8 @@ def _half_turn(edges: Edges, edge: int, is_back: int) -> int:
 
 @called
 def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
-    """Return -1, 0 or 1: half-chain g leaves its node before, with or after h, counter-clockwise from straight up.
-    Exact."""
+    """Return -1, 0 or 1: counter-clockwise from straight up (included), half-chain g leaves their common node before h,
+    in the same direction, or after it. Exact."""
     e, f = leaving_edge(chains, g), leaving_edge(chains, h)
     half_g, half_h = _half_turn(edges, e, g & 1), _half_turn(edges, f, h & 1)
     if half_g != half_h:
@@ -219,9 +225,9 @@ def _compare_directions(edges: Edges, chains: Chains, g: int, h: int) -> int:
 
 @called
 def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, last: int, masks: IntArray) -> int:
-    """Replace coinciding half-chains of the sorted ``star[first:last]`` by their lowest chain; return the new end.
-    ``chains.mask`` of that chain becomes the exclusive or of ``masks``. The node at the other end chooses the same
-    chain."""
+    """Replace each group of coinciding half-chains in the sorted ``star[first:last]`` by that of the lowest chain;
+    return the new end of the star. ``chains.mask`` of that chain becomes the exclusive or of ``masks`` (by chain) over
+    the group; ``representative`` and ``twin`` are set. The node at the other end chooses the same chain."""
     n_unique = at = first
     while at < last:  # bound: each turn passes one group
         stop = at + 1
@@ -250,8 +256,8 @@ def _unite_twins(edges: Edges, chains: Chains, star: Int32Array, first: int, las
 def _group_loose(
     chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
-    """Bucket the loose half-chains by their origin: fill ``stars.half``, ``starts`` and ``ends``, unsorted within a
-    node."""
+    """Bucket the n_loose half-chains ``loose.half`` by their origin: fill ``stars.half``, ``starts`` and ``ends`` of
+    nodes n_simple .. n_nodes - 1, unsorted within a node. ``loose.masks`` becomes a copy of ``chains.mask``."""
     starts, ends = stars.starts, stars.ends
     for k in range(n_loose):
         if k & POLL == 0 and stop[0]:
@@ -275,8 +281,8 @@ def _group_loose(
 
 @inline
 def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, first: int, last: int) -> bool:
-    """Sort the half-chains ``star[first:last]`` of a node counter-clockwise; return whether two have the same
-    direction."""
+    """Sort the half-chains ``star[first:last]`` of a node counter-clockwise, from straight up on; return whether two of
+    them have the same direction."""
     x, y, dx, dy = edges.x, edges.y, loose.dx, loose.dy
     has_twins = False
     for k in range(first, last):
@@ -311,8 +317,8 @@ def _sort_star(edges: Edges, chains: Chains, star: Int32Array, loose: Loose, fir
 def build_stars(
     edges: Edges, chains: Chains, stars: Stars, loose: Loose, n_simple: int, n_nodes: int, n_loose: int, stop: FlagArray
 ) -> None:
-    """Fill the stars of nodes n_simple .. n_nodes - 1, sorted counter-clockwise, one representative for coinciding
-    chains."""
+    """Fill the stars of nodes n_simple .. n_nodes - 1 from the n_loose half-chains ``loose.half``: sorted
+    counter-clockwise from straight up on, with one representative for half-chains that coincide."""
     _group_loose(chains, stars, loose, n_simple, n_nodes, n_loose, stop)
     star = stars.half
     for node in range(n_simple, n_nodes):

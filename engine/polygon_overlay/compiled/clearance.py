@@ -87,8 +87,8 @@ crossing_y, error: by crossing, its nearest doubles and a bound of its displacem
 
 
 class _Cut(NamedTuple):
-    """Crossing of edges e and f: the weights a, b of the ends of e as positive double-doubles, their sum, and a bound
-    of the relative error of a coordinate."""
+    """Crossing of edges e and f. ah + al, bh + bl: |orient| of the first and second end of e against the line of f, as
+    double-doubles; sum_h + sum_l: the sum of both; relative: 2.5 r, r a bound of their relative errors."""
 
     e: int
     f: int
@@ -109,8 +109,9 @@ def _abs2(h: float, low: float) -> tuple[float, float]:
 
 @called
 def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, float]:
-    """Return x, y of the doubles nearest to the crossing of edges e and f, and a bound of the rounding error of each.
-    Error bound 0: that double is the coordinate itself. LOST: the nearest double is not determined."""
+    """Return (x, y, x_error, y_error): the doubles nearest to the crossing of edges e and f, and a bound on the
+    rounding error of each. Error 0.0: the double is the coordinate itself. LOST: the nearest double is not determined.
+    """
     ends, others = _ends_of(edges, e), _ends_of(edges, f)
     (x, has_x), (y, has_y) = common_places(ends, others)
     if has_x and has_y:
@@ -128,14 +129,14 @@ def round_crossing(edges: Edges, e: int, f: int) -> tuple[float, float, float, f
 
 @merged
 def _ends_of(edges: Edges, e: int) -> Ends:
-    """Return x and y of the first end of edge e, then of its second end."""
+    """Return ax, ay, bx, by: the coordinates of the first end a and the second end b of edge e."""
     return edges.x[e], edges.y[e], edges.x[edges.after[e]], edges.y[edges.after[e]]
 
 
 @merged
 def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[float, bool]]:
-    """Return (x, has_x), (y, has_y): the x of a vertical edge and the y of a horizontal one, if one of two edges is
-    such."""
+    """Return (x, has_x), (y, has_y) for two edges: has_x tells whether one is vertical, so that x is the x of a
+    crossing exactly; has_y and y likewise for a horizontal one. Without has_x, x is any number."""
     ax, ay, bx, by = first
     cx, cy, dx, dy = second
     return ((ax if ax == bx else cx), (ax == bx) | (cx == dx)), ((ay if ay == by else cy), (ay == by) | (cy == dy))
@@ -143,8 +144,9 @@ def common_places(first: Ends, second: Ends) -> tuple[tuple[float, bool], tuple[
 
 @merged
 def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, float]:
-    """Return |orient| of both ends of an edge against the line of ``others`` as double-doubles, and 2.5 r. r bounds the
-    relative error of both. Expansions compute them where r would exceed 0.001, if exponents allow."""
+    """Return (ah, al, bh, bl, 2.5 r): |orient| of both ends a, b of an edge against the line of ``others``, as
+    double-doubles, and a bound r of the relative error of both. They come from expansions where r would exceed 0.001,
+    if exponents allow."""
     ax, ay, bx, by = ends
     cx, cy, dx, dy = others
     ah, al, ae = weight_of(cx, cy, dx, dy, ax, ay)
@@ -164,7 +166,8 @@ def weights_of(ends: Ends, others: Ends) -> tuple[float, float, float, float, fl
 
 @called
 def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, float]:
-    """Return |orient(c, d, (x, y))|, c and d the ends ``others``, as a double-double, from an expansion."""
+    """Return |orient(c, d, (x, y))| as a double-double (high, low), computed with an expansion; c and d are the ends
+    ``others``."""
     e = workspace(16)
     h, low = leading(e, exact_cross(others, (others[0], others[1], x, y), e))
     return _abs2(h, low)
@@ -172,7 +175,8 @@ def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, flo
 
 @inline
 def leading(e: Any, n: int) -> tuple[float, float]:
-    """Return the sum of an expansion of n components as a double-double: its two leading components."""
+    """Return the sum of an expansion e of n components, as a double-double (high, low) of its two leading components.
+    """
     n = compress(e, n)
     if n == 0:
         return 0.0, 0.0
@@ -181,8 +185,9 @@ def leading(e: Any, n: int) -> tuple[float, float]:
 
 @merged
 def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple[float, float]:
-    """Return the double nearest to one coordinate of the crossing of edges e and f, and a bound on its rounding error.
-    Bound 0: the coordinate is that double. axis: 0 for x, 1 for y. p, q: that coordinate of the ends of edge e."""
+    """Return the double nearest to one coordinate of a crossing, and a bound on its rounding error: 0.0 if they are
+    equal, LOST if it is not determined. axis: 0 for x, 1 for y. p, q: that coordinate of the first and second end of
+    edge ``cut.e``."""
     rh, rl = dd_scale(cut.bh, cut.bl, p)
     sh, sl = dd_scale(cut.ah, cut.al, q)
     nh, nl = dd_add(rh, rl, sh, sl)
@@ -195,8 +200,9 @@ def _coordinate(edges: Edges, cut: _Cut, axis: int, p: float, q: float) -> tuple
 
 @called
 def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: float) -> tuple[float, float]:
-    """Return the double nearest to one coordinate of the crossing of edges e and f, and its error bound, by exact
-    signs. axis: 0 for x, 1 for y. h: a double near the coordinate; bound: on |h - coordinate|."""
+    """Return the double nearest to one coordinate of the crossing of edges e and f, by exact signs, and a bound on its
+    rounding error: 0.0 if they are equal, LOST if it is not determined. axis: 0 for x, 1 for y. h: a double near the
+    coordinate; bound: on |h - coordinate|."""
     if bound > 2.0**-55 * abs(h):  # case: a crossing on an axis, or so near that h may be many doubles off
         h = _from_expansions(edges, e, f, axis)
     side = crossing_against(edges, e, f, axis, h, 0.0)
@@ -222,8 +228,8 @@ def _round_exactly(edges: Edges, e: int, f: int, axis: int, h: float, bound: flo
 
 @called
 def _from_expansions(edges: Edges, e: int, f: int, axis: int) -> float:
-    """Return a coordinate (axis 0 or 1) of the crossing of edges e and f, with an error below one unit in its last
-    place."""
+    """Return a coordinate (axis 0: x, 1: y) of the crossing of edges e and f, computed with expansions, with an error
+    below one unit in its last place."""
     z = edges.x if axis == 0 else edges.y
     a, b, fb = e, edges.after[e], edges.after[f]
     wa, wb = workspace(16), workspace(16)
@@ -249,8 +255,8 @@ def round_points(
     edges: Edges, events: Events, points: Int32Array, n: int, n_crossings: int, n_points: int, rounded: Rounded,
     stop: FlagArray,
 ) -> float:  # fmt: skip
-    """Round the ``points`` of all rings (vertices below n, crossing c as n + c) into ``rounded``. Returns the largest
-    displacement of a point, or LOST."""
+    """Fill ``rounded`` with the nearest doubles of the n_points points of all rings: points[k] is input vertex v < n,
+    or crossing c as n + c. Returns the largest displacement of a point, or LOST if one is not determined."""
     x, y, error = edges.x, edges.y, rounded.error
     error[:n_crossings] = _NOT_YET
     farthest = 0.0
@@ -281,7 +287,8 @@ MARGIN: Final = 16.0 * 2.0**-52
 @inline
 def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: float, margin: float) -> bool:
     """Return whether the next node on either edge at vertex v is further than the margin from the other of these edges.
-    share_before, share_after: the part of the edge before v, and of that after v, that lies between v and that node."""
+    share_before: the part, 0 .. 1, of the edge that arrives at v between its last node and v; share_after: that of the
+    edge that leaves v, between v and its first node."""
     x, y = edges.x, edges.y
     p, q = edges.before[v], edges.after[v]
     ux, uy, wx, wy = x[p] - x[v], y[p] - y[v], x[q] - x[v], y[q] - y[v]
@@ -293,8 +300,8 @@ def _corner_is_clear(edges: Edges, v: int, share_before: float, share_after: flo
 
 @inline
 def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: FlagArray) -> bool:
-    """Return whether, at every vertex, the next events on its two edges are further than the margin from the other
-    edge. along: filled by `sort_events`. False also if ``stop`` is set."""
+    """Return whether, at each of n vertices, the next events on its two edges are further than the margin from the
+    other edge. along: filled by `sort_events`. False also if ``stop`` is set."""
     starts, keys = along.starts, along.keys
     for e in range(n):
         if e & POLL == 0 and stop[0]:
@@ -317,9 +324,9 @@ def corners_are_clear(edges: Edges, n: int, along: Along, margin: float, stop: F
 
 @merged
 def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Return whether edges ab and cd are proven not to meet, even if their ends move by less than the margin. a, b, c,
-    d: point numbers; an equal number is a shared end, where the edges must not fold onto each other. square: the
-    margin, squared."""
+    """Return whether edges ab and cd are proven not to meet, even if each end moves by a part of the margin (module
+    docstring). a, b, c, d: indices into x and y; where ``points`` has equal numbers at two of them, they are a shared
+    end, at which the edges must not fold onto each other. square: the margin, squared."""
     if points[a] == points[d]:
         c, d = d, c
     elif points[b] == points[c]:
@@ -335,8 +342,8 @@ def _is_apart(points: Int32Array, x: FloatArray, y: FloatArray, a: int, b: int, 
 
 @inline
 def has_straight_point(rings: Rings, n_rings: int, rounded: Rounded, stop: FlagArray) -> bool:
-    """Return whether rounding made a point collinear with both neighbours in its ring; points where rings meet are
-    exempt."""
+    """Return whether rounding made a point of the n_rings rings collinear with both neighbours in its ring; points
+    where rings meet, and RUN edges, are exempt. True also if ``stop`` is set."""
     x, y, moved = rounded.x, rounded.y, rounded.moved
     for ring in range(n_rings):
         first, last = rings.offset[ring], rings.offset[ring + 1]
@@ -356,9 +363,9 @@ def certify(
     rings: Rings, n_rings: int, n: int, rounded: Rounded, tree: BoxTree, tails: Int32Array, heads: Int32Array,
     stop: FlagArray,
 ) -> bool:  # fmt: skip
-    """Return whether floats prove the rounded rings valid: no edges without a common point are within MARGIN of each
-    other. n: number of points in ``rings``. tree, tails, heads: scratch of that size. Edges marked RUN are not tested;
-    nothing that moves is near them."""
+    """Return whether floats prove the rounded rings valid: no two edges without a common point are within MARGIN of
+    each other, and none folds onto its neighbour. n: number of points in ``rings``; tree, tails, heads: scratch of that
+    size. Edges marked RUN are not tested: nothing that moves is near them. False also if ``stop`` is set."""
     x, y, moved, boxes, pairs = rounded.x, rounded.y, rounded.moved, tree.boxes, tree.pairs
     largest = 0.0
     for k in range(n):

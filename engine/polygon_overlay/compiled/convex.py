@@ -53,13 +53,14 @@ def _is_left(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -
 
 @merged
 def _is_after(ax: float, ay: float, bx: float, by: float) -> bool:
-    """Return whether b is lexicographically larger than a (x, then y)."""
+    """Return whether point b is lexicographically larger than point a (x, then y)."""
     return bool((bx > ax) | ((bx == ax) & (by > ay)))
 
 
 @inline
 def _count_rising(x: FloatArray, y: FloatArray, size: int) -> int:
-    """Return how many edges of a ring rise (x, then y), or GENERAL unless the ring is proven strictly convex.
+    """Return how many edges of a ring of ``size`` vertices rise (their end is lexicographically larger, x, then y), or
+    GENERAL unless the ring is proven strictly convex.
 
     It is if all turns are to the left and it winds once: its edges rise once and fall once. x, y: its vertices,
     counter-clockwise, and the first one again. Branch-free, so that the compiler vectorises the loop.
@@ -81,7 +82,7 @@ def _count_rising(x: FloatArray, y: FloatArray, size: int) -> int:
 
 @inline
 def _lowest_vertex(vertices: FloatArray) -> int:
-    """Return the lexicographically smallest vertex (x, then y)."""
+    """Return the index of the lexicographically smallest vertex (x, then y)."""
     low = 0
     px, py = vertices[0, 0], vertices[0, 1]
     for k in range(1, vertices.shape[0]):
@@ -95,9 +96,10 @@ def _lowest_vertex(vertices: FloatArray) -> int:
 def load_convex(
     vertices: FloatArray, base: int, edges: Edges, origins: Int32Array, start: int, stop: FlagArray
 ) -> tuple[int, int]:  # fmt: skip
-    """Write a ring to ``edges`` from ``start`` on: counter-clockwise, from its smallest vertex (x, then y), repeated at
-    the end. Returns the index of its largest vertex, GENERAL unless it is proven strictly convex; and 1, or -1 if
-    reversed. origins: receives ``base`` + the index of each vertex."""
+    """Write a ring to ``edges`` from index ``start`` on: counter-clockwise, from its smallest vertex (x, then y), which
+    is repeated at the end. Returns the index in ``edges`` of its largest vertex, or GENERAL unless the ring is proven
+    strictly convex; and the step, 1, or -1 if it was given clockwise. origins: filled with ``base`` + the number of
+    each vertex."""
     size = vertices.shape[0]
     low = _lowest_vertex(vertices)
     after, before = (low + 1 if low + 1 < size else 0), (low if low > 0 else size) - 1
@@ -121,8 +123,8 @@ def load_convex(
 
 @inline
 def _record_crossing(edges: Edges, e: int, f: int, passages: Passages) -> int:
-    """Write the crossing of edges e and f to ``passages``; return 1 if they cross, 0 if proven not to, GENERAL if
-    undecided."""
+    """Write the crossing of edges e and f, one of each polygon, to ``passages``; return 1 if they are proven to cross,
+    0 if proven not to, GENERAL if undecided or one of them crosses twice in the same way."""
     x, y = edges.x, edges.y
     to_f = turns(x, y, e, e + 1, f, f + 1)
     nearest_f = smaller_turn(to_f)
@@ -146,8 +148,9 @@ def _record_crossing(edges: Edges, e: int, f: int, passages: Passages) -> int:
 def _find_passages(
     edges: Edges, i: int, i_end: int, i_step: int, j: int, j_end: int, j_step: int, passages: Passages, stop: FlagArray
 ) -> int:  # fmt: skip
-    """Write the crossings of two x-monotone chains to ``passages``; return their number, or GENERAL. i, j: leftmost
-    vertex of each chain, i_end, j_end its last, i_step, j_step: 1 for a lower chain, -1 for an upper one."""
+    """Write the crossings of two x-monotone chains, one of each polygon, to ``passages``; return their number, or
+    GENERAL. i, j: leftmost vertex of each chain; i_end, j_end: its rightmost; i_step, j_step: 1 for a lower chain, -1
+    for an upper one."""
     x, y = edges.x, edges.y
     while i != i_end and x[i + i_step] < x[j]:
         i += i_step
@@ -192,7 +195,8 @@ def _locate_vertex(edges: Edges, first: int, last: int, v: int) -> int:
 
 @inline
 def _add_vertices(edges: Edges, origins: Int32Array, first: int, last: int, points: Points, n: int) -> int:
-    """Append the vertices first .. last - 1 to a result of n points; return the number of points then."""
+    """Append the vertices first .. last - 1 of ``edges``, with the numbers ``origins``, to the result of n points;
+    return the number of points then."""
     size = max(last - first, 0)
     x, y, names = edges.x[first : first + size], edges.y[first : first + size], origins[first : first + size]
     u, v, firsts, seconds = points.x[n:], points.y[n:], points.firsts[n:], points.seconds[n:]
@@ -205,8 +209,8 @@ def _add_vertices(edges: Edges, origins: Int32Array, first: int, last: int, poin
 def _add_stretch(
     edges: Edges, origins: Int32Array, e: int, f: int, first: int, last: int, points: Points, n: int
 ) -> int:  # fmt: skip
-    """Append the vertices of the ring first .. last - 1 from edge e, counter-clockwise, to edge f; return the number of
-    points."""
+    """Append the vertices of a ring between edge e and edge f, counter-clockwise, to the result of n points; return the
+    number of points then. The ring has the edges first .. last - 1."""
     if f >= e:
         return _add_vertices(edges, origins, e + 1, f + 1, points, n)
     n = _add_vertices(edges, origins, e + 1, last, points, n)
@@ -215,8 +219,9 @@ def _add_stretch(
 
 @inline
 def _add_crossing(edges: Edges, e: int, f: int, e_name: int, f_name: int, points: Points, n: int) -> float:
-    """Write the rounded crossing of edges e and f as point n; return a bound of its displacement, infinity if
-    undetermined."""
+    """Write the rounded crossing of edges e and f as point n of the result; return a bound of its displacement,
+    infinity if the nearest double is not determined. e_name, f_name: the input's numbers of the edges, that along which
+    the result continues first."""
     x, y, ex, ey = round_crossing(edges, e, f)
     points.x[n], points.y[n], points.firsts[n], points.seconds[n] = x, y, e_name, f_name
     if ex < 0.0 or ey < 0.0:
@@ -230,11 +235,11 @@ def _walk(
     passages: Passages, points: Points, stop: FlagArray,
 ) -> tuple[int, float]:  # fmt: skip
     """Trace the boundary of the intersection into ``points``; return its number of points, or GENERAL, and their
-    largest displacement.
+    largest displacement by rounding.
 
     The walk follows the first polygon (edges 0 .. n - 1) inside the second, and the second (edges second .. end - 1)
-    from where the first leaves it to where it enters again. There is a crossing. is_reversed, is_second_reversed: 1 if
-    the ring was given clockwise, so that an edge has the number of its end.
+    from where the first leaves it to where it enters again. Caller guarantees a crossing. is_reversed,
+    is_second_reversed: 1 if the ring was given clockwise, so that an edge has the input number of its end.
     """
     enters, leaves = passages.enters, passages.leaves
     start = 0
@@ -278,9 +283,10 @@ def _walk(
 def intersect_convex(
     subject: FloatArray, clip: FloatArray, given: Given, passages: Passages, points: Points, stop: FlagArray
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Intersect two convex rings; return the number of points or GENERAL, the index of the smallest one (x, then y),
-    and the largest displacement by rounding. points: filled counter-clockwise; vertices of ``clip`` are numbered after
-    those of ``subject``. given and passages have room for two more than all vertices, points for four times as many."""
+    """Intersect two convex rings, (n, 2) and (m, 2) float64; return the number of points or GENERAL, the index of the
+    smallest one (x, then y), and the largest displacement by rounding. points: filled counter-clockwise; vertices of
+    ``clip`` are numbered after those of ``subject``. given and passages have room for n + m + 2 vertices, points for
+    four times n + m."""
     edges, origins, x, y = given.edges, given.origins, points.x, points.y
     n = subject.shape[0]
     top, step = load_convex(subject, 0, edges, origins, 0, stop)

@@ -81,7 +81,7 @@ def turn_of_edges(edges: Edges, e: int, f: int) -> int:
 
 @called
 def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
-    """Return the sign of ``(b - a) x (d - c)``, a, b, c, d being vertices, computed with an expansion."""
+    """Return the sign of the cross product ``(b - a) x (d - c)`` of four vertices, computed with an expansion."""
     x, y = edges.x, edges.y
     if (x[a] == x[d]) & (y[a] == y[d]) & (x[b] == x[c]) & (y[b] == y[c]):  # case: as above
         return 0
@@ -91,7 +91,8 @@ def _exact_turn(edges: Edges, a: int, b: int, c: int, d: int) -> int:
 
 @merged
 def exact_cross(first: Ends, second: Ends, e: Components) -> int:
-    """Set expansion e to the cross product of the directions of two edges; return its length, at most WEIGHT_ROOM."""
+    """Set expansion e to the cross product of the directions of two edges; return its number of components, at most
+    WEIGHT_ROOM."""
     ux, ux_tail = two_diff(first[2], first[0])
     uy, uy_tail = two_diff(first[3], first[1])
     vx, vx_tail = two_diff(second[2], second[0])
@@ -101,7 +102,7 @@ def exact_cross(first: Ends, second: Ends, e: Components) -> int:
 
 @inline
 def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) -> tuple[float, float, float]:
-    """Return orient2d(c, d, p) as a double-double (h, low), and a bound of its absolute error."""
+    """Return (h, low, bound): orient2d(c, d, p) as a double-double, and a bound of its absolute error."""
     ux, ux_tail = two_diff(dx, cx)
     uy, uy_tail = two_diff(dy, cy)
     wx, wx_tail = two_diff(px, cx)
@@ -114,7 +115,7 @@ def weight_of(cx: float, cy: float, dx: float, dy: float, px: float, py: float) 
 
 @called
 def exact_weight(edges: Edges, c: int, d: int, p: int, e: Components) -> int:
-    """Set expansion e to orient2d(c, d, p) of three vertices; return its length, at most WEIGHT_ROOM."""
+    """Set expansion e to orient2d(c, d, p) of three vertices; return its number of components, at most WEIGHT_ROOM."""
     x, y = edges.x, edges.y
     return exact_cross((x[c], y[c], x[d], y[d]), (x[c], y[c], x[p], y[p]), e)
 
@@ -161,7 +162,7 @@ def crossing_against(edges: Edges, e: int, f: int, axis: int, value: float, tail
 
 @inline
 def _set_difference(z: float, value: float, tail: float, e: Components) -> int:
-    """Set expansion e to ``z - value - tail``; return its length, at most 3."""
+    """Set expansion e to ``z - value - tail``; return its number of components, at most 3."""
     n = 0
     high, low = two_diff(z, value)
     if low != 0.0:

@@ -1,6 +1,6 @@
 """Noding: all intersections of edges, decided exactly, as events on the edges concerned.
 
-Pairs of edges whose boxes intersect pass a float filter; exact signs decide the rest.
+Narrow phase: pairs of edges whose boxes intersect pass a float filter; exact signs decide the rest.
 
 | contact | result |
 | --- | --- |
@@ -35,7 +35,8 @@ from engine.types import FlagArray, FloatArray
 
 @merged
 def is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, square: float) -> bool:
-    """Return whether the distance of p from the segment ab is above ``sqrt(square)``."""
+    """Return whether the distance of point p from the segment ab is above ``sqrt(square)``; in floating point, not
+    proven."""
     dx, dy, ex, ey = bx - ax, by - ay, px - ax, py - ay
     along, length = ex * dx + ey * dy, dx * dx + dy * dy
     if along <= 0.0:
@@ -49,7 +50,8 @@ def is_far(px: float, py: float, ax: float, ay: float, bx: float, by: float, squ
 
 @merged
 def _are_on_one_side(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Return whether c and d are on one side of the line ab, further from it than ``sqrt(square)``."""
+    """Return whether vertices c and d are on one side of the line ab, each further from it than ``sqrt(square)``; in
+    floating point."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
     nearest = min(abs(side_c), abs(side_d))
@@ -58,7 +60,8 @@ def _are_on_one_side(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: in
 
 @merged
 def _crosses(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> bool:
-    """Return whether segments ab and cd cross properly, by signs of floating-point orientations (not proven)."""
+    """Return whether the segments ab and cd of vertices cross properly, by signs of floating-point orientations (not
+    proven)."""
     dx, dy = x[b] - x[a], y[b] - y[a]
     side_c, side_d = dx * (y[c] - y[a]) - dy * (x[c] - x[a]), dx * (y[d] - y[a]) - dy * (x[d] - x[a])
     if (side_c > 0.0) == (side_d > 0.0):
@@ -70,7 +73,8 @@ def _crosses(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> bo
 
 @called
 def segments_are_far(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int, square: float) -> bool:
-    """Return whether the distance of the segments ab and cd is above ``sqrt(square)``."""
+    """Return whether the distance of the segments ab and cd of vertices is above ``sqrt(square)``; in floating point,
+    not proven."""
     if _are_on_one_side(x, y, a, b, c, d, square) or _are_on_one_side(x, y, c, d, a, b, square):
         return True
     return (
@@ -115,15 +119,16 @@ there; rings: union-find forest of rings that touch."""
 
 @merged
 def _add_event(events: Events, at: int, edge: int, point: int, other: int, t: float, slack: float) -> None:
-    """Write event number ``at``: edge ``edge`` passes ``point`` at parameter t, known to +- slack."""
+    """Write event number ``at``: edge ``edge`` passes point ``point`` at parameter t, known to +- slack. other: the
+    edge that crosses there, -1 for a vertex."""
     events.edge[at], events.point[at], events.other[at] = edge, point, other
     events.t[at], events.slack[at], events.reach[at] = t, slack, slack
 
 
 @inline
 def _add_vertex_on_edge_event(edges: Edges, events: Events, unions: Unions, at: int, e: int, v: int) -> int:
-    """Append an event for vertex v if it lies inside edge e; unite v with an end of e that equals it; return the number
-    of events. Caller guarantees that v lies on the line of e."""
+    """Write event number ``at`` if vertex v lies inside edge e, or unite v with an end of e that equals it; return the
+    number of events then. Caller guarantees that v lies on the line of e."""
     x, y = edges.x, edges.y
     a, b = e, edges.after[e]
     for end in (a, b):
@@ -150,7 +155,8 @@ def _add_contact(
     edges: Edges, events: Events, unions: Unions, n: int, n_events: int, n_crossings: int, e: int, f: int
 ) -> tuple[int, int]:
     """Append the events of all common points of edges e and f, decided exactly; return the numbers of events and
-    crossings. n: number of vertices. There is room for four more events."""
+    crossings then, of which there are n_events and n_crossings before. n: number of vertices. Caller guarantees room
+    for four more events."""
     parent, rings = unions.points, unions.rings
     a, b, c, d = e, edges.after[e], f, edges.after[f]
     if b == c or d == a:  # consecutive edges: their common vertex is all, unless they fold
@@ -199,9 +205,9 @@ def _add_contact(
 
 
 class Contacts(NamedTuple):
-    """Result of noding. n_events: number of events, -1 if they exceed the room; n_exact: number of edge pairs decided
-    exactly; are_far: all edges without a common point are further apart than the margin, and all contacts are proper
-    crossings."""
+    """Result of noding. n_events: number of events, -1 if they exceed the room; n_crossings: number of proper
+    crossings; n_exact: number of edge pairs decided exactly; are_far: all edges without a common point are further
+    apart than the margin, and all contacts are proper crossings."""
 
     n_events: int
     n_crossings: int
@@ -210,7 +216,8 @@ class Contacts(NamedTuple):
 
 
 class Turns(NamedTuple):
-    """orient2d(a, b, c) and orient2d(a, b, d) in floating point, an error bound of both, and ``|dx| + |dy|`` of ab."""
+    """Orientations of two vertices c, d at a segment ab, in floating point. first: orient2d(a, b, c); second:
+    orient2d(a, b, d); bound: on the error of both; length: ``|dx| + |dy|`` of ab."""
 
     first: float
     second: float
@@ -245,8 +252,9 @@ def same_sign(pair: Turns) -> bool:
 def find_contacts(
     edges: Edges, n: int, n_rings: int, margin: float, events: Events, unions: Unions, tree: BoxTree, stop: FlagArray
 ) -> Contacts:
-    """Node the edges: write all contacts of the n edges to ``events``, crossings and vertices on edges, and fill
-    ``unions``. tree: over the boxes of the edges, enlarged by the margin."""
+    """Node the edges: write the contacts of n edges in n_rings rings to ``events`` (crossings, and vertices on edges),
+    and fill ``unions``. margin: the distance that `Contacts.are_far` compares with. tree: over the boxes of the edges,
+    enlarged by the margin."""
     for i in range(n):
         unions.points[i] = i
     unions.is_node[:n] = 0
@@ -299,9 +307,9 @@ def find_contacts(
 
 @merged
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
-    """Append the event of a proper crossing on ``edge``, proven by floats. ends: orientations A, B of the two ends of
-    ``edge`` relative to ``other``. ``t = A / (A + B)``; with A and B off by at most r, ``error <= r / (A + B) + 3
-    roundings``."""
+    """Write event number ``at``: a proper crossing on ``edge``, proven by floats. crossing: its point; other: the other
+    edge; ends: orientations A, B of the two ends of ``edge`` relative to ``other``. ``t = |A| / (|A| + |B|)``; with A
+    and B off by at most r, ``error <= r / (|A| + |B|) + 3 roundings``."""
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)
     events.reach[at] += margin * ends.length / total

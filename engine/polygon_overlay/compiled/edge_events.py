@@ -44,7 +44,8 @@ def compare_events(edges: Edges, events: Events, e: int, i: int, j: int) -> int:
 
 @inline
 def _vertex_before_crossing(edges: Edges, e: int, v: int, f: int) -> int:
-    """Return -1, 0 or 1: vertex v on edge e comes before, at or after the crossing with edge f."""
+    """Return -1, 0 or 1: along edge e, vertex v, which lies on e, comes before, at or after the crossing with edge f.
+    Exact."""
     side = orient(edges, f, edges.after[f], v)
     if side == 0:
         return 0
@@ -53,7 +54,7 @@ def _vertex_before_crossing(edges: Edges, e: int, v: int, f: int) -> int:
 
 @inline
 def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
-    """Return -1, 0 or 1: vertex v comes before, with or after vertex w along edge e, both on it."""
+    """Return -1, 0 or 1: along edge e, vertex v comes before, with or after vertex w; both lie on e. Exact."""
     x, y = edges.x, edges.y
     b = edges.after[e]
     if x[v] != x[w]:
@@ -65,7 +66,7 @@ def _order_of_vertices(edges: Edges, e: int, v: int, w: int) -> int:
 
 @inline
 def _sort_by_key(along: Along, first: int, last: int) -> None:
-    """Merge-sort ``along.keys[first:last]``, and ``along.order`` with it; stable."""
+    """Sort ``along.keys[first:last]`` ascending, and ``along.order`` with it, by a stable merge sort."""
     order, keys, spare_keys, spare = along.order, along.keys, along.spare_keys, along.spare
     width = _RUN
     for low in range(first, last, width):
@@ -93,7 +94,8 @@ def _sort_by_key(along: Along, first: int, last: int) -> None:
 
 @inline
 def _group_events(events: Events, along: Along, n: int, n_events: int, stop: FlagArray) -> bool:
-    """Bucket the events by edge in ``along``, unsorted within an edge; return False if ``stop`` is set."""
+    """Bucket the n_events events by their edge in ``along``, unsorted within each of the n edges; return False if
+    ``stop`` is set."""
     starts = along.starts
     starts[: n + 1] = 0
     for i in range(n_events):
@@ -117,7 +119,8 @@ def _group_events(events: Events, along: Along, n: int, n_events: int, stop: Fla
 
 @called
 def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n: int, e: int) -> None:
-    """Sort the events of edge e by exact comparisons (binary insertion), and unite points of events that coincide."""
+    """Sort the events of edge e in ``along`` by exact comparisons (binary insertion), unite the points of events that
+    coincide, and mark their crossings NOT_SIMPLE. n: number of vertices; crossing c is point n + c."""
     order, keys, points, first = along.order, along.keys, events.point, along.starts[e]
     for k in range(first + 1, along.starts[e + 1]):
         moving, key, low, high = order[k], keys[k], first, k
@@ -144,9 +147,9 @@ def _sort_exactly(edges: Edges, events: Events, along: Along, unions: Unions, n:
 def sort_events(
     edges: Edges, events: Events, along: Along, unions: Unions, n: int, n_events: int, stop: FlagArray
 ) -> bool:
-    """Sort the events along each edge into ``along``, unite points of events that coincide, and mark their crossings
-    NOT_SIMPLE. Returns whether, on every edge, events are further from each other than the sum of their reaches, and
-    further from both ends than their own reach."""
+    """Sort the n_events events along each of n edges into ``along``, unite points of events that coincide, and mark
+    their crossings NOT_SIMPLE. Returns whether, on every edge, events are further from each other than the sum of their
+    reaches (``events.reach``), and further from both ends than their own reach; False if ``stop`` is set."""
     if not _group_events(events, along, n, n_events, stop):
         return False
     starts, order, keys = along.starts, along.order, along.keys

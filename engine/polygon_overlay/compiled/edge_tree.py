@@ -1,4 +1,4 @@
-"""Pairs of intersecting boxes, by the dual traversal of an implicit tree over boxes in the order of their rings.
+"""Broad phase: pairs of intersecting boxes, by the dual traversal of an implicit tree over boxes in ring order.
 
 Consecutive edges of a ring lie near each other: four make a leaf, node i has the children 2 i and 2 i + 1, and each box
 is computed from the level below. Only where one edge lies far from the next are boxes first sorted in Morton order.
@@ -98,8 +98,8 @@ def heading(ux: float, uy: float) -> int:
 
 @merged
 def _is_one_run(mark: int) -> bool:
-    """Return whether edges with these combined direction bits all head for one quadrant (never right and left, up and
-    down)."""
+    """Return whether edges with these direction bits (`heading`), combined by or, all head for one quadrant: never
+    right and left, nor up and down."""
     return (mark & 6) != 6 and (mark & 24) != 24
 
 
@@ -114,9 +114,9 @@ def _interleave_zeros(bits: int) -> int:
 
 @allocating
 def order_boxes(boxes: FloatArray, n: int, places: Any) -> bool:
-    """Fill ``places`` with 0 .. n - 1 in Morton order of the boxes' lower left corners; return whether they were
-    sorted. They stay in the given order where the path through the corners is short: in Morton order it grows like
-    ``sqrt(n)``."""
+    """Fill ``places`` with 0 .. n - 1 in Morton order of the boxes' lower left corners; return True. Return False, with
+    ``places`` ascending, if the path through the corners in the given order is short already: in Morton order it grows
+    like ``sqrt(n)``."""
     x_min = y_min = float("inf")
     x_max = y_max = float("-inf")
     way, x_last, y_last = 0.0, boxes[0, 0], boxes[0, 2]
@@ -151,8 +151,8 @@ def build_tree(tree: BoxTree, n: int, stop: FlagArray) -> None:
 
 @inline
 def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
-    """Fill ``nodes`` and ``node_marks`` from ``places``; nodes without boxes get inverted boxes. added: bits for every
-    mark."""
+    """Fill ``nodes`` and ``node_marks`` of the tree over n boxes from ``places``; nodes without boxes get inverted
+    boxes. added: bits that every leaf's mark gets besides those of its boxes."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     n_leaves = leaves_of(n)
     for leaf in range(n_leaves):
@@ -178,7 +178,8 @@ def fill_nodes(tree: BoxTree, n: int, added: int, stop: FlagArray) -> None:
 
 @merged
 def push_children(tree: BoxTree, node: int, depth: int) -> int:
-    """Push both children of a node on ``tree.stack``, the one with the lower bottom last; return the new depth."""
+    """Push both children of a node on ``tree.stack``, whose depth is ``depth``, the one with the lower bottom on top;
+    return the new depth."""
     low, high = 2 * node, 2 * node + 1
     if tree.nodes[low, 2] > tree.nodes[high, 2]:
         low, high = high, low
@@ -188,8 +189,8 @@ def push_children(tree: BoxTree, node: int, depth: int) -> int:
 
 @inline
 def _next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Continue the dual traversal: write intersecting pairs to ``tree.pairs``; return their number and the stack's
-    depth."""
+    """Continue the dual traversal of the tree over n boxes from the stack of ``depth`` entries: write intersecting
+    pairs to ``tree.pairs``; return their number and the new depth."""
     boxes, nodes, node_marks, places = tree.boxes, tree.nodes, tree.node_marks, tree.places
     stack, pairs = tree.stack, tree.pairs
     n_leaves, n_pairs, steps = leaves_of(n), 0, 0
@@ -229,15 +230,16 @@ def _all_pairs(tree: BoxTree, n: int) -> int:
 
 @inline
 def begin_pairs(tree: BoxTree) -> int:
-    """Start the self-traversal of a tree; return the depth to pass to `next_pairs`."""
+    """Start the dual traversal of a tree with itself; return the depth of its stack, to pass to `next_pairs`."""
     tree.stack[0, 0], tree.stack[0, 1] = 1, 1
     return 1
 
 
 @inline
 def next_pairs(tree: BoxTree, n: int, depth: int) -> tuple[int, int]:
-    """Write the next portion of intersecting pairs to ``tree.pairs``, each pair once; return their number and the new
-    depth. Depth 0: the traversal has ended. Caller guarantees a built tree if n > FEW."""
+    """Write the next portion of intersecting pairs of n boxes to ``tree.pairs``, each pair once; return their number
+    and the new depth of the stack. depth: of `begin_pairs`, or of the call before; 0: the traversal has ended. Caller
+    guarantees a built tree if n > FEW."""
     if n <= FEW:
         return _all_pairs(tree, n), 0
     return _next_pairs(tree, n, depth)

@@ -84,14 +84,15 @@ NEEDS_OUTPUT: Final = 2
 
 
 class PairStatus(IntEnum):
-    """Outcome of a pair that is not OPEN: DONE, or MAY_CROSS where its rounded rings may cross."""
+    """Outcome of a pair that is not OPEN. DONE: its rounded rings are proven valid; MAY_CROSS: they may cross."""
 
     DONE = 0
     MAY_CROSS = 1
 
 
 class _Span(NamedTuple):
-    """The rings of a pair: first .. first_end - 1 of its subject, second .. second_end - 1 of its clip."""
+    """The numbers of the rings of a pair: first .. first_end - 1 of its subject, second .. second_end - 1 of its clip.
+    """
 
     first: int
     first_end: int
@@ -100,9 +101,9 @@ class _Span(NamedTuple):
 
 
 class _Arrangement(NamedTuple):
-    """Counts of a pair: boundary rings, their points, crossings, edge pairs decided exactly. is_clear: clearance.py
-    proves that rounding preserves the topology. n_contacts: the scratch needed; if it exceeds what there is, the pair
-    failed."""
+    """Counts of a pair. n_boundary: boundary rings; n_points: their points; n_exact: edge pairs decided exactly;
+    is_clear: clearance.py proves that rounding preserves the topology; n_contacts: the scratch that the pair needs; if
+    it exceeds what there is, the pair failed."""
 
     n_boundary: int
     n_points: int
@@ -119,8 +120,8 @@ _NONE: Final = _Arrangement(0, 0, 0, 0, False, 0)
 def _intersect_convex(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, stop: FlagArray
 ) -> tuple[int, int, float]:
-    """Intersect two convex polygons of one ring each; return the number of points or GENERAL, the first index, the
-    displacement."""
+    """Intersect the two rings of a pair, if both are convex; return the number of points, written to the `Workspace` w,
+    or GENERAL; the index of the smallest point (x, then y); and the largest displacement by rounding."""
     first, second = span.first, span.second
     return intersect_convex(
         subjects.vertices[subjects.offsets[first] : subjects.offsets[first + 1]],
@@ -135,7 +136,9 @@ def _load_pair(
     w: Workspace, subjects: RingArrays, clips: RingArrays, span: _Span, common: Box, selected: FlagArray,
     is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Load both polygons of a pair; return the numbers of vertices and rings, whether no coordinate is too small."""
+    """Load both polygons of a pair into ``w.given``; return the numbers of vertices and rings, and whether no nonzero
+    coordinate is below SMALLEST. common: the intersection of their boxes, outside of which stretches are shortened
+    where the result has no part. is_named: the mask of a ring is its number, not the bit of its polygon."""
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, is_in_range = load_rings(
@@ -151,7 +154,8 @@ def _load_pair(
 
 @merged
 def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, stop: FlagArray) -> _Arrangement:
-    """Node a loaded pair, label its faces and trace its boundary rings into ``w.rings``. Invalid if ``stop`` is set."""
+    """Node a loaded pair, label its faces and trace its boundary rings into ``w.rings``; return the counts. selected:
+    by label the part of the result, 0 outside. The result is invalid if ``stop`` is set."""
     n, n_rings, edges = loaded.n, loaded.n_rings, w.given.edges
     margin = CLEARANCE * loaded.largest
     is_clear = fill_boxes(edges, n, margin, w.tree, stop) > margin
@@ -188,8 +192,8 @@ def _arrange(w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting
 def _arrange_chains(
     w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
 ) -> tuple[int, int]:
-    """Trace the boundary rings of a noded pair by chains and faces; return the number of rings, or NO_ROOM, and of
-    points. If ``stop`` is set, the result is invalid."""
+    """Trace the boundary rings of a noded pair into ``w.rings`` by chains and faces; return the number of rings, or
+    NO_ROOM, and of points. contacts: the result of noding. If ``stop`` is set, the result is invalid."""
     n, n_rings, edges, n_crossings = loaded.n, loaded.n_rings, w.given.edges, contacts.n_crossings
     w.stars.node_of[: n + n_crossings] = -1
     n_nodes, n_chains, n_loose = build_chains(
@@ -224,8 +228,8 @@ def _arrange_chains(
 
 @merged
 def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tuple[float, bool]:
-    """Round the points of the rings; return the largest displacement, or LOST, and whether the rounded rings are proven
-    valid."""
+    """Round the points of the rings into ``w.rounded``; return the largest displacement, or LOST, and whether the
+    rounded rings are proven valid. n: number of input vertices."""
     rings, rounded, n_boundary, n_points = w.rings, w.rounded, arranged.n_boundary, arranged.n_points
     farthest = round_points(w.given.edges, w.events, rings.point, n, arranged.n_crossings, n_points, rounded, stop)
     if farthest <= 0.0:
@@ -239,8 +243,8 @@ def _round(w: Workspace, n: int, arranged: _Arrangement, stop: FlagArray) -> tup
 
 @merged
 def _progress(pair: int, needs: int, filled: Filled, n_left_out: int) -> tuple[int, int, int, int, int, int, int]:
-    """Return (pair, needs, number of vertices, of rings, of pieces, of evidence rows, of vertices left out), for
-    `overlay_pairs`."""
+    """Return the results of `overlay_pairs` in their order: (pair, needs, numbers of vertices, rings, pieces and
+    evidence rows in ``filled``, number of vertices left out)."""
     n_vertices, n_rings, n_pieces, n_evidence = filled
     return pair, needs, n_vertices, n_rings, n_pieces, n_evidence, n_left_out
 
@@ -252,8 +256,8 @@ def overlay_pairs(
 ) -> tuple[int, int, int, int, int, int, int]:  # fmt: skip
     """Overlay the pairs from ``begin`` on; fill ``outcomes`` by pair, and the output from its beginning.
 
-    Returns the pair reached, FINISHED or NEEDS_..., the numbers of vertices, rings, pieces and evidence rows,
-    and the number of vertices left out.
+    Returns the pair reached; FINISHED, NEEDS_CONTACTS or NEEDS_OUTPUT (more room is needed for that pair); the numbers
+    of vertices, rings, pieces and evidence rows written; and the number of vertices left out.
 
     | parameter | meaning |
     | --- | --- |

@@ -42,8 +42,8 @@ class RingArrays(NamedTuple):
 
 
 class Given(NamedTuple):
-    """The rings of both polygons: edges; origins, by vertex its number in the input; tops and masks, by ring its last
-    vertex (x, then y) and the bits of its source."""
+    """The loaded rings of both polygons. edges: by vertex; origins: by vertex its number in the input; tops, masks: by
+    ring its last vertex (x, then y), and its source: bit 0 the subject, bit 1 the clip, or the number of the ring."""
 
     edges: Edges
     origins: Any
@@ -52,7 +52,8 @@ class Given(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Numbers of vertices and rings, and of edges that replace several (runs); the largest |coordinate|."""
+    """What was loaded. n, n_rings: numbers of vertices and rings; n_runs: number of edges that replace several (runs);
+    largest: the largest |coordinate|."""
 
     n: int
     n_rings: int
@@ -68,8 +69,9 @@ def is_before(vertices: FloatArray, i: int, j: int) -> bool:
 
 @inline
 def end_ring(given: Given, start: int, n: int, n_rings: int, mask: int) -> tuple[int, int]:
-    """Close the ring of vertices ``start`` .. n - 1, dropped if it has fewer than three; return the numbers of vertices
-    and rings."""
+    """Close the ring of the vertices ``start`` .. n - 1 of ``given`` as ring number n_rings, with mask ``mask``; drop
+    it if fewer than three vertices are distinct from their neighbours. Return the numbers of vertices and rings then.
+    """
     edges = given.edges
     x, y = edges.x, edges.y
     while n > start + 1 and x[n - 1] == x[start] and y[n - 1] == y[start]:
@@ -92,10 +94,10 @@ def load_rings(
     rings: RingArrays, first_ring: int, last_ring: int, mask: int, is_named: bool, base: int, box: Box, given: Given,
     n: int, n_rings: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append rings, repeated points merged, to ``given``; return the numbers of vertices and rings, and whether no
-    nonzero coordinate is below SMALLEST.
+    """Append the rings first_ring .. last_ring - 1, repeated points merged, to ``given``, after its n vertices and
+    n_rings rings; return the numbers of vertices and rings then, and whether no nonzero |coordinate| is below SMALLEST.
 
-    is_named: the mask of each ring is its number from ``first_ring`` on, instead of ``mask``. base: added to vertex
+    mask: of each ring; is_named: the mask is the ring's number from ``first_ring`` on instead. base: added to vertex
     numbers in ``origins``. box: of consecutive vertices beyond one of its sides only the first and the last are loaded.
     """
     vertices, offsets = rings.vertices, rings.offsets
@@ -162,9 +164,9 @@ def is_empty(box: Box) -> bool:
 
 @inline
 def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArray) -> float:
-    """Fill ``tree.boxes`` with the box of each edge, enlarged by the margin, and ``tree.marks`` with its direction
-    bits. Returns the least max(|dx|, |dy|) of an edge. BENT is set where the turn from the edge before, by the filter
-    of `turns`, proves that both share one vertex only."""
+    """Fill ``tree.boxes`` with the box of each of n edges, enlarged by the margin, and ``tree.marks`` with its
+    direction bits (`heading`). Returns the least max(|dx|, |dy|) of an edge; 0.0 if ``stop`` is set. BENT is added
+    where the turn from the edge before, by the filter of `turns`, proves that both share one vertex only."""
     x, y, boxes, marks = edges.x, edges.y, tree.boxes, tree.marks
     shortest = np.inf
     first = 0
@@ -194,7 +196,8 @@ def fill_boxes(edges: Edges, n: int, margin: float, tree: BoxTree, stop: FlagArr
 
 @inline
 def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> None:
-    """Mark the edges that replace several (RUN), with boxes that intersect none; the ring turns at both ends (BENT)."""
+    """Mark the edges ``runs[:n_runs]``, which replace several, as RUN, with boxes that intersect none; the ring turns
+    at both of their ends (BENT)."""
     for k in range(n_runs):
         e = runs[k]
         tree.marks[e] = ANYWHERE | BENT | RUN
@@ -204,7 +207,8 @@ def mark_runs(edges: Edges, runs: Int32Array, n_runs: int, tree: BoxTree) -> Non
 
 @kernel
 def largest_counts(ring_offsets: IntArray, polygon_offsets: IntArray) -> tuple[int, int]:
-    """Return the largest number of vertices of one polygon, and the largest number of rings."""
+    """Return the largest number of vertices of one polygon, and the largest number of rings of one. ring_offsets: of
+    rings into vertices; polygon_offsets: of polygons into rings."""
     n_vertices = n_rings = 0
     for k in range(polygon_offsets.shape[0] - 1):
         first, end = polygon_offsets[k], polygon_offsets[k + 1]

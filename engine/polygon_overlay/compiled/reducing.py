@@ -48,7 +48,7 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 @inline
 def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
-    """Return the lexicographically largest vertex (x, then y) of blocks begin .. end - 1 of a ring."""
+    """Return the lexicographically largest vertex (x, then y) of the ring that consists of blocks begin .. end - 1."""
     x_max = blocks.boxes[begin, 1]
     for i in range(begin + 1, end):
         x_max = max(x_max, blocks.boxes[i, 1])
@@ -64,8 +64,8 @@ def _top_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
 
 @inline
 def _low_of(vertices: FloatArray, blocks: Blocks, begin: int, end: int) -> int:
-    """Return the lexicographically smallest vertex (x, then y) of blocks begin .. end - 1, the end of the last
-    excluded."""
+    """Return the lexicographically smallest vertex (x, then y) of blocks begin .. end - 1; the vertex at which the last
+    block ends does not count."""
     x_min = blocks.boxes[begin, 0]
     for i in range(begin + 1, end):
         x_min = min(x_min, blocks.boxes[i, 0])
@@ -83,8 +83,10 @@ def _load_run(
     vertices: FloatArray, first: int, last: int, low: int, high: int, base: int, given: Given, runs: Int32Array, n: int,
     n_runs: int,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append the vertices that a run first .. last retains: both ends, ``low`` and ``high``, and the neighbours of
-    each. Returns the numbers of vertices and runs, and whether all coordinates are in range."""
+    """Append to ``given`` the vertices that remain of a run, vertices first .. last: both ends, its smallest and
+    largest vertex ``low`` and ``high``, and the neighbours of each. Returns the numbers of vertices and of runs then (n
+    and n_runs before), and whether all coordinates are in range. base: added to vertex numbers. runs: filled with the
+    edges that replace several."""
     x, y = given.edges.x, given.edges.y
     is_in_range = True
     k = first
@@ -110,8 +112,9 @@ def _load_ring(
     vertices: FloatArray, blocks: Blocks, begin: int, end: int, top: int, base: int, given: Given, runs: Int32Array,
     n: int, n_runs: int, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
-    """Append a ring of blocks begin .. end - 1: active blocks whole, others reduced by `_load_run`. Returns the numbers
-    of vertices and runs, and whether all coordinates are in range. runs: receives the edges that replace several."""
+    """Append to ``given`` the ring of blocks begin .. end - 1: the vertices of active blocks, and of the others what
+    `_load_run` retains. top: the ring's largest vertex (x, then y). Returns the numbers of vertices and of runs then (n
+    and n_runs before), and whether all coordinates are in range. runs: filled with the edges that replace several."""
     x, y, origins = given.edges.x, given.edges.y, given.origins
     start = n
     is_in_range = True
@@ -149,8 +152,10 @@ def _load_polygon(
     rings: RingArrays, blocks: Blocks, ring: int, mask: int, base: int, given: Given, highest: IntArray,
     runs: Int32Array, reduced: Loaded, stop: FlagArray,
 ) -> tuple[Loaded, bool]:  # fmt: skip
-    """Append a polygon to `reduced`, its inactive blocks replaced by runs; return the new counts, and whether all
-    coordinates are in range."""
+    """Append a polygon to ``given``, its inactive blocks replaced by runs; return the counts then (`reduced` before),
+    and whether all coordinates are in range. ring: number of its first ring among those of both polygons; mask: bit of
+    its source; base: added to vertex numbers; highest: by ring its largest vertex; runs: filled with the edges that
+    replace several."""
     n, n_rings, n_runs, largest = reduced
     vertices, is_in_range = rings.vertices, True
     for i_ring in range(ring, ring + rings.offsets.shape[0] - 1):
@@ -169,7 +174,9 @@ def _activate_blocks(
     subjects: RingArrays, clips: RingArrays, blocks: Blocks, end: int, margin: float, n_most: int, tree: BoxTree,
     highest: IntArray, stop: FlagArray,
 ) -> bool:  # fmt: skip
-    """Activate blocks near another block or above the top of a ring; return False if too many."""
+    """Activate the blocks that are near another block or above the top of a ring, among the ``end`` blocks of both
+    polygons; return False if n_most edges or more become active, or if stopped. highest: filled by ring with its top,
+    the largest vertex (x, then y)."""
     n_subject = subjects.offsets.shape[0] - 1
     n_rings = n_subject + clips.offsets.shape[0] - 1
     for i in range(end):
@@ -196,8 +203,9 @@ def reduce_pair(
     subjects: RingArrays, clips: RingArrays, size: int, n_most: int, stop: FlagArray, addresses: IntArray
 ) -> Loaded:
     """Load two polygons into the scratch of `overlay_pairs`, with stretches of edges that meet nothing reduced to runs.
-    size: edges of a block. n_most: with more active edges than this reduction does not pay, and the result has no
-    vertices. There is scratch for at least a thousand contacts."""
+    size: edges of a block. n_most: number of active edges from which a reduction does not pay: the result has no
+    vertices then, nor where coordinates are out of range or boxes are disjoint. Caller guarantees scratch for a
+    thousand contacts or more."""
     w = workspace_at(addresses)
     n_subject = subjects.offsets.shape[0] - 1
     blocks = Blocks(
@@ -229,7 +237,8 @@ def reduce_pair(
 
 @inline
 def count_left_out(sources: Int32Array, first: int, last: int) -> int:
-    """Return how many input vertices are omitted (LEFT_OUT) in the ring of sources ``first`` .. ``last - 1``."""
+    """Return how many input vertices are omitted (mark LEFT_OUT) in the ring whose rows of sources are first .. last -
+    1."""
     n = 0
     for k in range(first, last):
         if sources[k, 1] == LEFT_OUT:
@@ -241,8 +250,8 @@ def count_left_out(sources: Int32Array, first: int, last: int) -> int:
 def _copy(
     vertices: FloatArray, source: int, base: int, step: int, n: int, made: FloatArray, made_sources: Int32Array, at: int
 ) -> None:
-    """Write n consecutive input vertices, from number ``source`` on in direction ``step`` (1 or -1), and their sources.
-    base: number of the first of ``vertices``. at: where to write in ``made``."""
+    """Write n consecutive input vertices to ``made``, and their sources to ``made_sources``, from row ``at`` on: vertex
+    number ``source`` and the next in direction ``step`` (1 or -1). base: number of the first of ``vertices``."""
     part, numbers = made[at : at + n], made_sources[at : at + n]
     if step > 0:
         given = vertices[source - base : source - base + n]

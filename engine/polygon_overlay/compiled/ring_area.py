@@ -53,7 +53,8 @@ bound of a block."""
 
 
 class _Place(NamedTuple):
-    """A point as double-doubles (xh + xl, yh + yl) relative to an origin, and an error bound of each coordinate."""
+    """A point (xh + xl, yh + yl) as double-doubles, relative to an origin; error: bound on the error of each
+    coordinate."""
 
     xh: float
     xl: float
@@ -63,8 +64,9 @@ class _Place(NamedTuple):
 
 
 class _Pair(NamedTuple):
-    """Polygons, and a pair of them: its subject's first vertex and number of vertices, its clip's first vertex;
-    last_rings: by side, the ring that was located last."""
+    """Two polygons among many. subjects, clips: all `RingArrays`; first, n: the subject's first vertex and its number
+    of vertices; second: the clip's first vertex; last_rings: by side (0 subject, 1 clip) the ring located last, a guess
+    for the next search. Vertices of a pair are numbered subject first."""
 
     subjects: Any
     clips: Any
@@ -84,8 +86,8 @@ def _polygon_vertex(pair: _Pair, v: int) -> tuple[Any, int, int]:
 
 @merged
 def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, side: int) -> int:
-    """Return the next vertex of v's ring that differs from v (v itself if there is none). last_rings[side]: a guess of
-    the ring, updated."""
+    """Return the next vertex of v's ring whose position differs from that of v (v itself if there is none).
+    last_rings[side]: a guess of the ring that contains v, updated."""
     low, n = int(last_rings[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
         low = (v - offsets[0]) * n // (offsets[n] - offsets[0])  # where all rings are of one size
@@ -109,7 +111,7 @@ def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, si
 
 @merged
 def _edge(pair: _Pair, e: int) -> Ends:
-    """Return x, y of both ends of the edge that begins at vertex e of a pair."""
+    """Return ax, ay, bx, by of the edge that begins at vertex e of a pair."""
     vertices, v, side = _polygon_vertex(pair, e)
     after = _end_of(vertices, pair.clips.offsets if side else pair.subjects.offsets, v, pair.last_rings, side)
     return vertices[v, 0], vertices[v, 1], vertices[after, 0], vertices[after, 1]
@@ -149,7 +151,8 @@ def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
 
 @inline
 def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _Place:
-    """Return point k of the rings, an input vertex or a crossing by its ``sources``, relative to (ox, oy)."""
+    """Return the exact point of row k of ``sources``, an input vertex or a crossing of two edges, relative to (ox, oy).
+    """
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
     vertices, v, _ = _polygon_vertex(pair, sources[k, 0])
@@ -158,7 +161,8 @@ def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _P
 
 @merged
 def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
-    """Return whether the `_BLOCK` + 2 points from ``first`` on are consecutive input vertices, in either direction."""
+    """Return whether the `_BLOCK` + 2 rows of ``sources`` from ``first`` on are consecutive input vertices of one
+    polygon, in either direction."""
     last = first + _BLOCK + 1
     v, w = sources[first, 0], sources[last, 0]
     if abs(w - v) != last - first or (v < pair.n) != (w < pair.n):
@@ -173,9 +177,9 @@ def _is_stretch(pair: _Pair, sources: Int32Array, first: int) -> bool:
 
 @merged
 def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
-    """Add the area terms of the `_BLOCK` inner ones of `_BLOCK` + 2 vertices to ``sums``; return whether all
-    differences to ``ox`` are exact. sums: (3 * LANES,) totals, rounding errors, and magnitudes. sign: -1 if the ring
-    runs from the last to the first."""
+    """Add the area terms of all but the first and last of `_BLOCK` + 2 vertices (rows of ``vertices``) to ``sums``;
+    return whether all differences to ``ox`` are exact. sums: (3 * LANES,), by lane the totals, then the rounding
+    errors, then the sums of magnitudes. sign: -1.0 if the ring runs from the last to the first, else 1.0."""
     low, high = (min(0.5 * ox, 2.0 * ox), max(0.5 * ox, 2.0 * ox)) if ox != 0.0 else (-np.inf, np.inf)
     is_exact = True
     for row in range(1, _BLOCK, _LANES):
@@ -193,7 +197,9 @@ def _sum_block(vertices: FloatArray, ox: float, sign: float, sums: Any) -> bool:
 
 @inline
 def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tuple[float, float, float, float]:
-    """Return twice the area of a ring as a double-double, an error bound, and the sum of its terms' magnitudes."""
+    """Return (h, low, error, size) for the ring of rows first .. last - 1 of ``sources``: twice its area as a
+    double-double h + low, a bound on its error but for roundings of the sum, and the sum of the magnitudes of its
+    terms."""
     vertices, v, _ = _polygon_vertex(pair, sources[first, 0])
     ox, n = vertices[v, 0], (last - first) >> 2
     for k in range(first, last if n > _BLOCK else first, max(n, 1)):  # the others are likely to be like these
@@ -211,8 +217,8 @@ def _twice_area(pair: _Pair, sources: Int32Array, first: int, last: int) -> tupl
 def _twice_area_from(
     pair: _Pair, sources: Int32Array, first: int, last: int, ox: float, oy: float
 ) -> tuple[float, float, float, float]:
-    """Return twice the area of a ring as a double-double, an error bound, and the sum of its terms' magnitudes.
-    Coordinates are taken relative to (ox, oy). An error bound below 0: they must be taken relative to ``ox`` = 0."""
+    """Return what `_twice_area` does, with coordinates relative to (ox, oy). An error below 0.0: a difference to ``ox``
+    is not exact; call again with ``ox`` = 0.0."""
     before = _place(pair, sources, last - 1, ox, oy)
     now = _place(pair, sources, first, ox, oy)
     total = rest = error = size = 0.0
@@ -260,8 +266,8 @@ def sum_areas(
     """Fill ``areas``, (n,) float64, with the double nearest to the area of each group of rings, NaN if not proven.
 
     Returns the number of NaN. subject_items, clip_items: offsets of polygons into the rings of subjects and clips, a
-    pair for each area, or one for all. sources, offsets: source of each vertex, offsets of rings. groups: (n + 1,)
-    int64 offsets into the rings.
+    pair of polygons for each area, or one for all. sources, offsets: source of each vertex (`overlay_pairs`), offsets
+    of rings. groups: (n + 1,) int64 offsets of groups into the rings.
     """
     n_uncertified = 0
     last_rings = workspace(2)

@@ -46,8 +46,8 @@ Blocks = namedtuple("Blocks", "first last following boxes marks is_active firsts
 
 @inline
 def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int, stop: FlagArray) -> int:
-    """Append the blocks, of up to ``size`` edges, of all rings, as blocks n .. and rings ``ring`` ..; return the end of
-    blocks."""
+    """Append the blocks, of up to ``size`` edges each, of all rings; the first is block number n, of ring number
+    ``ring``. Return the number of blocks then."""
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     first, last, boxes = blocks.first, blocks.last, blocks.boxes
     for i_ring in range(n_rings):
@@ -70,7 +70,7 @@ def load_blocks(rings: RingArrays, size: int, blocks: Blocks, n: int, ring: int,
 
 @inline
 def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
-    """Return the box of some blocks; inverted where there is none."""
+    """Return the box around the boxes first .. last - 1; inverted (minimum above maximum) if there is none."""
     x_min = y_min = np.inf
     x_max = y_max = -np.inf
     for i in range(first, last):
@@ -81,9 +81,9 @@ def box_of_blocks(boxes: FloatArray, first: int, last: int) -> Box:
 
 @inline
 def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, stop: FlagArray) -> None:
-    """Fill the marks and successors of all blocks of rings; activate blocks without a common direction or with a
-    doubtful vertex. A vertex is doubtful if floats do not prove that the ring turns there, or that it differs from the
-    vertex before."""
+    """Fill the marks and successors of the blocks of all rings, the first of which is ring number ``ring``; activate
+    blocks without a common direction or with a doubtful vertex. A vertex is doubtful if floats do not prove that the
+    ring turns there, or that it differs from the vertex before. margin: by which edges must advance in a direction."""
     vertices, offsets, n_rings = rings.vertices, rings.offsets, rings.offsets.shape[0] - 1
     for i_ring in range(n_rings):
         start, end = offsets[i_ring], offsets[i_ring + 1]
@@ -117,7 +117,8 @@ def mark_blocks(rings: RingArrays, margin: float, blocks: Blocks, ring: int, sto
 
 @inline
 def _way(is_right: bool, is_left: bool, is_up: bool, is_down: bool) -> int:
-    """Return the mark of a block: the NOT_ bits of the directions in which not all its edges advance."""
+    """Return the mark of a block: NOT_RIGHT, NOT_LEFT, NOT_UP or NOT_DOWN for each direction in which not all its edges
+    advance. The arguments: whether all do."""
     mark = 0 if is_right else NOT_RIGHT
     mark |= 0 if is_left else NOT_LEFT
     mark |= 0 if is_up else NOT_UP
@@ -141,7 +142,7 @@ def _are_near(boxes: FloatArray, i: int, others: FloatArray, j: int, gap: float)
 
 @inline
 def count_active(blocks: Blocks, n: int) -> int:
-    """Return the number of edges of active blocks."""
+    """Return the number of edges in the active ones of n blocks."""
     n_active = 0
     for i in range(n):
         if blocks.is_active[i]:
@@ -151,9 +152,9 @@ def count_active(blocks: Blocks, n: int) -> int:
 
 @inline
 def activate_blocks_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_most: int, stop: FlagArray) -> bool:
-    """Activate each block whose box is within ``gap`` of another's; return False if this makes too many edges active.
-    tree: built over the boxes of n blocks, with all mark bits on the last block of each ring. n_most: number of edges
-    that is too many."""
+    """Activate each of n blocks whose box is within ``gap`` of another's, except for consecutive blocks with a common
+    direction; return False if n_most edges or more become active, the traversal takes too long, or it is stopped. tree:
+    built over the boxes of the blocks, with the mark EVERYWHERE on the last block of each ring."""
     nodes, stack = tree.nodes, tree.stack
     n_active = count_active(blocks, n)
     n_leaves, visits = leaves_of(n), _VISITS * n
@@ -179,14 +180,16 @@ def activate_blocks_near(blocks: Blocks, n: int, gap: float, tree: BoxTree, n_mo
 
 @merged
 def _head_together(mark: int, other: int) -> bool:
-    """Return whether consecutive blocks with these marks have a common direction."""
+    """Return whether two consecutive blocks with these marks have a common direction in which all edges of both advance
+    (a mark has the NOT_ bits of the directions in which they do not)."""
     return (mark | other) & EVERYWHERE != EVERYWHERE
 
 
 @inline
 def _activate_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, leaf: int, other: int) -> int:
-    """Activate the near blocks of two leaves; return the number of edges in the blocks newly activated. Consecutive
-    blocks with a common direction are exempt."""
+    """Activate the blocks of leaf ``leaf`` and leaf ``other`` of the tree over n blocks that are within ``gap`` of each
+    other; return the number of edges in the blocks newly activated. places: the blocks in the order of the leaves.
+    Consecutive blocks with a common direction are exempt."""
     first, last, boxes, marks, is_active = blocks.first, blocks.last, blocks.boxes, blocks.marks, blocks.is_active
     n_activated = 0
     low, high = LEAF * leaf, LEAF * other
@@ -206,7 +209,8 @@ def _activate_in_leaves(blocks: Blocks, n: int, gap: float, places: Int32Array, 
 
 @inline
 def activate_blocks_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxTree) -> None:
-    """Activate all blocks that may contain the first edge above the point (x, y), a step to its right."""
+    """Activate all of n blocks that may contain the first edge above the point (x, y), an infinitesimal step to its
+    right. tree: over their boxes."""
     ceiling = float("inf")  # certainly above the edge that is next above the point
     for is_searching in (True, False):
         tree.stack[0, 0], depth = 1, 1
@@ -231,6 +235,6 @@ def activate_blocks_above(blocks: Blocks, n: int, x: float, y: float, tree: BoxT
 
 @merged
 def _is_above(boxes: FloatArray, i: int, x: float, y: float, ceiling: float) -> bool:
-    """Return whether a box intersects the ray from (x, y) straight up, a step to the right, at or below height
-    ``ceiling``."""
+    """Return whether box i intersects the ray from (x, y) straight up, an infinitesimal step to the right, at or below
+    height ``ceiling``."""
     return not (boxes[i, 0] > x or boxes[i, 1] <= x or boxes[i, 3] < y or boxes[i, 2] > ceiling)

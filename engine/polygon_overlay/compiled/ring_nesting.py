@@ -35,7 +35,7 @@ _NOT_YET: Final = -2
 
 
 class Rule(IntEnum):
-    """The fill rule: which faces are inside."""
+    """The fill rule: which faces of the arrangement are inside."""
 
     AGAIN = 0
     """Inside a shell and in no hole of that shell; used for rounded rings."""
@@ -85,9 +85,9 @@ FloodFill = namedtuple("FloodFill", "sources place stamp link first entered ring
 
 @merged
 def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFill, half: int, n_sources: int) -> int:
-    """Toggle the sources that bound a half-chain, crossed from its left; return the number of sources around the face
-    beyond. By PAIR and by the rules of winding numbers ``n_sources`` and the result are a label or a winding number
-    instead."""
+    """Update the state of the flood fill, n_sources, on a step from the left of half-chain ``half`` to its right;
+    return the new state. By the rule PAIR it is the label of the face, by rules of winding numbers that number, by
+    other rules the number of sources that contain the face, listed in ``h.sources``."""
     chain = half >> 1
     if nesting.rule == Rule.PAIR:
         return n_sources ^ chains.mask[chain]
@@ -111,8 +111,8 @@ def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFi
 
 @merged
 def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> int:
-    """Return the part of the result that a face belongs to, 0 for none, by any fill rule but AGAIN (see `Rule`).
-    n_sources: number of sources around the face; by PAIR its label, by the rules of winding numbers that number."""
+    """Return the part of the result that a face belongs to, 0 for none, by any fill rule but AGAIN. n_sources: the
+    state of the flood fill in the face (`_cross_half_chain`). selected: by label the part, for the rule PAIR."""
     if rule == Rule.PAIR:
         return int(selected[n_sources])
     if rule == Rule.FIRST_ALONE:
@@ -122,9 +122,9 @@ def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> in
 
 @merged
 def _classify_face(nesting: Nesting, h: FloodFill, face: int, n_sources: int, n: int) -> tuple[bool, int]:
-    """Return whether a face is inside a shell and in none of its holes (rule AGAIN), and the new number of evidence
-    entries, or NO_ROOM. n: number of entries before. The face lies in the rings ``h.sources[:n_sources]``; its evidence
-    are those shells, or the innermost holes if it is outside."""
+    """Return whether a face is inside by the rule AGAIN (in a shell and in none of its holes), and the new number of
+    evidence entries, or NO_ROOM. The face lies in the rings ``h.sources[:n_sources]``. Entries are appended after the n
+    there: those shells, or the innermost holes if the face is outside."""
     shells, sizes, room = nesting.shells, nesting.sizes, h.ring.shape[0]
     least = float("inf")
     for k in range(n_sources):
@@ -152,9 +152,9 @@ def propagate_labels(
     given: Given, chains: Chains, faces: Faces, nesting: Nesting, h: FloodFill, selected: FlagArray,
     sizes: tuple[int, int], stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Fill ``faces.inside`` by flood fill over half-chains, and append evidence entries; return their number, or
-    NO_ROOM. selected: see `overlay_pairs`. sizes: numbers of chains and cycles. ``faces.joined`` joins the cycles of
-    one face."""
+    """Fill ``faces.inside`` (by cycle the part of the result, 0 outside) by flood fill over half-chains, and append
+    evidence entries to ``h``; return their number, or NO_ROOM. selected: by label the part, for the rule PAIR. sizes:
+    numbers of chains and cycles. ``faces.joined`` is filled: it unites the cycles of one face."""
     n_chains, n_cycles = sizes
     cycle, joined, inside = faces.cycle, faces.joined, faces.inside
     for ring in range(nesting.shells.shape[0]):
@@ -200,8 +200,9 @@ def propagate_labels(
 def group_provenance_by_region(
     faces: Faces, h: FloodFill, n_entries: int, n_cycles: int, n_rings: int, stop: FlagArray
 ) -> None:
-    """Link the n_entries evidence entries of faces into one list a region, each source ring once (``h.region``,
-    ``h.after``). ``faces.regions`` is filled."""
+    """Link the n_entries evidence entries of faces into one list a region, in which each of the n_rings source rings
+    occurs once: fill ``h.region`` (first entry) and ``h.after`` (next entry, -1 at the end). ``faces.regions`` is
+    filled."""
     for i in range(n_cycles + 1):
         h.region[i] = h.entered[
             i
@@ -228,7 +229,8 @@ def group_provenance_by_region(
 
 @merged
 def record_adjacent_regions(faces: Faces, h: FloodFill, path: Int32Array, first: int, last: int, n_rings: int) -> None:
-    """Append to ``h.beyond`` the regions beyond ring n_rings, whose half-chains are ``path[first:last]``."""
+    """Append to ``h.beyond`` the regions on the other side of the result's ring number n_rings, each once; its
+    half-chains are ``path[first:last]``."""
     n = h.offset[n_rings]
     for k in range(first, last):
         region = root_of(faces.regions, faces.cycle[path[k] ^ 1])
@@ -242,9 +244,9 @@ def record_adjacent_regions(faces: Faces, h: FloodFill, path: Int32Array, first:
 def write_evidence(
     h: FloodFill, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: IntArray, n: int
 ) -> int:  # fmt: skip
-    """Append a row (``name``, ``base`` + source) for each source ring of one result ring; return the number of rows, or
-    NO_ROOM. The sources of a shell are those of its own region, the sources of a hole those of the regions on its other
-    side."""
+    """Append to ``evidence``, after its n rows, a row (``name``, ``base`` + source ring) for each source ring of one
+    ring of the result; return the number of rows then, or NO_ROOM. The sources of a shell are those of its region
+    ``region``, the sources of a hole those of the regions on its other side."""
     for at in range(h.offset[ring] if is_hole else 0, h.offset[ring + 1] if is_hole else 1):
         k = h.region[h.beyond[at] if is_hole else region]
         while k >= 0:  # bound: the entries of the region

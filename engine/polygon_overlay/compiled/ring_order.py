@@ -32,7 +32,8 @@ in canonical order; spare: scratch."""
 
 @inline
 def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int) -> bool:
-    """Return whether ring i precedes ring j in canonical order: by piece, shell before holes, then vertex by vertex."""
+    """Return whether ring i precedes ring j in canonical order: by piece, the shell before holes, then
+    lexicographically vertex by vertex."""
     x, y = rounded.x, rounded.y
     if ranking.piece[i] != ranking.piece[j]:
         return ranking.piece[i] < ranking.piece[j]
@@ -56,8 +57,9 @@ def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int)
 
 @inline
 def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece: bool, stop: FlagArray) -> None:
-    """Merge-sort the first n entries of ``ranking.order``, runs of doubling length. is_by_piece: the rings belong to
-    several pieces."""
+    """Sort the first n rings of ``ranking.order`` into canonical order, by merging runs of doubling length.
+    is_by_piece: the rings are of several pieces; if False, all are shells, and the x of their first vertices decides
+    nearly always."""
     order, spare, first_x = ranking.order, ranking.spare, ranking.x
     width = 1
     while width < n:  # bound: log n turns
@@ -88,9 +90,12 @@ def _sort(rings: Rings, ranking: Ranking, rounded: Rounded, n: int, is_by_piece:
 
 @inline
 def find_shells(rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, widest: Any, boxes: FloatArray) -> bool:
-    """Fill ``ranking.is_hole`` for rings whose orientation rounding may have changed; return False if it is ambiguous.
+    """Fill ``ranking.is_hole`` for rings whose orientation rounding may have changed; return False if a region has not
+    exactly one possible shell.
+
     Rounding is monotone, so the rounded box of a shell contains those of its holes: the shell of a region is the only
-    ring whose box contains all others and equals none. widest: scratch by region. boxes: scratch by ring."""
+    ring whose box contains all others and equals none. widest, boxes: scratch by region, by ring.
+    """
     x, y = rounded.x, rounded.y
     for ring in range(n_rings):
         x_min = y_min = np.inf
@@ -116,9 +121,9 @@ def rank_rings(
     rings: Rings, n_rings: int, rounded: Rounded, ranking: Ranking, is_valid: bool, piece_of: Int32Array,
     boxes: FloatArray, stop: FlagArray,
 ) -> int:  # fmt: skip
-    """Sort rings into canonical order (``ranking``); return the number of pieces, -1 if a region has not one proven
-    shell. is_valid: rounding preserved the topology of the rings. piece_of: scratch by region; boxes: scratch by ring.
-    """
+    """Fill ``ranking``, with the rings in canonical order; return the number of pieces, or -1 if a region has not
+    exactly one proven shell or ``stop`` is set. is_valid: rounding is proven to preserve the topology of the rings.
+    piece_of, boxes: scratch by region, by ring."""
     if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
     n_pieces = 0
@@ -156,7 +161,8 @@ def rank_rings(
 
 @inline
 def _turn_at_first(rings: Rings, ring: int, rounded: Rounded, ranking: Ranking, stop: FlagArray) -> int:
-    """Write the smallest vertex (x, then y) of a ring to ``ranking``; return the turn's sign there, 0 if stopped."""
+    """Write to ``ranking`` the index and coordinates of the smallest vertex (x, then y) of a ring; return the sign of
+    the ring's turn there (1 left, -1 right), 0 also if stopped."""
     x, y = rounded.x, rounded.y
     first, last = rings.offset[ring], rings.offset[ring + 1]
     low = first
@@ -189,7 +195,8 @@ def has_room(output: Output, filled: Filled, n_vertices: int, n_rings: int) -> b
 
 @merged
 def write_convex(w: Any, m: int, low: int, output: Output, filled: Filled) -> None:
-    """Append the ring of m points that `_intersect_convex` computed, from its point ``low`` on."""
+    """Append the ring of m points that `intersect_convex` left in the `Workspace` w, beginning at its point ``low``, to
+    the output, of which ``filled`` is taken. Caller guarantees room."""
     i = low
     for k in range(filled.n_vertices, filled.n_vertices + m):
         output.vertices[k, 0], output.vertices[k, 1] = w.rounded.x[i], w.rounded.y[i]
@@ -201,7 +208,8 @@ def write_convex(w: Any, m: int, low: int, output: Output, filled: Filled) -> No
 
 @merged
 def _source_of(w: Any, n: int, i: int) -> tuple[int, int]:
-    """Return the source of point i of the rings, encoded as in `overlay_pairs`."""
+    """Return the row of ``sources`` for point i of the rings in the `Workspace` w, encoded as in the table of
+    `overlay_pairs`. n: number of input vertices."""
     point, edge, origins = w.rings.point[i], w.rings.edge[i], w.given.origins
     if point >= n:
         first, second = w.events.first[point - n], w.events.second[point - n]
@@ -214,7 +222,8 @@ def _source_of(w: Any, n: int, i: int) -> tuple[int, int]:
 
 @merged
 def write_rings(w: Any, n: int, n_boundary: int, output: Output, filled: Filled, stop: FlagArray) -> None:
-    """Append the n_boundary rings to the output in canonical order. n: number of input vertices."""
+    """Append the n_boundary rings in the `Workspace` w to the output in canonical order. n: number of input vertices;
+    filled: what of the output is taken. Caller guarantees room."""
     n_out, n_pieces = filled.n_vertices, filled.n_pieces
     for k in range(n_boundary):
         ring = w.ranking.order[k] if n_boundary > 1 else 0
@@ -235,9 +244,8 @@ def write_rings(w: Any, n: int, n_boundary: int, output: Output, filled: Filled,
 
 @merged
 def write_provenance(w: Any, n_boundary: int, first: int, output: Output, filled: Filled) -> int:
-    """Append the evidence rows (ring, source ring) of all rings; return the number of rows then, or NO_ROOM. first:
-    number of the pair's first source ring.
-    """
+    """Append the evidence rows (ring, source ring) of the n_boundary rings in the `Workspace` w to the output; return
+    the number of rows then, or NO_ROOM. first: number of the pair's first source ring."""
     n = filled.n_evidence
     for k in range(n_boundary):
         ring = w.ranking.order[k] if n_boundary > 1 else 0
@@ -250,7 +258,8 @@ def write_provenance(w: Any, n_boundary: int, first: int, output: Output, filled
 
 @merged
 def write_component_ids(w: Any, n_boundary: int, output: Output, filled: Filled) -> int:
-    """Append a row (ring, part of the result that it bounds) for each ring; return the number of rings then."""
+    """Write to ``output.evidence`` a row (ring, part of the result that it bounds) for each of the n_boundary rings in
+    the `Workspace` w; return the number of rings in the output then."""
     for k in range(n_boundary):
         ring = w.ranking.order[k] if n_boundary > 1 else 0
         at = filled.n_rings + k

@@ -42,7 +42,8 @@ def _pixel(x: float) -> float:
 
 @called
 def _passes(ax: float, ay: float, bx: float, by: float, x: float, y: float, reach: float) -> bool:
-    """Return whether the segment ab intersects the half-open square of half-side ``reach`` about (x, y)."""
+    """Return whether the segment ab meets the square of half-side ``reach`` about (x, y), which contains its left and
+    lower side, not the others. Exact."""
     if bx < ax:
         ax, ay, bx, by = bx, by, ax, ay
     left, right, low, high = x - reach, x + reach, y - reach, y + reach
@@ -66,8 +67,9 @@ def scale(
     least: float,
     scaled: FloatArray,
 ) -> float:
-    """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest magnitude before rounding.
-    A value within a relative ``near_integer`` of an integer becomes that integer; a value below ``least``, zero."""
+    """Fill ``scaled``, (n, 2), with ``values / divisor * factor * more``; return the largest of these magnitudes. The
+    factors convert between coordinates and multiples of a grid (`Grid.into`, `Grid.back`). near_integer: a value within
+    this relative distance of an integer becomes that integer; least: one of smaller magnitude becomes 0.0."""
     largest = 0.0
     for k in range(values.shape[0]):
         for axis in range(2):
@@ -95,9 +97,9 @@ def _find_pixels(vertices: FloatArray, pixels: FloatArray, stop: FlagArray) -> i
 def _find_corners(
     pixels: FloatArray, offsets: IntArray, pieces: IntArray, corners: Int32Array, starts: IntArray, stop: FlagArray
 ) -> int:
-    """Fill ``corners`` with the vertices where snapped rings turn, and ``starts`` with the offsets of rings into them.
-    Returns the number of corners, or FOLDS if a ring turns back, begins at another vertex than before, or is out of
-    order."""
+    """Fill ``corners`` with the vertices where snapped rings turn, and ``starts`` with the offsets of rings into them;
+    return the number of corners. FOLDS instead if a ring turns back, no longer begins at its smallest vertex, or rings
+    are no longer in canonical order. pixels: by vertex its integer point; offsets, pieces: of rings and pieces."""
     piece = n = 0
     for ring in range(offsets.shape[0] - 1):
         first, last = offsets[ring], offsets[ring + 1]
@@ -135,7 +137,8 @@ def _find_corners(
 
 @merged
 def _add_passage(passages: Int32Array, m: int, edges: Edges, e: int, f: int, px: float, py: float) -> int:
-    """Append (e, f) to ``passages`` if edge e passes the pixel (px, py) of vertex f; return the number of passages."""
+    """Write (e, f) to row m of ``passages`` if edge e passes the pixel (px, py) of vertex f; return the number of
+    passages then, which may exceed the room."""
     x, y, b = edges.x, edges.y, edges.after[e]
     if not _passes(x[e], y[e], x[b], y[b], px, py, 0.5):
         return m

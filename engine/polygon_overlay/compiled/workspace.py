@@ -78,8 +78,9 @@ Outcomes = namedtuple("Outcomes", "status counts displacement")
 
 @dataclass(frozen=True, slots=True)
 class Scratch:
-    """Arrays that the kernel writes to, for pairs of at most n_vertices, n_rings and n_contacts. outcome: room for one
-    pair. addresses: sizes and addresses of buffers and output, for `workspace_at` and `output_at`."""
+    """Arrays that the kernel writes to, for pairs of at most n_vertices vertices, n_rings rings and n_contacts
+    contacts. outcome: room for the outcome of one pair. addresses: sizes and addresses of buffers and output, which
+    `workspace_at` and `output_at` read."""
 
     n_bytes: int
     n_vertices: int
@@ -92,9 +93,10 @@ class Scratch:
 
 
 def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_out_rings: int) -> Scratch:
-    """Return scratch of at least these sizes, from the pool or new; the caller returns it by `return_scratch`. The
-    output has room for one pair of that size: every contact adds at most a vertex and a ring. Pages that are not
-    written to cost nothing; fresh pages cost more than the kernel does."""
+    """Return scratch of at least these sizes, from the pool or new; the caller hands it back by `return_scratch`.
+    n_out, n_out_rings: least room for vertices and rings in the output, which always fits one pair of the other sizes:
+    a contact adds at most a vertex and a ring. Pages that are not written to cost nothing; fresh pages cost more than
+    the kernel does."""
     try:
         pooled: Scratch | None = _pool.pop()
     except IndexError:  # no check before: another thread may be quicker
@@ -122,7 +124,8 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
 
 
 def scratch_for_few() -> Scratch:
-    """Return scratch for one pair of up to `FEW_VERTICES`; the caller appends it to `small_pool`."""
+    """Return scratch for one pair of up to `FEW_VERTICES` vertices; the caller appends it to `small_pool` afterwards.
+    """
     try:
         return small_pool.pop()
     except IndexError:  # as in scratch_for
@@ -130,12 +133,14 @@ def scratch_for_few() -> Scratch:
 
 
 def first_contacts(n_vertices: int) -> int:
-    """Return the room for contacts to try first: few for large polygons, so that the scratch fits the pool."""
+    """Return the room for contacts to try first for a pair of n_vertices: few for large polygons, so that the scratch
+    fits the pool."""
     return max(256, min(4 * n_vertices, n_vertices + _MORE_CONTACTS))
 
 
 def more_contacts(n: int) -> int:
-    """Return the room for contacts to try after ``n``: eight times as much, or twice where memory may be refused."""
+    """Return the room for contacts to try after n did not suffice: 8 n, or 2 n where that much memory may be refused.
+    """
     return 8 * n if n < _MANY_CONTACTS else 2 * n
 
 
