@@ -42,7 +42,8 @@ Pair = tuple[float, float]
 
 
 class _Quadratic(NamedTuple):
-    """The quadratic a t^2 + 2 b t + c': a, b, c', its value at t = 1, D = b^2 - a c', and an error bound of each."""
+    """The quadratic a t^2 + 2 b t + c' of a segment and a ball. a, b, gap: double-doubles, gap = b^2 - a c'; c, at_q:
+    its values at t = 0 and t = 1; each with an error bound."""
 
     a: Pair
     b: Pair
@@ -58,7 +59,7 @@ class _Quadratic(NamedTuple):
 
 @inline
 def difference(p: Triple, q: Triple) -> Vector:
-    """Return q - p, each coordinate an exact pair of doubles."""
+    """Return q - p, each coordinate an exact pair of doubles (rounded difference, its rounding error)."""
     return two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2])
 
 
@@ -72,13 +73,13 @@ def sign_of(value: float, bound: float) -> int:
 
 @inline
 def _size(v: Vector) -> float:
-    """Return the 1-norm of a vector of pairs, by their heads."""
+    """Return the 1-norm of a vector of pairs (head, tail), by the heads alone."""
     return abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0])
 
 
 @inline
 def _dot(a: Vector, b: Vector) -> Pair:
-    """Return the scalar product of two vectors of pairs, as a double-double."""
+    """Return the scalar product of two vectors of pairs (head, tail), as a double-double."""
     xh, xl = dd_mul(a[0][0], a[0][1], b[0][0], b[0][1])
     yh, yl = dd_mul(a[1][0], a[1][1], b[1][0], b[1][1])
     zh, zl = dd_mul(a[2][0], a[2][1], b[2][0], b[2][1])
@@ -88,7 +89,8 @@ def _dot(a: Vector, b: Vector) -> Pair:
 
 @inline
 def _in_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
-    """Return the quadratic computed in doubles from the heads of d = q - p and f = p - c."""
+    """Return the quadratic of a segment and a ball, computed in doubles from the heads of d = q - p and f = p - c.
+    blur: error of each coordinate of f."""
     d_size, f_size = _size(d), _size(f)
     a = d[0][0] * d[0][0] + d[1][0] * d[1][0] + d[2][0] * d[2][0]
     b = d[0][0] * f[0][0] + d[1][0] * f[1][0] + d[2][0] * f[2][0]
@@ -104,7 +106,8 @@ def _in_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
 
 @inline
 def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Quadratic:
-    """Return the quadratic computed in double-doubles from d = q - p and f = p - c."""
+    """Return the quadratic of a segment and a ball, computed in double-doubles from d = q - p and f = p - c. blur:
+    error of each coordinate of f."""
     d_size, f_size = _size(d), _size(f)
     ah, al = _dot(d, d)
     bh, bl = _dot(d, f)
@@ -126,8 +129,8 @@ def _in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> _Qua
 
 @inline
 def _meets(e: _Quadratic) -> tuple[int, int, int]:
-    """Return whether a segment meets a ball (1, -1 or UNDECIDED), and the same for p and q outside, from a quadratic
-    with bounds. See `meets_ball`."""
+    """Return what `meets_ball` does (meets, p outside, q outside; each 1, -1 or UNDECIDED) as far as a quadratic with
+    bounds proves it."""
     a, b, gap = e.a[0], e.b[0], e.gap[0]
     past = e.a_bound + e.b_bound + 2.0**-50 * (a + abs(b))
     of_p, of_q = sign_of(e.c, e.c_bound), sign_of(e.at_q, e.q_bound)
@@ -139,7 +142,8 @@ def _meets(e: _Quadratic) -> tuple[int, int, int]:
 
 @called
 def _meets_in_double_doubles(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, int, int]:
-    """Return what `meets_ball` does, by double-doubles: meets, p outside, q outside, each 1, -1 or UNDECIDED."""
+    """Return what `meets_ball` does (meets, p outside, q outside; each 1, -1 or UNDECIDED), by double-doubles. d = q -
+    p, f = p - c; blur: error of each coordinate of f."""
     return _meets(_in_double_doubles(d, f, blur, radius))
 
 
@@ -162,8 +166,9 @@ def meets_ball(d: Vector, f: Vector, blur: float, radius: float) -> tuple[int, i
 
 @inline
 def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, of_q: int) -> tuple[int, End, End]:
-    """Return 1 and both ends, for `put_piece`, of the piece of a segment in a ball; or UNDECIDED. of_p, of_q: 1 if that
-    end is outside, so that a root replaces it."""
+    """Return 1 and both ends (t, t_low, slack, face) of the piece of a segment in a ball; or UNDECIDED and any ends. d
+    = q - p, f = p - c; blur: error of each coordinate of f. of_p, of_q: 1 if that end is outside, so that a root
+    replaces it, -1 if inside."""
     first, last = OWN_START, OWN_END
     if of_p < 0 and of_q < 0:
         return 1, first, last
@@ -201,8 +206,8 @@ def decide_on_sphere(
     segments: FloatArray, center: FloatArray, radius: float, first: int, last: int, stop: FlagArray, items: Int32Array,
     planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide which ``segments[first:last]`` ((n, 2, dim) float64) meet the closed ball; outputs: table of
-    `decide_on_boxes`."""
+    """Decide which ``segments[first:last]`` ((n, 2, dim) float64) meet the closed ball; the other arguments are in the
+    table of `decide_on_boxes`. planes: 0 for an end on the sphere, -1 for an end of the segment."""
     n_accepted, n_open = 0, 0
     for i in range(first, last):
         if stop[0]:

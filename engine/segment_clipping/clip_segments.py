@@ -167,7 +167,7 @@ def plan_for(region: Solid) -> Plan:
 
 
 def on_box(region: Aabb) -> Plan:
-    """Return the clipping plan of a box: Cohen-Sutherland."""
+    """Return the clipping plan of a box: the kernels of Cohen-Sutherland clipping."""
     low, high = region.min, region.max
 
     def with_columns(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -182,7 +182,7 @@ def on_box(region: Aabb) -> Plan:
 
 
 def on_planes(region: HalfSpace | Convex) -> Plan:
-    """Return the clipping plan of a half-space or convex solid: Cyrus-Beck."""
+    """Return the clipping plan of a half-space or convex solid: the kernels of Cyrus-Beck clipping."""
     rows = rows_of(region)
     plain = balanced_rows(rows, 0)
 
@@ -196,7 +196,7 @@ def on_planes(region: HalfSpace | Convex) -> Plan:
 
 
 def on_ball(region: Sphere) -> Plan:
-    """Return the clipping plan of a ball: roots of a quadratic."""
+    """Return the clipping plan of a ball: the kernels that compute roots of a quadratic."""
     center, radius = region.center, float(region.radius)
 
     def scale(segments: FloatArray) -> Scaled | None:

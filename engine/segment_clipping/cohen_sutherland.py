@@ -56,9 +56,9 @@ that of the high parts is exact within a factor of two, and elsewhere does not m
 
 
 class PlaneCrossing(NamedTuple):
-    """The crossing of a segment with a plane of a slab. t, t_low: parameter, a double-double. n, d: at - p and q - p on
-    the plane's axis, rounded; t = n / d. is_exact: both differences are exact. plane: 0.0 .. 5.0, or -1.0 for none,
-    with a t outside of [0, 1] that equals no other."""
+    """The crossing of a segment with a plane of a slab, at t = n / d. t, t_low: the parameter as a double-double. n, d:
+    at - p and q - p on the plane's axis, rounded. is_exact: both differences are exact. plane: 0.0 .. 5.0 for xmin,
+    xmax, ymin, ..., or -1.0 for no crossing, with a t outside of [0, 1] that equals no other."""
 
     t: float
     t_low: float
@@ -70,8 +70,8 @@ class PlaneCrossing(NamedTuple):
 
 @merged
 def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing:
-    """Return the crossing of a segment with the plane x = at; p, q: coordinates of its ends on that axis. plane: its
-    number, copied."""
+    """Return the crossing of a segment with the plane at `at` across an axis. p, q: coordinates of its ends on that
+    axis. plane: number of the plane, copied to the result."""
     n, n_low = two_diff(at, p)
     d, d_low = two_diff(q, p)
     d = d if p != q else 1.0  # not met: any number
@@ -83,8 +83,8 @@ def plane_crossing(p: float, q: float, at: float, plane: float) -> PlaneCrossing
 def slab_crossings(
     p: float, q: float, low: float, high: float, axis: float
 ) -> tuple[PlaneCrossing, PlaneCrossing, bool]:
-    """Return the crossings where a segment enters and leaves the slab low .. high; False if q - p is out of range. p,
-    q: coordinates of its ends on the axis (0.0, 1.0, 2.0)."""
+    """Return the crossings where a segment enters and leaves the slab low .. high, and False if |q - p| is too small or
+    large for their bounds, else True. p, q: coordinates of its ends on the axis `axis`, 0.0, 1.0 or 2.0."""
     is_entered, is_left = (p < low) | (p > high), (q < low) | (q > high)
     entered = plane_crossing(p, q, low if p < low else high, 2.0 * axis if p < low else 2.0 * axis + 1.0)
     left = plane_crossing(p, q, low if q < low else high, 2.0 * axis if q < low else 2.0 * axis + 1.0)
@@ -97,8 +97,8 @@ def slab_crossings(
 
 @merged
 def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]:
-    """Return the parameter of a minus that of b, and whether its sign is proven; exactly 0.0 if both are proven equal.
-    Of exact differences equality is n_a d_b = n_b d_a (lattices: diagonals through corners)."""
+    """Return the parameter of crossing a minus that of b, and whether its sign is proven; 0.0 and True if both are
+    proven equal. If all differences are exact, equality is n_a d_b = n_b d_a (lattices: diagonals through corners)."""
     gap = (a.t - b.t) + (a.t_low - b.t_low)
     left, left_tail = two_prod(a.n, b.d)
     right, right_tail = two_prod(b.n, a.d)
@@ -108,8 +108,9 @@ def compare_parameters(a: PlaneCrossing, b: PlaneCrossing) -> tuple[float, bool]
 
 @merged
 def slab(p: float, q: float, low: float, high: float, not_entered: float, not_left: float) -> tuple[float, float]:
-    """Return the parameters at which a segment enters and leaves low .. high, in doubles. p, q: coordinates of its ends
-    on the axis. not_entered, not_left: returned where it does not."""
+    """Return the parameters at which a segment enters and leaves the slab low .. high (slab test on one axis), in
+    doubles. p, q: coordinates of its ends on the axis. not_entered, not_left: returned instead if p, or q, is within
+    the slab."""
     d = q - p if p != q else 1.0  # not met: any number
     enters, leaves = ((low if p < low else high) - p) / d, ((low if q < low else high) - p) / d
     return (enters if (p < low) | (p > high) else not_entered), (leaves if (q < low) | (q > high) else not_left)
@@ -117,8 +118,8 @@ def slab(p: float, q: float, low: float, high: float, not_entered: float, not_le
 
 @merged
 def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Return state, plane entered and plane left (-1.0: none) of segment p q in a box low .. high. State: 0.0 REJECTED,
-    1.0 ACCEPTED, 2.0 OPEN, if doubles do not prove it."""
+    """Return (state, plane entered, plane left) of segment p q in the box low .. high; planes 0.0 .. 5.0, or -1.0 for
+    none. State: 0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN if doubles do not prove it."""
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, low, high
     misses = (max(px, qx) < x0) | (min(px, qx) > x1) | (max(py, qy) < y0) | (min(py, qy) > y1)
     misses = misses | (max(pz, qz) < z0) | (min(pz, qz) > z1)  # the outcodes share a bit
@@ -141,8 +142,8 @@ def decide_in_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple
 
 @merged
 def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) -> Triple:
-    """Return state, plane entered and plane left (-1.0: none) of segment p q in a box low .. high, proven in
-    double-doubles. State: 0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN."""
+    """Return (state, plane entered, plane left) of segment p q in the box low .. high, as `decide_in_doubles`, but by
+    double-doubles."""
     a, d, is_x = slab_crossings(p[0], q[0], low[0], high[0], 0.0)
     b, e, is_y = slab_crossings(p[1], q[1], low[1], high[1], 1.0)
     c, f, is_z = slab_crossings(p[2], q[2], low[2], high[2], 2.0)
@@ -177,7 +178,7 @@ def decide_on_boxes(
     |---|---|
     | columns | of the box's plane rows, see `as_columns` |
     | items (m,) int32 | out: the segments that are accepted, in order |
-    | planes (m, 2) int32 | out: the planes entered and left, -1 for an end of the segment |
+    | planes (m, 2) int32 | out: the planes entered and left, 0 .. 5 for xmin, xmax, ...; -1: an end of the segment |
     | still (m,) int32 | out: the segments left OPEN |
     | n (3,) int64 | out: how many are accepted, OPEN, and beyond the filter |
     | stop (1,) uint8 | polled |

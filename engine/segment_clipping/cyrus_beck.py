@@ -42,7 +42,8 @@ NARROWEST: Final = 2.0**-960
 
 
 class Latest(NamedTuple):
-    """The last plane that a segment crosses: at t +- slack; rival: largest t that any other plane may have."""
+    """The last of the planes that a segment crosses. t, slack: its parameter, to +- slack; plane: its number, -1.0 for
+    none; rival: upper bound on the parameter of every other plane."""
 
     t: float
     slack: float
@@ -51,9 +52,9 @@ class Latest(NamedTuple):
 
 
 def as_columns(rows: FloatArray) -> FloatArray:
-    """Return plane rows (m, dim + 1) as columns (dim + 3, m), with two columns of error bounds. The bounds of a value
-    in doubles: relative to the largest coordinate, and absolute. They are zero if a value is a coordinate and a number,
-    rounded once: its sign is exact, and comparisons have room for a rounding of each."""
+    """Return plane rows (m, dim + 1) as columns (dim + 3, m), the last two of which bound the error of a plane's value
+    in doubles: per unit of the largest coordinate, and absolutely. Both are 0.0 if the value is one coordinate plus a
+    number, rounded once: its sign is exact, and comparisons have room for a rounding of each."""
     with np.errstate(all="ignore"):  # what overflows bounds nothing, and is left to exact arithmetic
         slope = VALUE_BOUND * np.abs(rows[:, :-1]).sum(axis=1)
         floor = VALUE_BOUND * np.abs(rows[:, -1]) + VALUE_TINY
@@ -66,7 +67,8 @@ def as_columns(rows: FloatArray) -> FloatArray:
 
 @inline
 def are_safe(row: FloatArray, segment: FloatArray) -> bool:
-    """Return whether all numbers of a plane row and segment are zero or in the range in which expansions are exact."""
+    """Return whether all numbers of a plane row (dim + 1,) and a segment (2, dim) are zero or in the range in which
+    expansions are exact."""
     safe = True
     for k in range(row.size):
         safe = safe and is_safe(row[k])
@@ -77,7 +79,7 @@ def are_safe(row: FloatArray, segment: FloatArray) -> bool:
 
 @inline
 def expand_value(row: FloatArray, point: FloatArray, e: Components) -> int:
-    """Set expansion e to the value of a plane row at a point; return its length, at most 7 in 3D."""
+    """Set expansion e to the value of a plane row at a point; return its number of components, at most 7 in 3D."""
     d = row.size - 1
     n = grow(e, 0, row[d])
     for k in range(d):
@@ -94,8 +96,8 @@ def exact_sign(row: FloatArray, point: FloatArray) -> int:
 
 @called
 def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> int:
-    """Return the exact sign of t_i - t_j, the parameters where a segment crosses two planes, all in the range of
-    `are_safe`."""
+    """Return the exact sign of t_i - t_j, the parameters at which a segment crosses the planes of two rows. Caller
+    guarantees `are_safe`."""
     p_i, q_i, p_j, q_j, e = workspace(8), workspace(8), workspace(8), workspace(8), workspace(200)
     n_pi, n_qi = expand_value(row_i, segment[0], p_i), expand_value(row_i, segment[1], q_i)
     n_pj, n_qj = expand_value(row_j, segment[0], p_j), expand_value(row_j, segment[1], q_j)
@@ -106,9 +108,10 @@ def exact_order(row_i: FloatArray, row_j: FloatArray, segment: FloatArray) -> in
 def decide_by_rows(
     segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, n: int
 ) -> tuple[int, int, int, int]:
-    """Decide one segment by n chosen planes; return state, plane entered, plane left (-1: none), and 1 if beyond the
-    filter. chosen: columns of the planes; planes are returned as indices into it. s_p, s_q, bounds: value of each plane
-    at both ends, and their error bound. An uncertain sign or order outside the safe range leaves the state OPEN."""
+    """Decide one segment by n chosen planes; return (state, plane entered, plane left, beyond): planes as indices into
+    `chosen`, -1 for none; beyond: 1 if doubles do not decide a sign or order, else 0. chosen: the column of each plane.
+    s_p, s_q, bounds: value of each plane at both ends, and its error bound. The state is OPEN if an uncertain sign or
+    order is outside the safe range."""
     entered = left = -1
     beyond = 0
     for i in range(n):
@@ -152,7 +155,8 @@ def decide_by_rows(
 def compare_rows(
     segment: FloatArray, columns: FloatArray, s_p: Any, s_q: Any, bounds: Any, chosen: Any, i: int, j: int
 ) -> tuple[int, bool]:
-    """Return the sign of t_i - t_j for the planes i and j that a segment crosses, and whether the filter sufficed."""
+    """Return the sign of t_i - t_j, the parameters at which a segment crosses the planes chosen[i] and chosen[j], or
+    UNDECIDED outside the safe range; and whether doubles sufficed. The other arguments: as in `decide_by_rows`."""
     order = compare_ratios_filter(s_p[i], bounds[i], s_q[j], bounds[j], s_p[j], bounds[j], s_q[i], bounds[i])
     if order != UNDECIDED:
         return order, True
@@ -164,7 +168,8 @@ def compare_rows(
 
 @merged
 def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best: Latest) -> Latest:
-    """Return the later of the latest crossing so far, `best`, and a crossing at t +- slack, only if is_crossed."""
+    """Return the latest crossing after one more plane: `best`, or the crossing of plane `plane` at t +- slack if
+    is_crossed and t is larger; the rival is updated."""
     is_later = is_crossed & (t > best.t)
     other = best.t + best.slack if is_later else (t + slack if is_crossed else best.rival)
     return Latest(
@@ -175,9 +180,9 @@ def later_crossing(t: float, slack: float, plane: float, is_crossed: bool, best:
 
 @merged
 def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> float:
-    """Return the state (0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN) of a segment. entered: the last plane entered; left: the
-    first plane left, with -t for t. t = s_p / (s_p - s_q) has the error bound / (|s_p| + |s_q|) if both values have the
-    error bound. is_out, is_open: already decided so."""
+    """Return the state of a segment: 0.0 REJECTED, 1.0 ACCEPTED, 2.0 OPEN. entered: the last plane entered; left: the
+    first plane left, as a `Latest` of -t. t = s_p / (s_p - s_q) has the error bound / (|s_p| + |s_q|) if both values
+    have the error bound. is_out: it is rejected already; is_open: a sign is open."""
     start, end = entered.t, -left.t
     is_sure = max(start + entered.slack, entered.rival) < min(end - left.slack, -left.rival)
     is_sure = is_sure & ((entered.plane < 0.0) | (entered.rival < start - entered.slack))
@@ -188,7 +193,8 @@ def state_of(entered: Latest, left: Latest, is_out: bool, is_open: bool) -> floa
 
 @inline
 def coordinate_limit(columns: FloatArray) -> float:
-    """Return a bound on coordinates below which the bounds of plane values stay below `WIDEST`."""
+    """Return a bound on |coordinates| of segments below which the error bounds of all plane values are below `WIDEST`.
+    columns: of `as_columns`."""
     limit = np.inf
     for j in range(columns.shape[1]):
         limit = min(limit, (WIDEST - columns[-1, j]) / columns[-2, j])
@@ -199,8 +205,9 @@ def coordinate_limit(columns: FloatArray) -> float:
 def decide_alone(
     segments: FloatArray, item: int, columns: FloatArray, limit: float, numbers: Any, chosen: Any
 ) -> tuple[int, int, int, int]:
-    """Decide segment ``item``; return state, plane entered, plane left (-1: none), and 1 if beyond the filter. Planes
-    are indices of rows. limit: `coordinate_limit`. numbers (3, m), chosen (m,): scratch."""
+    """Decide segment ``item`` by all planes; return (state, plane entered, plane left, beyond): planes as numbers of
+    rows, -1 for none; beyond: 1 if doubles do not decide it, else 0. limit: of `coordinate_limit`. numbers (3, m),
+    chosen (m,): scratch."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
@@ -223,9 +230,9 @@ def decide_on_rows(
     segments: FloatArray, columns: FloatArray, first: int, last: int, stop: FlagArray, items: Int32Array,
     planes: Int32Array, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Decide which planes bound the pieces of ``segments[first:last]`` in a convex region; outputs: see
-    `decide_on_boxes`. Plane by plane over a block of segments (n, 2, dim), without branches. columns: of `as_columns`.
-    """
+    """Decide which planes bound the pieces of ``segments[first:last]`` ((n, 2, dim) float64) in a convex region, plane
+    by plane over a block of segments, without branches. columns: of `as_columns`; the other arguments: table of
+    `decide_on_boxes`, planes being numbers of rows."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]

@@ -46,7 +46,7 @@ lock free where more than a few threads need it."""
 
 @dataclass(frozen=True, slots=True)
 class Scaled:
-    """A batch of segments and its region, both times 2^-exponent, as arguments of kernels."""
+    """A batch of segments and the arrays of its region, as arguments of kernels, all times 2^-exponent."""
 
     points: FloatArray
     region: tuple[Any, ...]
@@ -54,7 +54,8 @@ class Scaled:
 
 
 def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
-    """Return a batch and the arrays of its region scaled by a power of two; None if that is not needed or not exact."""
+    """Return a batch and the arrays of its region scaled by a power of two into the range of expansions; None if no
+    scale is needed, or not all numbers are exact after it."""
     exponent = exponent_of(points, *region)
     arrays = [shifted(array, -exponent) for array in (points, *region)]
     exact = [array for array in arrays if array is not None]
@@ -64,9 +65,8 @@ def scaled(points: FloatArray, *region: FloatArray) -> Scaled | None:
 
 
 class Method(NamedTuple):
-    """How to clip segments to one convex region. decide, fill: kernels; see cohen_sutherland.py, planes_cut.py. region:
-    their arguments. scale: returns the batch scaled, None if that is not needed or not exact.
-    """
+    """How to clip segments to one convex region. decide, fill: kernels (cohen_sutherland.py, planes_cut.py); region:
+    their arguments after the segments; scale: returns a batch `Scaled`, or None."""
 
     decide: Any
     fill: Any
@@ -91,8 +91,8 @@ class Plan(NamedTuple):
 def clip_on_convex(
     segments: FloatArray, region: Solid, plan: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the pieces of segments in a convex region, at most one each, number beyond the filter, and number in
-    rationals."""
+    """Return the pieces of segments (n, 2, dim) in a convex region, at most one each; the number of segments beyond the
+    filter; and of those decided in rationals."""
     method = plan.method
     assert method is not None
     if len(segments) <= FEW and (few := _clip_few(segments, method)) is not None:
@@ -111,7 +111,8 @@ def clip_on_convex(
 
 
 def _clip_few(segments: FloatArray, method: Method) -> Clipped | None:
-    """Return the pieces of at most `FEW` segments (n, 2, dim) float64, maybe NaN; None if one stays OPEN."""
+    """Return the pieces of at most `FEW` segments (n, 2, dim) float64, maybe with NaN, and counts; None if one stays
+    OPEN."""
     n, _, dimension = segments.shape
     decide, fill, region, _ = method
     try:
@@ -202,8 +203,8 @@ class _Batch:
             self.waiting[first] = last, items, planes, n_accepted
 
     def _next_to_fill(self) -> tuple[int, Int32Array, Int32Array, int] | None:
-        """Return first row, segments, planes and number of rows of the next chunk in order; None if it is still
-        undecided."""
+        """Return the first row of the next chunk in order, its segments, their planes, and its number of rows; None if
+        that chunk is still undecided."""
         with self._lock:
             if self._next not in self.waiting:
                 return None
@@ -213,7 +214,8 @@ class _Batch:
             return row, items, planes, n_accepted
 
     def _fill(self, row: int, items: Int32Array, planes: Int32Array, n_accepted: int) -> None:
-        """Fill `n_accepted` rows from `row` on; note the rows that are not certainly rounded."""
+        """Fill `n_accepted` rows from `row` on with the pieces of segments `items` between their planes; note the rows
+        that are not certainly rounded."""
         scene, pieces, counts, still = self._scene, self.pieces, np.zeros(2, np.int64), np.empty(n_accepted, np.int32)
         entry_of(self._method.fill)(
             scene.points, *scene.region, items, planes, row, n_accepted, self._flag, pieces, still, counts
@@ -233,8 +235,8 @@ class _Batch:
 
 
 def _settle(filled: Pieces, batch: _Batch, segments: FloatArray, region: Solid, budget: Budget) -> Pieces:
-    """Return the pieces in order of source, after the exact fallback recomputed uncertain rows and clipped OPEN
-    segments."""
+    """Return the pieces in order of source, after the exact fallback recomputed the uncertain rows of `filled` and
+    clipped the OPEN segments of `batch`."""
     rows = np.concatenate([np.zeros(0, np.int64), *batch.unsure_rows])
     again = clip_exactly(segments, filled.source[rows], region, None, budget)
     filled.t[rows], filled.ends[:, rows], filled.faces[rows] = again.t, again.ends, again.faces

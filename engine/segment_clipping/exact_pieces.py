@@ -35,8 +35,8 @@ _CHECK_EVERY: Final = 64
 
 
 class Contact(NamedTuple):
-    """Common part of a segment and an element (edge or triangle), from parameter `first` to `last`, equal for a point.
-    is_along: the segment lies in the element's plane or line. turns: the perturbed line crosses the element."""
+    """Common part of a segment and an element (edge or triangle) of a face. first, last: its parameters, equal for a
+    point. is_along: the segment lies in the element's plane or line. turns: the perturbed line crosses the element."""
 
     first: Fraction
     last: Fraction
@@ -51,8 +51,8 @@ def _cross(u: Integers, v: Integers) -> Integers:
 
 
 def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fraction, Fraction, bool] | None:
-    """Return first and last parameter of the common part of segment p q and edge a b, and whether they are collinear.
-    Collinear also if a = b. None if there is no common point."""
+    """Return (first, last, is_along): the parameters of the common part of segment p q and edge a b, and whether they
+    are collinear (also if a = b); None if there is no common point."""
     u, v, w = minus(q, p), minus(b, a), minus(a, p)
     normal = _cross(u, v)
     size = dot(normal, normal)
@@ -72,12 +72,11 @@ def edge_overlap(p: Integers, q: Integers, a: Integers, b: Integers) -> tuple[Fr
 def triangle_overlap(
     p: Integers, q: Integers, a: Integers, b: Integers, c: Integers
 ) -> tuple[Fraction, Fraction, bool] | None:
-    """Return first and last parameter of the common part of segment p q and closed triangle a b c, and whether
-    coplanar.
+    """Return (first, last, is_along): the parameters of the common part of segment p q and the closed triangle a b c,
+    and whether they are coplanar (also if the triangle has no area); None if there is no common point.
 
-    None if there is no common point. A triangle without area counts as coplanar. With corners relative to p and u = q -
-    p, the normal is B x C + C x A + A x B; the line meets the triangle unless signs of the volumes u . (B x C), ...
-    differ, and their sum is n . u.
+    With corners relative to p and u = q - p, the normal is B x C + C x A + A x B; the line meets the triangle unless
+    signs of the volumes u . (B x C), ... differ, and their sum is n . u.
     """
     u, *seen = (minus(x, p) for x in (q, a, b, c))
     around = [cross(seen[k - 2], seen[k - 1]) for k in range(3)]
@@ -111,8 +110,8 @@ def triangle_overlap(
 
 
 def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
-    """Return whether the line through p and q, moved by infinitesimals, crosses an edge or triangle. Seen along the
-    line, an element parallel to it has no length or no area: it contains no perturbed point."""
+    """Return whether the line through p and q, moved by infinitesimals (eps, eps^2), crosses an edge or triangle. An
+    element parallel to the line has no length or area, seen along it: no perturbed line meets it."""
     u = minus(q, p)
     if len(u) == 2:
         return len({_cross(u, minus(corner, p))[0] > 0 for corner in corners}) == 2
@@ -126,7 +125,8 @@ def is_crossed(p: Integers, q: Integers, corners: Sequence[Integers]) -> bool:
 def contacts_of(
     start: Integers, end: Integers, elements: Sequence[tuple[int, Sequence[Integers]]], check: Callable[[], object]
 ) -> Iterator[Contact]:
-    """Yield the contacts of a segment with elements, each given as its face and its two or three corners."""
+    """Yield the contacts of the segment from start to end with elements, each given as the number of its face and its
+    two or three corners; all are integers over one denominator. check: called now and then, and may raise."""
     for i, (face, corners) in enumerate(elements):
         if i % _CHECK_EVERY == 0:
             check()
@@ -136,7 +136,8 @@ def contacts_of(
 
 
 def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]]:
-    """Return the sorted parameters at which contacts begin or end, 0 and 1 included, each with the contacts there."""
+    """Return, sorted, the parameters at which contacts begin or end, and 0 and 1, each with the contacts that begin or
+    end there."""
     events: list[tuple[Fraction, Contact | None]] = [(FIRST, None), (LAST, None)]
     events += [(contact.first, contact) for contact in contacts]
     events += [(contact.last, contact) for contact in contacts if contact.first < contact.last]
@@ -149,9 +150,9 @@ def nodes_of(contacts: Sequence[Contact]) -> list[tuple[Fraction, list[Contact]]
 def nodes_with_locations(
     contacts: Sequence[Contact], locations: tuple[int, int], locate: Callable[[Fraction], int]
 ) -> Iterator[tuple[Fraction, list[Contact], bool, bool]]:
-    """Yield each parameter of `nodes_of` with its contacts, and of the span after it: is it along an element? is it
-    inside? locations: of the ends of the segment. locate: returns the location at a parameter; called at most once, if
-    both ends are on the boundary."""
+    """Yield (t, contacts, is_along, is_inside): each parameter of `nodes_of` with its contacts, and whether the span
+    after it runs along an element, and is inside if not. locations: of the ends of the segment (-1, 0, 1). locate:
+    returns the location at a parameter; called at most once, if both ends are on the boundary."""
     nodes = nodes_of(contacts)
     n_along, has_turned = 0, False
     are_along, have_turned = [], []  # of the span after each node; turned: against the first span
@@ -173,7 +174,7 @@ def nodes_with_locations(
 
 
 class Parameter(NamedTuple):
-    """The number (u + v sqrt(w)) / z, integers with w >= 0 and z > 0, and the double nearest to it."""
+    """The number (u + v sqrt(w)) / z, in integers with w >= 0 and z > 0. near: the double nearest to it."""
 
     u: int
     v: int
@@ -183,7 +184,7 @@ class Parameter(NamedTuple):
 
 
 def parameter(u: int, v: int, w: int, z: int) -> Parameter:
-    """Return the number (u + v sqrt(w)) / z; z is not 0."""
+    """Return the `Parameter` (u + v sqrt(w)) / z; z is not 0, and may be negative."""
     if z < 0:
         u, v, z = -u, -v, -z
     return Parameter(u, v, w, z, nearest_with_root(u, v, w, z))
@@ -206,7 +207,7 @@ def compare(a: Parameter, b: Parameter) -> int:
 
 
 def _sign_with_root(a: int, b: int, m: int) -> int:
-    """Return the exact sign of a + b sqrt(m)."""
+    """Return the exact sign of a + b sqrt(m), m >= 0."""
     first, second = sign_of(a), sign_of(b) * sign_of(m)
     if first * second >= 0:
         return first or second

@@ -165,12 +165,14 @@ def clip_lines(
 
 
 def _firsts_of(offsets: IntArray, n_vertices: int) -> IntArray:
-    """Return the first vertex of each segment: all vertices but the last of each line."""
+    """Return the first vertex of each segment of lines: all vertices but the last of each line. offsets: of lines into
+    the n_vertices vertices."""
     return np.delete(np.arange(n_vertices), offsets[1:][np.diff(offsets) > 0] - 1)
 
 
 def _joined(pieces: Pieces, firsts: IntArray, vertices: FloatArray, offsets: IntArray, budget: Budget) -> LinePieces:
-    """Join the pieces of segments to pieces of lines; firsts: first vertex of each segment."""
+    """Join the pieces of segments to pieces of lines. firsts: number of the first vertex of each segment; offsets: of
+    the lines into vertices."""
     m, at = len(pieces.source), firsts[pieces.source]
     starts, ends = map(np.ascontiguousarray, pieces.ends)
     made = Joined(np.empty((2 * m, vertices.shape[1])), np.empty(m + 1, np.int64), *np.empty((3, m), np.int64))
@@ -192,9 +194,9 @@ def join_parts(
     starts: FloatArray, ends: FloatArray, faces: IntArray, at: IntArray, vertices: FloatArray, offsets: IntArray,
     out: Joined, flag: FlagArray,
 ) -> int:  # fmt: skip
-    """Join consecutive pieces of segments, from starts (m, dim) to ends, where they meet in a vertex; return their
-    number. at: (m,) first vertex of the segment of each piece; offsets: of the lines into all vertices. Polls `flag`.
-    """
+    """Join consecutive pieces of segments, from starts (m, dim) to ends (m, dim), where they meet in a vertex of their
+    line; fill `out` and return the number of joined pieces. faces (m, 2): -1 for an end of the segment itself; at (m,):
+    first vertex of the segment of each piece; offsets: of the lines into vertices. Polls `flag`."""
     n, n_made, begin, line = 0, 0, 0, 0
     out.offsets[0] = 0
     while begin < at.size and not flag[0]:  # bound: each turn ends a line
@@ -229,14 +231,16 @@ def join_parts(
 
 @inline
 def _continues(faces: IntArray, at: IntArray, part: int, after: int) -> bool:
-    """Return whether piece `part` reaches the end of its segment, and piece `after` begins the next segment there."""
+    """Return whether piece `part` reaches the end of its segment, and piece `after` begins at the start of the next
+    segment. faces, at: as in `join_parts`."""
     return (faces[part, 1] < 0) & (faces[after, 0] < 0) & (at[after] == at[part] + 1)
 
 
 @inline
 def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: FloatArray, first: int, last: int) -> int:
-    """Return how many pieces at the start of a closed line continue its last piece, and so move behind it. 0 unless
-    first and last vertex are equal and inside, and some piece of the line is not connected to the next."""
+    """Return how many pieces at the start of a closed line continue its last piece, and so move behind it. begin .. end
+    - 1: the pieces of the line; first, last: its first and last vertex. 0 unless these are equal and inside, and some
+    piece of the line is not connected to the next."""
     if at[begin] != first or at[end - 1] != last - 1 or faces[begin, 0] >= 0 or faces[end - 1, 1] >= 0:
         return 0
     if not are_same(vertices, first, vertices, last):
@@ -249,7 +253,7 @@ def _n_moved(faces: IntArray, at: IntArray, begin: int, end: int, vertices: Floa
 
 @inline
 def _append_vertex(rows: FloatArray, row: int, points: FloatArray, point: int) -> int:
-    """Copy point ``point`` to row ``row``; return the row after it."""
+    """Copy row ``point`` of points to row ``row`` of rows; return row + 1."""
     for k in range(points.shape[1]):
         rows[row, k] = points[point, k]
     return row + 1

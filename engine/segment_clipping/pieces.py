@@ -29,8 +29,8 @@ BLOCK: Final = 64
 
 
 class Piece(NamedTuple):
-    """One piece of one segment: parameters and points, correctly rounded, and faces crossed (-1: the segment's own
-    end)."""
+    """One piece of one segment: parameters and points of its two ends, correctly rounded, and the faces crossed there
+    (-1: the segment's own end)."""
 
     t: tuple[float, float]
     start: list[float]
@@ -58,7 +58,7 @@ def first_of(pieces: Pieces, m: int) -> Pieces:
 
 
 def as_pieces(sources: Sequence[int], pieces: Sequence[Piece], dimension: int) -> Pieces:
-    """Return pieces of the exact fallback as columns, -0.0 replaced by 0.0."""
+    """Return pieces of the exact fallback as arrays, -0.0 replaced by 0.0. sources: the segment of each."""
     ends = np.array([(piece.start, piece.end) for piece in pieces], np.float64).reshape(-1, 2, dimension) + 0.0
     return Pieces(
         np.array(sources, np.int64),
@@ -104,7 +104,8 @@ def put_own_end(pieces: Pieces, row: int, end: int, segments: FloatArray, item: 
 
 @inline
 def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
-    """Return a bound on the relative error of s / d; infinite if s or d is out of the range of the bound."""
+    """Return a bound on the relative error of s / d, each known to within its bound; infinite if s or d is out of
+    range."""
     if not (2.0**-400 <= abs(d) <= 2.0**400 and abs(s) >= 2.0**-500):
         return np.inf
     return 1.01 * (s_bound / abs(s) + d_bound / abs(d))
@@ -112,7 +113,8 @@ def slack_of(s: float, s_bound: float, d: float, d_bound: float) -> float:
 
 @inline
 def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low: float, slack: float) -> bool:
-    """Write the point at parameter t + low, relative error slack; return whether both are proven nearest doubles."""
+    """Write the point of segment ``item`` at parameter t + low to ``point``; slack: relative error of the parameter.
+    Return whether the parameter t + low and all coordinates are proven nearest doubles."""
     bound = (T_BOUND + slack) * abs(t)
     sure = (slack < 0.001) & (t + (low - bound) == t + (low + bound))
     for k in range(segments.shape[2]):
@@ -124,7 +126,8 @@ def put_point(point: FloatArray, segments: FloatArray, item: int, t: float, low:
 
 @inline
 def put_piece(out: Pieces, row: int, source: int, segments: FloatArray, item: int, first: End, last: End) -> bool:
-    """Write a piece of segment ``item`` between two ends; return whether all numbers are proven nearest doubles."""
+    """Write the piece of segment ``item`` between two ends, each (t, t_low, slack, face), to row `row` of `out`; return
+    whether all numbers are proven nearest doubles. face: -1 for the segment's own end."""
     sure = True
     out.source[row] = source
     for end in range(2):

@@ -21,8 +21,9 @@ from engine.types import FlagArray, FloatArray, Int32Array, IntArray
 
 @called
 def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: int, at: float) -> tuple[float, bool]:
-    """Set `point` to the crossing of a segment with the plane of `row`, by expansions; return t, and whether all is
-    proven. axis, at: of an axis-parallel plane, whose row has a single 1 or -1; else -1 and anything."""
+    """Set `point` to the crossing of a segment (2, dim) with the plane of `row`, by expansions; return its parameter t,
+    and whether t and all coordinates are proven nearest doubles. axis, at: of a plane across an axis, whose row has a
+    single 1 or -1, the axis and the coordinate; for others -1 and any number."""
     wp, wq, e = workspace(8), workspace(8), workspace(96)
     if axis >= 0:  # what is not safe on other axes is multiplied by zero
         safe = is_safe(segment[0, axis]) and is_safe(segment[1, axis]) and is_safe(at)
@@ -37,8 +38,8 @@ def cut_by_signs(row: FloatArray, segment: FloatArray, point: FloatArray, axis: 
 
 @merged
 def cut_by_values(p: Triple, q: Triple, sp: Triple, sq: Triple) -> tuple[float, float, float, float, bool]:
-    """Return the crossing x, y, z of p q with a plane, t, and whether all are proven nearest doubles. sp, sq: the
-    plane's value at p and q as double-double and error bound. slack: relative error bound of t."""
+    """Return (x, y, z, t, is_proven): the crossing of p q with a plane, its parameter, and whether all are proven
+    nearest doubles. sp, sq: the plane's value at p and q, each as (high, low, error bound)."""
     sp_h, sp_l, sp_bound = sp
     sq_h, sq_l, sq_bound = sq
     sum_h, sum_l = dd_add(sp_h, sp_l, -sq_h, -sq_l)
@@ -57,7 +58,8 @@ def fill_on_rows(
     segments: FloatArray, columns: FloatArray, items: Int32Array, planes: Int32Array, begin: int, size: int,
     stop: FlagArray, pieces: Pieces, still: Int32Array, n: IntArray,
 ) -> None:  # fmt: skip
-    """Write the pieces of ``segments`` (n, 2, dim) float64 in a convex region; arguments: table of `fill_on_boxes`."""
+    """Write the pieces of ``segments`` (n, 2, dim) float64 in a convex region. columns: of `as_columns`; planes:
+    numbers of its rows; the other arguments: table of `fill_on_boxes`."""
     is_flat = segments.shape[2] == 2
     k = columns.shape[0] - 3  # in the plane any column is that of c, since z is 0
     a, b, c, d = columns[0], columns[1], columns[k - 1], columns[k]
@@ -95,9 +97,9 @@ def fill_on_rows(
 def cut_end(
     p: Triple, q: Triple, lowest: Triple, highest: Triple, plane: float, end: float
 ) -> tuple[float, float, float, float, bool]:
-    """Return x, y, z of the crossing of p q with a plane of a box, t, and whether all is proven. plane: 0.0 .. 5.0;
-    -1.0: end 0.0 or 1.0 of the segment itself.
-    """
+    """Return (x, y, z, t, is_proven): the crossing of p q with a plane of the box lowest .. highest, its parameter, and
+    whether all are proven nearest doubles. plane: 0.0 .. 5.0; -1.0: no plane, the result is end 0.0 or 1.0, `end`, of
+    the segment itself."""
     (px, py, pz), (qx, qy, qz), (x0, y0, z0), (x1, y1, z1) = p, q, lowest, highest
     is_x, is_y, is_z = plane < 1.5, (plane > 1.5) & (plane < 3.5), plane > 3.5
     is_high = (plane == 1.0) | (plane == 3.0) | (plane == 5.0)
@@ -126,8 +128,8 @@ def cut_end(
 def recompute_ends(
     segments: FloatArray, low: FloatArray, high: FloatArray, columns: FloatArray, row: int, unsure: int, pieces: Pieces
 ) -> bool:  # fmt: skip
-    """Recompute by expansions the ends (bit 0: first, bit 1: last) of a piece set in `unsure`; return whether all is
-    proven. row: of the piece in `pieces`. columns: of the box's plane rows."""
+    """Recompute by expansions the ends of the piece in row `row` that are set in `unsure` (bit 0: the first, bit 1: the
+    last); return whether all numbers are proven nearest doubles. columns: of the box's plane rows."""
     all_sure = True
     for end in range(2):
         if unsure >> end & 1 == 1:

@@ -57,8 +57,9 @@ Point = Sequence[Number]
 
 
 class Node(NamedTuple):
-    """A node of a profile: parameter, location there, faces entered and left there, location of the open span after it.
-    A face is -1 for none; a face that contains an end of the segment is named if no other is."""
+    """A node of a profile. t: its parameter; at: the location there; entered, left: the faces entered and left there,
+    -1 for none; after: the location of the open span after it. A face that contains an end of the segment is named if
+    no other is."""
 
     t: Parameter
     at: int
@@ -70,8 +71,9 @@ class Node(NamedTuple):
 def clip_exactly(
     segments: FloatArray, items: IntArray, solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> Pieces:
-    """Return the pieces of segments `items` of (n, 2, dim) by exact arithmetic. locations: of both ends of each, if
-    known. Raises: UnsupportedSolidError, what `Budget.check` raises."""
+    """Return the pieces of segments `items` of (n, 2, dim) in a posed solid, by exact arithmetic. locations: (-1, 0, 1)
+    of both ends of each of them, None if unknown. Raises: UnsupportedSolidError, DeadlineExceededError, CancelledError.
+    """
     sources: list[int] = []
     pieces: list[Piece] = []
     for place, item in enumerate(items.tolist()):
@@ -216,7 +218,8 @@ def _face_offsets(solid: Csg) -> dict[int, int]:
 
 
 def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
-    """Return the profile of a Boolean operation; the face at a parameter is the lowest of the operands' faces."""
+    """Return the profile of a Boolean operation ("union", "intersection", "difference") from those of its operands. The
+    face at a parameter is the lowest of the operands' faces there."""
     nodes = sorted((node.t for profile in profiles for node in profile), key=cmp_to_key(compare))
     parameters = [t for i, t in enumerate(nodes) if i == 0 or compare(nodes[i - 1], t) != 0]
     combined, places = [], [0] * len(profiles)
@@ -237,7 +240,8 @@ def _combined(operation: str, profiles: list[list[Node]]) -> list[Node]:
 
 
 def _interval(a: Node, b: Node, between: int) -> list[Node]:
-    """Return the profile of one interval from node a to node b, maybe a point; between: location of its open span."""
+    """Return the profile of a segment that is not outside from node a to node b, which may be one point, and outside
+    elsewhere. between: location of the open span between them."""
     nodes = [] if compare(a.t, ZERO) == 0 else [Node(ZERO, OUTSIDE, -1, -1, OUTSIDE)]
     if compare(a.t, b.t) == 0:
         nodes.append(Node(a.t, min(a.at, b.at), a.entered, b.left, OUTSIDE))
@@ -291,8 +295,8 @@ def _on_rows(line: Line, rows: Sequence[Sequence[float]]) -> list[Node]:
 
 
 def on_sphere(line: Line, solid: Sphere) -> list[Node]:
-    """Return the profile of a segment in a ball. The ball is where a t^2 + 2 b t + c <= 0; c and c_end are the values
-    at t = 0 and t = 1."""
+    """Return the profile of a segment in a ball, which is where a t^2 + 2 b t + c <= 0; c and a + 2 b + c, its values
+    at t = 0 and t = 1, give the locations of the ends."""
     center: Point = solid.center.tolist()
     center, n = center if line.pose is None else to_world_frame(center, line.pose), len(center)
     numbers, _ = common_integers([*line.p, *line.q, *center, solid.radius])
@@ -357,7 +361,8 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
 
 
 def _near(elements: FloatArray, p: Point, q: Point) -> Any:
-    """Return the indices of the elements (k, corners, dim) that segment p q may meet, by boxes rounded outward."""
+    """Return the indices of the elements (k, corners, dim) whose boxes a segment p q of rationals may meet; its box is
+    rounded outward."""
     with np.errstate(all="ignore"):  # what is no number keeps an element
         a, b = (np.array([float(x) for x in point]) for point in (p, q))
         low, high = elements.min(axis=1), elements.max(axis=1)

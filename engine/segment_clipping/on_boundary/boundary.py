@@ -57,8 +57,8 @@ def on_boundary(region: Polygon | Polyhedron) -> Plan:
 def clip_on_boundary(
     segments: FloatArray, region: Bounded, _: Plan, budget: Budget, workers: int | None, progress: Progress | None
 ) -> Clipped:
-    """Return the pieces of segments in a polygon or polyhedron, number beyond the filter, and number decided in
-    rationals."""
+    """Return the pieces of segments in a polygon or polyhedron, the number of segments beyond the filter, and of those
+    decided in rationals."""
     if len(segments) > _MOST_FEW or not np.isfinite(segments).all():
         check_finite(segments, ("segments",))
     if budget is UNLIMITED or not len(segments):
@@ -81,7 +81,8 @@ def clip_chunk(
     segments: FloatArray, first: int, last: int, region: Bounded, locator: Locator | None, budget: Budget
 ) -> tuple[Pieces, IntArray]:
     """Return the pieces of ``segments[first:last]``, (n, 2, dim) float64, sorted, and the segments that took the exact
-    fallback. locator: of the region; None for a small batch, whose first ends are located on the fast path."""
+    fallback, counted from `first`. locator: of the region; None for a small batch, whose first ends are located on the
+    fast path."""
     boundary, part = region.cached("clipping_boundary") or boundary_of(region), segments[first:last]
     points, locations = part[:, 0].copy(), np.zeros((last - first, 2), np.int8)
     at_once = locate_small_batch(points, region) if locator is None else None
@@ -105,8 +106,8 @@ def clip_chunk(
 def _locate_second_ends(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set locations[:, 1] of segments whose first end is on the boundary: the location of the second end. For chords
-    (both ends on the boundary) INSIDE_BEFORE or OUTSIDE_BEFORE, if the filter decides."""
+    """Set locations[:, 1] of the segments whose first end is on the boundary (locations[:, 0] is 0) to the location of
+    the second end. For chords, with both ends on the boundary, set what `locate_before_contacts` does."""
     chords = np.flatnonzero(locations[:, 0] == 0)
     locator.fill(segments[chords, 1], second := np.empty(len(chords), np.int8), budget)
     locations[chords, 1] = second
@@ -116,7 +117,8 @@ def _locate_second_ends(
 def cut_at_crossings(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[list[Pieces], FlagArray]:
-    """Return the pieces of the segments that the kernel decides, and by segment its state (SETTLED, OPEN)."""
+    """Return the pieces of the segments (n, 2, dim) that the kernel decides, in several arrays, and by segment its
+    state (SETTLED, OPEN). locations (n, 2): see `cut_on_outline`."""
     n, _, dimension = segments.shape
     cut: Any = cut_on_mesh if isinstance(boundary, Mesh) else cut_on_outline
     room, least, reached, parts = _LEAST_ROOM + n, _LEAST_ROOM + _CONTACTS * min(GROUP, n), 0, []
@@ -148,8 +150,8 @@ _PLACES: Final = (0.5, 0.3125, 0.8125)
 def locate_before_contacts(
     segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
 ) -> None:
-    """Set locations[:, 1] to INSIDE_BEFORE or OUTSIDE_BEFORE for chords, both ends on the boundary, if the filter
-    decides."""
+    """Set locations[:, 1] of chords (both ends on the boundary) to INSIDE_BEFORE or OUTSIDE_BEFORE, the location of the
+    perturbed line before the first contact; unchanged if the filter does not decide."""
     if not boundary.are_safe:  # signs of the perturbed line are exact only then
         return
     chords = np.flatnonzero((locations == 0).all(axis=1))
@@ -159,7 +161,8 @@ def locate_before_contacts(
 
 
 def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
-    """Return INSIDE_BEFORE, OUTSIDE_BEFORE or 0 (undecided) for chords (n, 2, dim)."""
+    """Return INSIDE_BEFORE, OUTSIDE_BEFORE or 0 (undecided) for chords (n, 2, dim): the location of the perturbed line
+    before the first contact."""
     sides = np.zeros(len(segments), np.int8)
     is_odd, is_left, met, owners = _crossing_parity(segments, boundary, budget)
     for place in _PLACES:
@@ -180,9 +183,9 @@ def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, bu
 def _crossing_parity(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
-    """Return by segment whether it crosses the boundary an odd number of times before its end, and whether that is
-    certain. Not certain if an edge runs along its end. Then the elements that contain a segment's end, and the segment
-    of each."""
+    """Return (is_odd, is_certain, met, owners): by segment, whether its perturbed line crosses the boundary an odd
+    number of times before its end, and whether that is certain (not where an edge runs along that end); then the
+    elements that contain a segment's end, and the segment of each."""
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
     holds_end = kinds | Bit.CROSSES == _AT_END
@@ -201,9 +204,9 @@ def _crossing_parity(
 def exclude_separated(
     elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_known: BoolArray
 ) -> None:
-    """Set is_known (n,) False for segments whose first end and inner point may be separated by an element. met, owners:
-    elements and the segment of each. inner: (n, 2, dim), from the inner points.
-    """
+    """Set is_known (n,) False for each segment whose first end and inner point are not proven to be on one side of each
+    of its elements. met, owners: elements and the segment of each. inner: (n, 2, dim), segments that begin at the inner
+    points."""
     for place in range(met.size):
         element, item = met[place], owners[place]
         if elements.shape[1] == 2:

@@ -52,7 +52,7 @@ Crossings = namedtuple("Crossings", "t points faces order codes met")
 @called
 def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> int:
     """Compute the contacts of segment ``item`` into `cuts`, sorted along it; return their number, UNSURE if one is
-    undecided."""
+    undecided. boundary: `Outline` or `Mesh`; contacts: filled by `gather_edges` or `gather_triangles`."""
     first, last, n = contacts.offsets[item], contacts.offsets[item + 1], 0
     if not is_item_safe(segments, item) or 2 * (last - first) > cuts.t.size:
         return UNSURE
@@ -73,7 +73,8 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
 
 @called
 def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: int, cuts: Crossings, n: int) -> int:
-    """Write parameter and point of the contact with element ``cuts.met[n]`` as entry n; return n + 1, or UNSURE."""
+    """Write parameter and point of the contact of segment ``item`` with element ``cuts.met[n]`` as entry n of `cuts`;
+    return n + 1, or UNSURE if they are not proven nearest doubles. code: of the contact (contacts.py)."""
     place, element, dimension = decode_place(code), cuts.met[n], segments.shape[2]
     cuts.codes[n] = code
     if Place.START <= place <= Place.END:
@@ -95,8 +96,8 @@ def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: 
 
 @inline
 def _write_overlap(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
-    """Write both ends of the overlap of a segment and a collinear edge as entries n and n + 1; return the next, or
-    UNSURE."""
+    """Write both ends of the overlap of segment ``item`` and the collinear edge ``cuts.met[n]`` as entries n and n + 1
+    of `cuts`, or one entry if it is a point; return the next entry, or UNSURE."""
     k, element, face = axis_of(segments, item), cuts.met[n], cuts.faces[n]
     p, q = segments[item, 0, k], segments[item, 1, k]
     rises = q > p
@@ -128,8 +129,9 @@ class Before(IntEnum):
 
 @inline
 def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
-    """Return the location (`Before`) of the perturbed line before the first of n contacts; of_p, of_q: locations of the
-    ends."""
+    """Return the location (`Before`) of the perturbed line before the first of n sorted contacts; UNKNOWN also if
+    contacts that round alike may be different points. of_p, of_q: locations of the segment's ends, of_q as
+    `emit_touching` takes it."""
     begin, turns = 0, False
     for place in range(n):
         i, first = cuts.order[place], cuts.order[begin]
@@ -153,7 +155,8 @@ def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, o
 def _write_end(
     out: Pieces, row: int, end: int, segments: FloatArray, item: int, cuts: Crossings, i: int, face: int
 ) -> None:
-    """Write contact i as end 0 or 1 of the piece in a row, as the segment's own end if the contact is that end."""
+    """Write contact i of `cuts`, on face `face`, as end 0 or 1 of the piece in row `row`; a contact at that end of the
+    segment becomes the segment's own end, face -1."""
     if decode_place(cuts.codes[i]) == Place.START + end:
         put_own_end(out, row, end, segments, item, segments.shape[2] == 2)
         return
@@ -167,10 +170,9 @@ def emit_touching(
     segments: FloatArray, item: int, source: int, ends: Int8Array, elements: FloatArray, cuts: Crossings, n: int,
     out: Pieces, row: int,
 ) -> int:  # fmt: skip
-    """Write the pieces between n contacts, at most n + 1, to `out` from `row` on; return the next row, or UNSURE. ends:
-    (2,) int8 locations of the segment's ends, the second only if the first is not OUTSIDE, or what
-    `locate_before_contacts` sets.
-    """
+    """Write the pieces between n contacts, at most n + 1, to `out` from `row` on; return the next row, or UNSURE.
+    source: number of the segment. ends: (2,) int8 locations of the segment's ends; the second counts only if the first
+    is on the boundary, and may be what `locate_before_contacts` sets."""
     is_in, turned, n_along, is_open, place = _location_before(elements, cuts, n, ends[0], ends[1]), 0, 0, ends[0] > 0, 0
     if is_in == Before.UNKNOWN:
         return UNSURE
@@ -213,7 +215,7 @@ def allocate_crossings(n: int, dimension: int) -> Crossings:
 
 @inline
 def sort_crossings(cuts: Crossings, n: int) -> bool:
-    """Sort the first n crossings by t into ``cuts.order``; return False if two parameters are equal."""
+    """Sort the first n crossings by t into ``cuts.order``; return False if two of them have equal doubles t."""
     t, order = cuts.t, cuts.order
     for i in range(n):
         order[i] = i
@@ -243,7 +245,8 @@ def group_size(n: int) -> int:
 def emit(
     segments: FloatArray, item: int, source: int, is_inside: bool, cuts: Crossings, n: int, out: Pieces, row: int
 ) -> int:
-    """Write the pieces between n sorted proper crossings to `out` from `row` on; return the next row."""
+    """Write the pieces between n sorted proper crossings to `out` from `row` on; return the next row. source: number of
+    the segment; is_inside: its first end is inside."""
     is_flat, end = segments.shape[2] == 2, 1 if is_inside else 0
     if is_inside:
         out.source[row] = source
@@ -271,8 +274,8 @@ def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
 
 @inline
 def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, cuts: Crossings) -> bool:
-    """Compute the proper crossings of segment ``item``, sorted; return False if one is uncertain or two parameters are
-    equal."""
+    """Compute the crossings of segment ``item`` into `cuts`, sorted; return False if one is not proven, or two have
+    equal doubles t. Caller guarantees that all its contacts are proper crossings."""
     first, last = contacts.offsets[item], contacts.offsets[item + 1]
     if first < last and not is_item_safe(segments, item):
         return False
@@ -293,8 +296,9 @@ def cut_group(
     segments: FloatArray, locations: Int8Array, first: int, boundary: Any, contacts: Any, cuts: Crossings,
     stop: FlagArray, out: Pieces, row: int, state: FlagArray,
 ) -> tuple[int, int]:  # fmt: skip
-    """Cut the segments of a group at their contacts; return the next segment and the next row. first: index of the
-    group's first segment. Stops early if `out` is full or `stop` is set. See `cut_on_outline`."""
+    """Cut the segments of a group at their contacts; return the next segment and the next row of `out`. first: number
+    of the group's first segment; cuts: scratch; the others: see `cut_on_outline`. Stops early if `out` is full or
+    `stop` is set."""
     for item in range(segments.shape[0]):
         begin, end, place = contacts.offsets[item], contacts.offsets[item + 1], first + item
         state[place] = OPEN

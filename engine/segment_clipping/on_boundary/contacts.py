@@ -39,8 +39,9 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2
 
 
 class Kind(IntEnum):
-    """How a segment and an element meet, where that is no contact at a place (`code_of`): not, properly, undecided,
-    along a line."""
+    """How a segment and an element meet: APART (no common point), PROPER (crossed in a point inside of both),
+    DEGENERATE (undecided), ALONG (they overlap on a line). A contact at a corner, side or end has a code instead
+    (`code_of`)."""
 
     APART = 0
     PROPER = 1
@@ -49,8 +50,8 @@ class Kind(IntEnum):
 
 
 class Place(IntEnum):
-    """Where on a triangle or edge a contact lies: 0 .. 2 a corner, 3 .. 5 the side from corner place - 3 on, or one of
-    these."""
+    """Where a contact lies: 0 .. 2 at that corner of the element, 3 .. 5 on its side from corner place - 3 on, START or
+    END at an end of the segment, WITHIN inside of both."""
 
     START = 6
     END = 7
@@ -90,7 +91,8 @@ _TOO_LARGE: Final = 2.0**500
 
 
 class Contacts(NamedTuple):
-    """Output for the contacts of a group of segments: met, kinds: element and kind of each; offsets: by segment."""
+    """Output for the contacts of a group of segments. met, kinds: by contact the element, and its `Kind` or code;
+    offsets: by segment."""
 
     met: Any
     kinds: Any
@@ -116,8 +118,8 @@ def edge_stack() -> IntArray:
 
 @merged
 def code_of(place: int, is_crossed: bool) -> int:
-    """Return the code of a contact at a place (corner, side, START, END, WITHIN): 2 (place + 2) + (1 if the line
-    crosses there)."""
+    """Return the code of a contact at a place (corner, side, START, END, WITHIN): 2 (place + 2) + (1 if is_crossed: the
+    perturbed line crosses the element there)."""
     return 2 * place + (5 if is_crossed else 4)
 
 
@@ -129,7 +131,7 @@ def decode_place(code: int) -> int:
 
 @merged
 def axis_of(segments: FloatArray, item: int) -> int:
-    """Return the axis along which a segment is longest."""
+    """Return the axis (0, 1, 2) along which segment ``item`` is longest."""
     best = 0
     for k in range(1, segments.shape[2]):
         length = abs(segments[item, 1, k] - segments[item, 0, k])
@@ -149,8 +151,8 @@ def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> 
 
 @inline
 def are_same_point(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
-    """Return whether two contacts of one segment are one point: its end, or a common corner or side of the elements.
-    first, second: elements; code, other: their codes."""
+    """Return whether two contacts of one segment are one point: an end of the segment, or a common corner or side of
+    both elements. first, second: the elements; code, other: the codes of their contacts."""
     n, m = decode_place(code), decode_place(other)
     if n >= Place.START or m >= Place.START:
         return n == m and n <= Place.END
@@ -165,9 +167,9 @@ def are_same_point(elements: FloatArray, first: int, code: int, second: int, oth
 
 @called
 def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
-    """Return the code of the contact of edge a b and segment p q from four signs, some of which are not 1 or -1. of_a,
-    of_b: sides of a and b at the line p q; of_p, of_q: vice versa. ALONG if collinear, DEGENERATE if one is UNDECIDED.
-    """
+    """Return the code of the contact of edge a b and segment p q, where a sign is zero or UNDECIDED; ALONG if they are
+    collinear, DEGENERATE if one is UNDECIDED. of_a, of_b: side of a and b at the line p q; of_p, of_q: side of p and q
+    at the line a b."""
     if of_a == UNDECIDED or of_b == UNDECIDED or of_p == UNDECIDED or of_q == UNDECIDED:
         return Kind.DEGENERATE
     if of_a == 0 and of_b == 0:
@@ -188,7 +190,8 @@ def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
 
 @inline
 def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
-    """Return kind (APART, PROPER, ALONG, DEGENERATE) or code of the contact of a segment and an edge, both (2, 2)."""
+    """Return the `Kind` (APART, PROPER, ALONG, DEGENERATE) or the code of the contact of a segment and an edge, both
+    (2, 2)."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
@@ -205,7 +208,8 @@ def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
 
 @inline
 def may_meet(segment: FloatArray, box: FloatArray) -> bool:
-    """Return False if a separating axis proves that a segment misses the closed box low, high; else True."""
+    """Return False if a separating axis proves that a segment (2, 2) misses the closed box, (2, 2) low and high; else
+    True."""
     n = segment.shape[1]
     largest = 0.0
     for k in range(n):
@@ -230,8 +234,8 @@ def may_meet(segment: FloatArray, box: FloatArray) -> bool:
 
 @inline
 def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contacts: int) -> int:
-    """Append the contacts of a segment (2, 2) with edges to the n_contacts present; return their new number, or
-    NO_ROOM."""
+    """Append the contacts of a segment (2, 2) with edges to the n_contacts in `contacts`; return their number then, or
+    NO_ROOM. outline: the `Outline` of the polygon."""
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -257,8 +261,8 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contac
 
 @called
 def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 2); return their number.
-    Zero-length segments have none. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
+    """Fill `contacts` with those of the first n of segments (m, 2, 2) and the edges of an `Outline`; return their
+    number. Segments of zero length have none. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -274,9 +278,9 @@ def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int,
 
 @allocating_kernel
 def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return the number of contacts of segments (n, 2, 2) float64 with the edges of a polygon, and arrays of them.
-    Arrays: elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of segments. NO_ROOM if there are
-    more than `room`. stop: one uint8, polled."""
+    """Return (number, met, kinds, offsets): the contacts of segments (n, 2, 2) float64 with the edges of an `Outline`,
+    segment by segment. met int64: the elements; kinds uint8: `Kind` or code; offsets (n + 1,) of segments. The number
+    is NO_ROOM if there are more than `room`, STOPPED if `stop` (one uint8) is set."""
     contacts = allocate_contacts(segments.shape[0], room, edge_stack())
     n_met = gather_edges(contacts, outline, segments, segments.shape[0], stop)
     return n_met, contacts.met, contacts.kinds, contacts.offsets

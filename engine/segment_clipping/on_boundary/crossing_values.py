@@ -48,7 +48,8 @@ Vector = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
 @merged
 def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float, y: float, y_low: float) -> Triple:
-    """Return U V - X Y as a sum of two doubles, and |u v| + |x y|; U = u + u_low and so on are exact pairs."""
+    """Return (h, low, m): U V - X Y as a sum of two doubles h + low, and m = |u v| + |x y|. U = u + u_low and so on are
+    exact pairs."""
     ph, pl = two_prod(u, v)
     qh, ql = two_prod(x, y)
     h, tail = two_diff(ph, qh)
@@ -58,14 +59,15 @@ def minor(u: float, u_low: float, v: float, v_low: float, x: float, x_low: float
 
 @merged
 def product(n: Triple, w: float, w_low: float) -> Triple:
-    """Return (h + low) (w + w_low) as a sum of two doubles, and its size m |w|; n = (h, low, m) of `minor`."""
+    """Return (h, low, size): the product of n and W = w + w_low as a sum of two doubles, and its size m |w|. n = (h,
+    low, m) of `minor`."""
     g, tail = two_prod(n[0], w)
     return g, tail + (n[0] * w_low + n[1] * w), n[2] * abs(w)
 
 
 @merged
 def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
-    """Return (b - a) x (c - a): each component a sum of two doubles, and the sum of the magnitudes of its products."""
+    """Return the normal (b - a) x (c - a) of a triangle: each component as (h, low, m) of `minor`."""
     ux, uy, uz = two_diff(b.x, a.x), two_diff(b.y, a.y), two_diff(b.z, a.z)
     vx, vy, vz = two_diff(c.x, a.x), two_diff(c.y, a.y), two_diff(c.z, a.z)
     return (
@@ -77,7 +79,8 @@ def normal_of(a: Point3, b: Point3, c: Point3) -> Normal:
 
 @merged
 def dot(n: Normal, w: Vector) -> Triple:
-    """Return n . w as a double-double, and its error bound; n of `normal_of`, w of exact pairs."""
+    """Return (h, low, bound): n . w as a double-double, and a bound on its error. n: of `normal_of`; w: three exact
+    pairs."""
     x, x_low, x_size = product(n[0], w[0][0], w[0][1])
     y, y_low, y_size = product(n[1], w[1][0], w[1][1])
     z, z_low, z_size = product(n[2], w[2][0], w[2][1])
@@ -89,7 +92,8 @@ def dot(n: Normal, w: Vector) -> Triple:
 
 @merged
 def line_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d of edge ``element`` (k, 2, 2) and segment ``item``, each a double-double with error bound."""
+    """Return s(p) and d = s(p) - s(q) of segment ``item``, p q, at the line of edge ``element`` of elements (k, 2, 2),
+    each as (h, low, error bound)."""
     ax, ay = elements[element, 0, 0], elements[element, 0, 1]
     px, py = segments[item, 0, 0], segments[item, 0, 1]
     u, u_low = two_diff(elements[element, 1, 0], ax)
@@ -107,8 +111,8 @@ def line_values(elements: FloatArray, element: int, segments: FloatArray, item: 
 
 @merged
 def plane_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d of triangle ``element`` (k, 3, 3) and segment ``item``, each a double-double and its error
-    bound."""
+    """Return s(p) and d = s(p) - s(q) of segment ``item``, p q, at the plane of triangle ``element`` of elements (k, 3,
+    3), each as (h, low, error bound)."""
     a, b, c = triangle_at(elements, element)
     p, q = corner(segments, item, 0), corner(segments, item, 1)
     normal = normal_of(a, b, c)
@@ -132,8 +136,8 @@ def is_item_safe(items: FloatArray, item: int) -> bool:
 def cut_at(
     segments: FloatArray, item: int, elements: FloatArray, element: int, points: FloatArray, row: int
 ) -> tuple[float, bool]:
-    """Set points[row] to the crossing of a segment and an element; return t, and whether all are proven nearest
-    doubles."""
+    """Set points[row] to the crossing of segment ``item`` and element ``element``, by double-doubles; return its
+    parameter t, and whether t and all coordinates are proven nearest doubles."""
     if segments.shape[2] == 2:
         at_p, along = line_values(elements, element, segments, item)
     else:
@@ -161,8 +165,9 @@ def cut_at(
 
 @called
 def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
-    """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of a segment; return its length. Triangle a b c: sum over k
-    of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b - a) x (x - a)."""
+    """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of segment ``item``; return its number of components.
+    Triangle a b c: sum over k of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b -
+    a) x (x - a)."""
     m, n, is_flat = workspace(16), 0, segments.shape[2] == 2
     for k in range(2 if is_flat else 0, 3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -182,9 +187,10 @@ def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int
 def cross_exactly(
     segments: FloatArray, item: int, elements: FloatArray, element: int, point: FloatArray
 ) -> tuple[float, bool]:
-    """Set `point` to the crossing of a segment and an element from exact values; return t, and whether all is proven.
-    The ends lie on different sides, or one of them on the element's line or plane. Coordinates are zero or of sizes
-    within 2^-120 .. 2^120, so differences are multiples of 2^-172 and values of 2^-516, below 2^366."""
+    """Set `point` to the crossing of segment ``item`` and element ``element`` from exact values; return its parameter
+    t, and whether t and all coordinates are proven nearest doubles. Caller guarantees that the ends lie on different
+    sides, or one of them on the element's line or plane, and that coordinates are zero or of sizes within 2^-120 ..
+    2^120, so that differences are multiples of 2^-172 and values of 2^-516, below 2^366."""
     wp, wq, e = workspace(192), workspace(192), workspace(2304)
     n_wp = _size_at(elements, element, segments, item, 0, wp)
     n_wq = _size_at(elements, element, segments, item, 1, wq)
@@ -203,6 +209,6 @@ def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
 
 @inline
 def _put_distance(e: Components, x: float, y: float) -> int:
-    """Set expansion e to |x - y|; return its length, at most 2."""
+    """Set expansion e to |x - y|; return its number of components, at most 2."""
     h, low = two_diff(x, y)
     return magnitude(e, grow(e, grow(e, 0, low), h))

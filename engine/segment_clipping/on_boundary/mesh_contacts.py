@@ -81,9 +81,9 @@ are far below every slack; is_near: whether it comes near the tree."""
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return kind or code of the contact of segment p q and triangle a b c, by exact signs. If an end is off the plane
-    and the triangle has an area, the line meets the plane in one point, on the segment unless both ends are on one
-    side. That point is outside of the triangle only if the signs of two edges differ."""
+    """Return the `Kind` or code of the contact of segment p q and triangle a b c, by exact signs. If an end is off the
+    plane and the triangle has an area, the line meets the plane in one point, on the segment unless both ends are on
+    one side; that point is outside of the triangle only if the signs of two edges differ."""
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return Kind.APART
@@ -111,8 +111,9 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
 
 @called
 def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> int:
-    """Return the side of edge a b on which the line p q passes, perturbed by eps along one axis and eps^2 along the
-    next. k: the longest axis of p q. UNDECIDED if they are parallel."""
+    """Return the side (1, -1) of edge a b on which the line p q passes when moved by eps along the axis after k and by
+    eps^2 along the next; UNDECIDED if they are parallel. k: the axis along which p q is longest. Caller guarantees that
+    a b and p q lie in one plane."""
     side = _slope(a, b, p, q, AXES_BEFORE[k + 1], k)
     if side == 0:
         side = -_slope(a, b, p, q, AXES_BEFORE[k], k)
@@ -121,8 +122,8 @@ def _side_when_perturbed(a: Point3, b: Point3, p: Point3, q: Point3, k: int) -> 
 
 @inline
 def _slope(a: Point3, b: Point3, p: Point3, q: Point3, j: int, k: int) -> int:
-    """Return the exact sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j), or UNDECIDED. Filter: six roundings
-    and a sum, twice that is 2^-50; then exact if sizes satisfy `is_safe`."""
+    """Return the exact sign of (a_j - b_j) (q_k - p_k) - (a_k - b_k) (q_j - p_j), or UNDECIDED. j, k: axes. The filter
+    has six roundings and a sum, twice that is 2^-50; beyond it the sign is exact if sizes satisfy `is_safe`."""
     x, y = (a[j] - b[j]) * (q[k] - p[k]), (a[k] - b[k]) * (q[j] - p[j])
     gap, bound = x - y, 2.0**-50 * (abs(x) + abs(y)) + UNDERFLOW
     if abs(gap) > bound:
@@ -167,8 +168,8 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 
 @merged
 def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, blur: float) -> int:
-    """Return kind or code of the contact of segment p q with triangle ``element`` (k, 3, 3). blur: error of each
-    coordinate of p and q; if above 0, UNDECIDED where the filter does not decide."""
+    """Return the `Kind` or code of the contact of segment p q with triangle ``element`` of elements (k, 3, 3). blur:
+    error of each coordinate of p and q; if above 0, UNDECIDED where the filter does not decide."""
     a, b, c = triangle_at(elements, element)
     kind = contact_filter(a, b, c, p, q, blur)
     return kind if kind != UNDECIDED or blur > 0.0 else exact_contact(a, b, c, p, q)
@@ -190,7 +191,8 @@ def triangle_at(elements: FloatArray, element: int) -> tuple[Point3, Point3, Poi
 
 @merged
 def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float) -> Way:
-    """Return segment p q in tree coordinates; blur: error of each coordinate of its ends."""
+    """Return segment p q in tree coordinates, (x - origin) * inverse, as a `Way`. blur: error of each coordinate of p
+    and q."""
     ox, oy, oz = origin[0] * inverse, origin[1] * inverse, origin[2] * inverse
     px, py, pz = p.x * inverse - ox, p.y * inverse - oy, p.z * inverse - oz
     dx, dy, dz = q.x * inverse - p.x * inverse, q.y * inverse - p.y * inverse, q.z * inverse - p.z * inverse
@@ -220,7 +222,8 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float
 
 @merged
 def shear_of(way: Way) -> Any:
-    """Return the arguments of `near_triangles` for a segment: axes, middle, slopes r and s, reach, slack."""
+    """Return the arguments of `near_triangles` for a segment: the axes (i, j, k), k the one along which it is longest;
+    its middle on these; the slopes r and s; reach; slack."""
     k, middle, half = longest_axis(way.half), way.middle, way.half
     i, j = AXES_BEFORE[k], AXES_BEFORE[k + 1]
     slack = np.float32(2.0) * way.slack  # 32 u (S + 2) of lanes/faces.py, and twice what cutting loses
@@ -249,7 +252,7 @@ def traversal_buffers() -> Waiting:
 
 @inline
 def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
-    """Return whether a traversal may end: the arrays are full, or `is_any` and one contact is decided."""
+    """Return whether a traversal may end: n_met is NO_ROOM, or `is_any` and the contact in row 0 is decided."""
     return n_met < 0 or (is_any and n_met > 0 and kinds[0] != Kind.DEGENERATE)
 
 
@@ -257,8 +260,8 @@ def is_answered(is_any: bool, n_met: int, kinds: IntArray | FlagArray) -> bool:
 def _append_triangles(
     mesh: Any, ends: Any, is_any: bool, triangles: IntArray, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts of a segment with n queued triangles to met and kinds; return their new number, or NO_ROOM.
-    ends: p, q, blur. is_any: one contact is enough."""
+    """Append the contacts of a segment with triangles[:n] to met (elements) and kinds, after the n_met there; return
+    their number then, or NO_ROOM. mesh: the `Mesh`; ends: (p, q, blur); is_any: one contact is enough, in row 0."""
     p, q, blur = ends
     for place in range(n):
         element = triangles[place]
@@ -279,8 +282,9 @@ def _append_triangles(
 def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append to met and kinds the contacts of a segment with the triangles of n queued leaf blocks; return their new
-    number, or NO_ROOM. ends: p, q, blur. shear: `shear_of` the segment. is_any: one contact is enough."""
+    """Append the contacts of a segment with the triangles of n leaf blocks, queued in `waiting`, to met (elements) and
+    kinds, after the n_met there; return their number then, or NO_ROOM. ends: (p, q, blur); shear: `shear_of` the
+    segment; is_any: one contact is enough, in row 0."""
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
@@ -306,10 +310,10 @@ def _append_blocks(
 def append_contacts(
     mesh: Any, p: Point3, q: Point3, blur: float, is_any: bool, waiting: Waiting, met: IntArray, kinds: Any, n_met: int
 ) -> int:
-    """Append the contacts of segment p q with triangles to met and kinds; return their new number, or NO_ROOM. blur:
-    error of each coordinate of p and q; if above 0, what the filter leaves is Kind.DEGENERATE. is_any: one contact is
-    enough, in row 0; it is Kind.DEGENERATE only if no other is decided.
-    """
+    """Append the contacts of segment p q with the triangles of a `Mesh` to met (elements) and kinds, after the n_met
+    there; return their number then, or NO_ROOM. blur: error of each coordinate of p and q; if above 0, what the filter
+    leaves open is Kind.DEGENERATE. is_any: one contact is enough, in row 0; it is Kind.DEGENERATE only if no other is
+    decided. waiting: scratch."""
     stack, blocks = waiting.stack, waiting.blocks
     way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)
     shear, ends, n_blocks, depth = shear_of(way), (p, q, blur), 0, int(way.is_near)
@@ -346,7 +350,7 @@ def append_contacts(
 
 @called
 def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill met, kinds and offsets with the contacts of the first n of segments (m, 2, 3) with triangles; return their
+    """Fill `contacts` with those of the first n of segments (m, 2, 3) and the triangles of a `Mesh`; return their
     number. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
@@ -364,9 +368,9 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
 
 @allocating_kernel
 def find_contacts_3d(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
-    """Return the number of contacts of at most GROUP segments (n, 2, 3) float64 with triangles, and arrays of the
-    contacts. Arrays: elements met int64 and kinds uint8, by segment; offsets (n + 1,) int64 of segments. NO_ROOM if
-    there are more than `room`."""
+    """Return (number, met, kinds, offsets): the contacts of at most GROUP segments (n, 2, 3) float64 with triangles,
+    segment by segment. met int64: the elements; kinds uint8: `Kind` or code; offsets (n + 1,) of segments. The number
+    is NO_ROOM if there are more than `room`, STOPPED if `stop` (one uint8) is set."""
     contacts = allocate_contacts(segments.shape[0], room, traversal_buffers())
     n_met = gather_triangles(contacts, mesh, segments, segments.shape[0], stop)
     return n_met, contacts.met, contacts.kinds, contacts.offsets
@@ -380,7 +384,8 @@ _EACH: Final = 8
 def contacts_with(
     segments: FloatArray, boundary: Outline | Mesh, budget: Budget
 ) -> tuple[IntArray, FlagArray, IntArray]:
-    """Return, by segment (n <= GROUP, 2, dim), the elements that it may meet, their kinds, and offsets (n + 1,)."""
+    """Return (met, kinds, offsets) for segments (n <= GROUP, 2, dim): the elements that each meets or may meet, segment
+    by segment; the `Kind` or code of each contact; and the offsets (n + 1,) of segments."""
     kernel: Any = find_contacts_3d if isinstance(boundary, Mesh) else find_contacts_2d
     room, n_contacts = _LEAST_CONTACTS + _EACH * len(segments), NO_ROOM
     met, kinds, offsets = np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.int64)

@@ -79,15 +79,17 @@ def boundary_of(region: Polygon | Triangle | Polyhedron | Surface) -> Outline | 
 
 
 def outline_of(elements: FloatArray, faces: IntArray, offsets: IntArray) -> Outline:
-    """Build the boundary of the edges (k, 2, 2) of rings; faces: number of each edge; offsets: of rings."""
+    """Build the boundary of a polygon from its edges (k, 2, 2). faces: the caller's number of each edge; offsets: of
+    rings into edges."""
     low, high = np.minimum(elements[:, 0], elements[:, 1]), np.maximum(elements[:, 0], elements[:, 1])
     order, boxes = build_box_tree(low, high, offsets)
     return Outline(read_only(elements), are_all_safe(elements), read_only(faces), read_only(order), read_only(boxes))
 
 
 def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the tree over elements with the boxes `low`, `high`, (n, dim) float64 each; offsets: of their rings.
-    Result: (n,) int64, elements by leaf; (2 n_leaves, 2, dim) float64, low and high of node i at row i."""
+    """Return the implicit tree over elements with the boxes `low`, `high`, (n, dim) float64 each: (n,) int64, the
+    elements in the order of the leaves; and (2 n_leaves, 2, dim) float64, low and high of node i at row i. offsets: of
+    the rings into elements."""
     n, dimension = low.shape
     order = _order(low, high, offsets)
     n_leaves = 1
@@ -134,7 +136,7 @@ def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
 
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
-    """Build the boundary of triangles (k, 3, 3); faces: number of each."""
+    """Build the boundary of a mesh from its triangles (k, 3, 3). faces: the caller's number of the face of each."""
     low, high = elements.min(axis=1), elements.max(axis=1)
     tree, n_inner = _inner_first(build_bvh(np.concatenate([low, high], axis=1)))
     return Mesh(
@@ -155,8 +157,9 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
 
 
 def corners_of(tree: Bvh, n_inner: int, elements: FloatArray) -> Float32Array:
-    """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates. Unused
-    lanes lie far from everything."""
+    """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates: by row a
+    coordinate of a corner, by lane a triangle. Unused lanes lie far from everything. n_inner: number of inner nodes,
+    which come first in the tree; elements (k, 3, 3)."""
     child = tree.child[n_inner:]
     is_item = child != EMPTY
     block, lane = np.nonzero(is_item)
