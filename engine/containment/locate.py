@@ -44,7 +44,8 @@ Located: TypeAlias = tuple[Int8Array, int, int, str]
 
 
 def locate_small_batch(points: object, solid: Solid) -> Located | None:
-    """Locate a small batch on the fast path; None where the general path must be taken. Raises as `locate` does."""
+    """Return the locations of a small batch on the fast path, and counts; None where the general path must be taken.
+    Raises as `locate` does."""
     if not isinstance(solid, Solid):
         return None
     array: Any = points
@@ -90,8 +91,8 @@ def _with_exact_fallback(array: FloatArray, solid: Solid, locations: Int8Array, 
 
 
 def _plan_of(solid: Solid, n_points: int) -> Plan | None:
-    """Return the `Plan` of a solid for a batch of `n_points`, made at first use; None if `policy.py` chooses cells, or
-    if the kernel is not compiled yet."""
+    """Return the `Plan` of a solid (compiled kernel and its arguments) for a batch of `n_points`, made at first use;
+    None if `policy.py` chooses cells, or if the kernel is not compiled yet."""
     if isinstance(solid, Polygon) and len(solid.vertices) <= _SMALL:
         return _cached_plan(solid, "plan", polygon_by(solid, Choice.PASS, UNLIMITED))
     if isinstance(solid, Polygon):

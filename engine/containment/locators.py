@@ -43,7 +43,8 @@ Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 
 
 class Counts(NamedTuple):
-    """Of the points of a chunk: how many the filter left open, and how many were decided in rationals."""
+    """Counts of a chunk of points. beyond: how many the filter left open; rational: how many were decided in rationals.
+    """
 
     beyond: int
     rational: int
@@ -66,15 +67,14 @@ class Locator(NamedTuple):
     """Whether a call takes long however few points there are, so that a batch should not be cut into chunks."""
 
     def chosen(self, n_points: int, budget: Budget) -> Locator:
-        """Return the locator for a batch of `n_points` points."""
+        """Return the locator for a batch of `n_points` points: one by a structure that pays for so many, or self."""
         return self if self.for_batch is None else self.for_batch(n_points, budget)
 
 
 def with_exact_fallback(kernel: Callable[[FloatArray, Int8Array, Budget], int], rest: Fill) -> Fill:
     """Return a `Fill` that calls a filter kernel, then `rest` for the points that the kernel leaves UNDECIDED. kernel:
-    returns how many points its filter left open (UNDECIDED ones included), or NOT_FINITE. Raises: NotFiniteError, which
-    names no point; what `Budget.check` raises, also where the kernel stopped early.
-    """
+    returns how many points its filter left open (UNDECIDED ones included), or NOT_FINITE. The `Fill` raises
+    NotFiniteError, which names no point, and as `Budget.check`, also where the kernel stopped early."""
 
     def fill(points: FloatArray, locations: Int8Array, budget: Budget) -> Counts:
         if len(points) == 0:
@@ -92,8 +92,8 @@ def with_exact_fallback(kernel: Callable[[FloatArray, Int8Array, Budget], int], 
 
 
 def settle(fill: Fill, points: FloatArray, locations: Int8Array, items: IntArray, budget: Budget) -> int:
-    """Locate points[items] by `fill` and write the results to locations[items]; return how many were decided in
-    rationals."""
+    """Locate the points numbered `items` by `fill`, and write the results to locations[items]; return how many of them
+    were decided in rationals."""
     if not len(items):
         return 0
     results = np.empty(len(items), np.int8)
@@ -129,7 +129,8 @@ def exact_fallback(solid: Solid, pose: Pose | None = None) -> Fill:
 def by_kernel(
     method: str, kernel: Callable[..., int], solid: Solid, *prepared: object, pose: Pose | None = None
 ) -> Locator:
-    """Return the locator that calls ``kernel(points, *prepared, locations, flag)`` and falls back to rationals."""
+    """Return the locator that calls ``kernel(points, *prepared, locations, flag)`` and decides the points left
+    UNDECIDED in rational arithmetic, in `solid` under `pose` (None: not moved). method: name for `Accuracy.method`."""
     return Locator(method, _filled_by(kernel, *prepared, rest=exact_fallback(solid, pose)), direct=(kernel, *prepared))
 
 
@@ -232,7 +233,7 @@ def _call(solid: Implicit) -> Fill:
 
 def csg_locator(solid: Csg, leaf_locator: Callable[[Solid], Locator] = locator_of) -> Locator:
     """Return the locator of a CSG tree: each distinct leaf is located once a chunk, and the tree combines the
-    locations."""
+    locations. leaf_locator: makes the locator of a leaf."""
     leaves: dict[int, Locator] = {}
     fold_csg_tree(solid, lambda leaf: leaves.setdefault(id(leaf), leaf_locator(leaf)), lambda *_: None)
 

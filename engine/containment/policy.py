@@ -77,7 +77,8 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
 
 
 def _cells_amortize(solid: Polyhedron, seen: int) -> bool:
-    """Return whether `seen` points located by the tree would have cost more than building cells."""
+    """Return whether locating `seen` points by the tree would have cost more than building cells, which are possible.
+    """
     n_faces = len(solid.triangles)
     least = _CELLS + _CELLS_A_FACE * n_faces
     if seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least or seen * cost_in_tree(solid) <= least:

@@ -1,4 +1,4 @@
-"""Locates points in posed solids: filters in the body's own frame, exact on input and transform.
+"""Locates points in posed solids: filters in the pose frame (the body's own), exact on input and transform.
 
 A posed solid is the exact image of the solid under p -> R p + t; a sphere has the same radius about the exact image of
 its centre. Points are moved into the solid's frame with a bound on the rounding and filtered there
@@ -83,8 +83,9 @@ def posed_implicit(solid: Implicit, pose: Pose) -> Locator:
 
 
 def by_filter(prepare: Callable[[Any, Check], tuple[Any, ...]]) -> Callable[[Any, Pose], Locator]:
-    """Return a function (solid, pose) -> `Locator` that filters preimages of points, then decides the rest exactly.
-    prepare: (solid, check) -> (kernel, *arguments) for a call kernel(points, blurs, *arguments, locations, flag)."""
+    """Return a function (solid, pose) -> `Locator` that filters preimages of points in the pose frame, then decides the
+    rest exactly. prepare: (solid, check) -> (kernel, *arguments) for a call kernel(points, blurs, *arguments,
+    locations, flag)."""
 
     def locator(solid: Solid, pose: Pose) -> Locator:
         unposed = locator_of(solid)

@@ -49,8 +49,8 @@ _NO_STATUSES: Final = np.empty(0, np.int8)
 def close_rings(
     vertices: FloatArray, ring_offsets: IntArray, xs: FloatArray, ys: FloatArray, runs: Int32Array, box: FloatArray
 ) -> None:
-    """Copy rings to xs, ys, each closed by its first vertex, with one run (first, last index) a ring in runs (n_rings,
-    2). vertices: (n, 2). box: filled with xmin, xmax, ymin, ymax."""
+    """Copy rings to xs, ys, each ended by its first vertex once more, and fill runs (n_rings, 2) with the first and
+    last index of each there, and box with xmin, xmax, ymin, ymax. vertices: (n, 2)."""
     place, x_min, x_max, y_min, y_max = 0, np.inf, -np.inf, np.inf, -np.inf
     for ring in range(len(ring_offsets) - 1):
         first, last = ring_offsets[ring], ring_offsets[ring + 1]
@@ -69,8 +69,9 @@ def close_rings(
 def list_runs(
     ys: FloatArray, rings: Int32Array, slabs: Axis, ends: IntArray, lasts: IntArray, runs: Int32Array, is_fill: bool
 ) -> None:
-    """Count (ends[slab] += 1), or with `is_fill` write to runs, the runs of edges in each horizontal slab. rings (n,
-    2): first and last index of each ring in ys. lasts (n_slabs,): -1 on entry; where the last run of a slab ends."""
+    """Count the runs of edges in each horizontal slab, by ends[slab] += 1; if is_fill, also write them to runs. A run
+    is the indices in ys of its first and last vertex. rings (n, 2): the runs that are whole rings. lasts (n_slabs,): -1
+    on entry; the last vertex of the last run of each slab."""
     low, scale, n_slabs = slabs.low, slabs.cells_per_unit, slabs.n_cells
     for ring in range(len(rings)):
         there = cell_of(ys[rings[ring, 0]], low, scale, n_slabs)
@@ -95,7 +96,8 @@ def _place(value: float, axis: Axis) -> float:
 def mark_cells(
     xs: FloatArray, ys: FloatArray, runs: Int32Array, u: Axis, v: Axis, statuses: Int8Array, flag: FlagArray
 ) -> None:
-    """Set to MIXED the status of every grid cell that an edge may reach into."""
+    """Set to MIXED the status of every cell, of a grid with the axes u and v, that an edge of the runs may reach into.
+    """
     for run in range(len(runs)):
         bu, bv = _place(xs[runs[run, 0]], u), _place(ys[runs[run, 0]], v)
         for edge in range(runs[run, 0], runs[run, 1]):
@@ -117,8 +119,8 @@ def mark_cells(
 
 @kernel
 def propagate_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> None:
-    """Set the location of each cell that is not MIXED: copied from the cell left or below (flood fill), else by the
-    slabs."""
+    """Fill statuses with the location of each cell that is not MIXED: copied from the cell left or below (flood fill),
+    else that of the cell's centre by the slabs; MIXED if that is undecided."""
     u, v, slabs = rings.u, rings.v, rings.slabs
     for row in range(v.n_cells):
         if flag[0]:
@@ -144,7 +146,8 @@ def propagate_locations(rings: Rings, statuses: Int8Array, flag: FlagArray) -> N
 
 
 def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArray, FloatArray, Int32Array, FloatArray]:
-    """Return xs, ys (each ring closed by its first vertex), runs (n_rings, 2) and box (4,): see `close_rings`."""
+    """Return xs, ys (the vertices of rings, each ring ended by its first one), runs (n_rings, 2) and box (4,): see
+    `close_rings`."""
     n_rings = len(ring_offsets) - 1
     xs, ys = np.empty((2, len(vertices) + n_rings))
     runs, box = np.empty((n_rings, 2), np.int32), np.empty(4)
@@ -210,7 +213,8 @@ def ring_cells_of(solid: Polygon, flag: FlagArray, check: Check = no_check) -> R
 
 
 def mean_edges_met(solid: Polygon | Triangle) -> tuple[float, float]:
-    """Return how many edges a vertical and a horizontal line meet in the mean, over the polygon's box; found once."""
+    """Return how many edges a vertical line, and a horizontal one, meet on average over the polygon's box; computed
+    once."""
 
     def find() -> tuple[float, float]:
         edges, means = edges_of(solid), []
@@ -277,7 +281,8 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
 
 
 def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
-    """Return the addresses (5), sizes (3) and numbers (10: origin, scale, low, high) of a tree, for `tree_at`."""
+    """Return the addresses of the arrays (5), their sizes (3) and the numbers (10: origin, scale, low, high) of a tree,
+    as one row of the tables that `tree_at` reads."""
     arrays: Any = tree.vertices, tree.triangles, tree.boxes, tree.child, tree.blocks
     sizes = len(tree.vertices), len(tree.triangles), len(tree.child)
     return tuple(array.ctypes.data for array in arrays), sizes, (*tree.origin, tree.scale, *tree.low, *tree.high)
@@ -285,7 +290,8 @@ def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tupl
 
 @inline
 def tree_at(tables: Any, row: int) -> TriangleTree:
-    """Return the tree of row `row` of tables addresses (n, 5), sizes (n, 3) and places (n, 10): see `tree_row`."""
+    """Return the tree that row `row` of the tables encodes: addresses (n, 5), sizes (n, 3), places (n, 10), see
+    `tree_row`."""
     addresses, sizes, places = tables.addresses, tables.sizes, tables.places
     return TriangleTree(
         array_at(addresses[row, 0], (sizes[row, 0], 3), np.float64),
@@ -299,7 +305,7 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
 
 
 def mean_faces_above(solid: Polyhedron) -> float:
-    """Return how many face boxes a vertical line meets in the mean, from a sample of faces; thousands on bad shapes."""
+    """Return how many face boxes a vertical line meets on average, from a sample of faces; thousands on bad shapes."""
 
     def find() -> float:
         some = solid.vertices[solid.triangles[:: len(solid.triangles) // SAMPLE + 1], :2]
@@ -324,9 +330,9 @@ def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
 
 
 def rounded_rows(rows: Sequence[Sequence[int | Fraction]]) -> tuple[FloatArray, BoolArray]:
-    """Return rational plane rows as float64, scaled to a largest coefficient near 1, and by row whether that is exact.
-    A nonzero coefficient below 2^-900 of the largest could underflow: such a row becomes NaN, which no filter accepts.
-    """
+    """Return rational plane rows as float64, scaled to a largest coefficient near 1; and, by row, whether all its
+    numbers are exact. A nonzero coefficient below 2^-900 of the largest could underflow: such a row becomes NaN, which
+    no filter accepts."""
     rounded, is_exact = np.empty((len(rows), len(rows[0]))), np.empty(len(rows), np.bool_)
     for i_row, row in enumerate(rows):
         largest = max(abs(Fraction(value)) for value in row)

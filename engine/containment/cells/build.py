@@ -74,12 +74,12 @@ class Sides(NamedTuple):
 
 
 def cells_of(solid: Polyhedron, budget: Budget) -> Cells:
-    """Return the `Cells` of a polyhedron, built at first use; `can_have_cells` must hold."""
+    """Return the `Cells` of a polyhedron, built at first use. Caller guarantees `can_have_cells`."""
     return solid.prepared("cells", lambda: build_cells(solid, budget), budget.check)
 
 
 def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
-    """Build the cells of `solid`. Raises what `Budget.check` raises."""
+    """Build the cells of `solid`. Raises: DeadlineExceededError, CancelledError."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     mesh = Mesh(tree.vertices, tree.triangles, lattice)
     counts = count_triangles(mesh, budget)
@@ -101,8 +101,9 @@ def build_cells(solid: Polyhedron, budget: Budget) -> Cells:
 
 
 def sides_if_profitable(solid: Polyhedron, n_points: int, budget: Budget) -> Sides | None:
-    """Return the `Sides` of a polyhedron, built at first use; None until scenes have located enough points to pay for
-    them. Construction takes about 0.5 us a face and 10 ns a cell, some 0.5 ms for 1,000 faces; a ray takes 0.2 us."""
+    """Return the `Sides` of a polyhedron, built at first use; None until scenes have located enough points (n_points
+    more now) to pay for them, or if they cannot be built. Construction takes about 0.5 us a face and 10 ns a cell, some
+    0.5 ms for 1,000 faces; a ray takes 0.2 us."""
     seen = solid.prepared("scene_points_seen", lambda: [0], budget.check)
     seen[0] += n_points
     n_faces = len(solid.triangles)
@@ -114,7 +115,7 @@ def sides_if_profitable(solid: Polyhedron, n_points: int, budget: Budget) -> Sid
 
 
 def build_sides(solid: Polyhedron, budget: Budget) -> Sides:
-    """Build the `Sides` of a polyhedron. Raises what `Budget.check` raises."""
+    """Build the `Sides` of a polyhedron. Raises: DeadlineExceededError, CancelledError."""
     tree, lattice = tree_of(solid, budget.check), lattice_of(solid, budget)
     counts = count_triangles(Mesh(tree.vertices, tree.triangles, lattice), budget)
     statuses = _statuses(_sides_by_rays(tree, lattice, counts, True, budget), counts)
@@ -127,9 +128,9 @@ def _statuses(sides: Int8Array, counts: IntArray) -> Int8Array:
 
 @kernel
 def label_empty_cells(counts: IntArray, nx: int, ny: int, labels: IntArray) -> None:
-    """Fill labels (nz * ny * nx,) int64 with the cell whose side each empty cell has too (flood fill). counts:
-    triangles listed in each cell. A cell with triangles, and the first of a connected group, has its own index.
-    """
+    """Fill labels (nz * ny * nx,) int64 with the number of a cell on the same side of the surface (flood fill in
+    scanning order): an empty cell takes the label of an empty neighbour before it; the first of a group, and a cell
+    with triangles, its own number. counts: triangles listed in each cell."""
     for cell in range(len(counts)):
         labels[cell] = cell
         if counts[cell] != 0:
@@ -145,10 +146,9 @@ def label_empty_cells(counts: IntArray, nx: int, ny: int, labels: IntArray) -> N
 def _sides_by_rays(
     tree: TriangleTree, lattice: Lattice, counts: IntArray, only_empty: bool, budget: Budget
 ) -> Int8Array:
-    """Return by cell the side (1 inside, -1 outside) of an empty cell, or of another cell's reference point, by
-    vertical rays. _UNKNOWN: the reference point rounds out of its cell, is on the boundary, or UNDECIDED. counts:
-    triangles listed in each cell. only_empty: skip cells with triangles.
-    """
+    """Return, by cell, the side (1 inside, -1 outside) of an empty cell, or of the reference point of another, by
+    vertical rays. _UNKNOWN: the reference point rounds out of its cell, is on the boundary, or is UNDECIDED. counts:
+    triangles listed in each cell. only_empty: skip cells with triangles."""
     (nx, ny, _), labels = lattice.n, np.empty(len(counts), np.int64)
     label_empty_cells(counts, nx, ny, labels)
     queried = np.flatnonzero((labels == np.arange(len(labels))) & ((counts == 0) | (not only_empty)))
@@ -170,8 +170,8 @@ def fill_groups(
     mesh: Mesh, leaves: IntArray, starts: IntArray, firsts: IntArray, ends: IntArray, lists: Int32Array,
     groups: Float32Array, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill groups (n, 14, 8) with the triangles listed in the cells `leaves`, those of a cell from group starts[item]
-    on."""
+    """Fill groups (n, 14, 8) with the triangles of the cells ``leaves[item]``, eight a group: those listed in
+    lists[firsts[item] : ends[item]] go to the groups from starts[item] on."""
     nx, ny, _ = mesh.lattice.n
     for item in range(len(leaves)):
         if flag[0]:
@@ -185,7 +185,8 @@ def fill_groups(
 def _fill_list(
     mesh: Mesh, triangles: Int32Array, reference: tuple[float, ...], groups: Float32Array, first_group: int
 ) -> None:
-    """Write the triangles of one cell to its groups, relative to the cell's reference point, in units of cells."""
+    """Write the triangles of one cell to groups from `first_group` on, relative to the cell's reference point, in units
+    of cells."""
     scale, n_groups = mesh.lattice.scale, (len(triangles) + LANES - 1) // LANES
     for place in range(n_groups * LANES):
         row = groups[first_group + place // LANES, :, place % LANES]

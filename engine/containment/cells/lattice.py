@@ -45,8 +45,8 @@ _FLAT: Final = 2.0**-300
 
 
 class Walls(NamedTuple):
-    """Linear functions of the centre w of a cell, each >= 0 where the cell may meet a triangle: (slope, slope,
-    constant)."""
+    """Linear functions of the centre w of a cell, relative to corner a of a triangle, each >= 0 where the cell may meet
+    the triangle: (slope, slope, constant), the slopes of two coordinates of w."""
 
     seen_along_z: Any
     """Three functions of (x, y): the edges projected along z."""
@@ -61,7 +61,7 @@ class Walls(NamedTuple):
 
 @inline
 def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
-    """Return the `Walls` of the triangle 0, u, v."""
+    """Return the `Walls` of the triangle with corners 0, u and v, in units of cells."""
     nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
     su, sv = abs(u[0]) + abs(u[1]) + abs(u[2]), abs(v[0]) + abs(v[1]) + abs(v[2])
     reach = _MARGIN * (abs(nx) + abs(ny) + abs(nz)) + _ROUNDING * su * sv * (su + sv + 6.0)
@@ -73,8 +73,8 @@ def walls_of(u: tuple[float, ...], v: tuple[float, ...]) -> Any:
 
 @inline
 def _edges(ux: float, uy: float, vx: float, vy: float) -> Any:
-    """Return three (slope, slope, constant), one for each edge of a planar triangle (0, u, v); (0, 0, 1) if its area
-    may be 0."""
+    """Return three linear functions (slope, slope, constant), one for each edge of the planar triangle with corners 0,
+    u and v, positive inside; each (0, 0, 1) if its area may be 0."""
     area = ux * vy - uy * vx
     if not abs(area) > _ROUNDING * (abs(ux * vy) + abs(uy * vx)):
         return (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
@@ -108,8 +108,9 @@ def _narrowed(low: float, high: float, slope: float, value: float) -> tuple[floa
 
 @inline
 def rows_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tuple[int, int]:
-    """Return first and last row (y index) of a layer of cells that the triangle may reach into, within first .. last.
-    z: of the layer's cell centres; y: of the cell centres of row 0."""
+    """Return first and last row (y index) of a layer of cells that the triangle may reach into, within first .. last;
+    first > last if there is none. z: of the layer's cell centres, y: of the cell centres of row 0, relative to corner
+    a."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_x:
         low, high = _narrowed(low, high, wall[0], wall[0] * y + wall[1] * z + wall[2])
@@ -118,8 +119,8 @@ def rows_reached(walls: Walls, z: float, y: float, first: int, last: int) -> tup
 
 @inline
 def cells_reached(walls: Walls, z: float, y: float, x: float, first: int, last: int) -> tuple[int, int]:
-    """Return first and last cell (x index) of a row that the triangle may reach into, within first .. last. z, y: of
-    the row's cell centres; x: of the centre of cell 0."""
+    """Return first and last cell (x index) of a row that the triangle may reach into, within first .. last; first >
+    last if there is none. z, y: of the row's cell centres, x: of the centre of cell 0, relative to corner a."""
     low, high = float(first), float(last)
     for wall in walls.seen_along_z:
         low, high = _narrowed(low, high, wall[0], wall[0] * x + wall[1] * y + wall[2])
@@ -149,7 +150,8 @@ _RANGE: Final = 2.0**400
 
 
 class Lattice(NamedTuple):
-    """A uniform grid: low corner, cells per unit, cell size (powers of two) and number of cells, each (x, y, z)."""
+    """A uniform grid, in the order x, y, z: its low corner, 1 / size, the size of a cell (powers of two), and the
+    numbers of cells."""
 
     low: tuple[float, float, float]
     scale: tuple[float, float, float]
@@ -159,7 +161,7 @@ class Lattice(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """A polyhedron and its grid."""
+    """A polyhedron's vertices (n, 3) and triangles (m, 3), and its grid."""
 
     vertices: FloatArray
     triangles: Int32Array
@@ -168,13 +170,14 @@ class Mesh(NamedTuple):
 
 @inline
 def index_of(value: float, low: float, scale: float) -> int:
-    """Return the index along an axis of the cell that contains `value` >= `low`."""
+    """Return the index, along an axis, of the cell that contains `value` >= `low`. low: of the grid; scale: cells per
+    unit."""
     return int((value - low) * scale)
 
 
 @inline
 def reference_point(lattice: Lattice, x: int, y: int, z: int) -> Any:
-    """Return the coordinates of the reference point of cell (x, y, z)."""
+    """Return the coordinates of the reference point of cell (x, y, z): that at the fractions PLACE of its sides."""
     low, size = lattice.low, lattice.size
     return low[0] + (x + PLACE[0]) * size[0], low[1] + (y + PLACE[1]) * size[1], low[2] + (z + PLACE[2]) * size[2]
 
@@ -187,13 +190,15 @@ def scaled_difference(a: Any, b: Any, scale: tuple[float, ...]) -> Any:
 
 @inline
 def _span(a: float, b: float, c: float, low: float, scale: float, n: int) -> tuple[int, int]:
-    """Return first and last cell index, along one axis, of the box of a triangle with corner coordinates a, b, c."""
+    """Return first and last cell index, along one axis, of the box of a triangle with corner coordinates a, b, c. low:
+    of the grid; scale: cells per unit; n: number of cells."""
     return max(index_of(min(a, b, c), low, scale), 0), min(index_of(max(a, b, c), low, scale), n - 1)
 
 
 @kernel
 def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool, flag: FlagArray) -> None:
-    """Count (ends[cell] += 1) or list (items[ends[cell]] = triangle) the triangles that may reach into each cell."""
+    """Count the triangles that may reach into each cell, by ends[cell] += 1; if is_fill, also list them, by
+    items[ends[cell]] = triangle before that. Stops if `flag` is set."""
     low, scale, (nx, ny, nz) = mesh.lattice.low, mesh.lattice.scale, mesh.lattice.n
     for triangle in range(len(mesh.triangles)):
         if flag[0]:
@@ -219,7 +224,7 @@ def list_triangles(mesh: Mesh, ends: IntArray, items: Int32Array, is_fill: bool,
 
 
 def can_have_cells(solid: Polyhedron) -> bool:
-    """Return whether extent and coordinates of a polyhedron are within `_RANGE`."""
+    """Return whether extent and coordinates of a polyhedron are within `_RANGE`, in which cells can be built."""
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     with np.errstate(over="ignore"):
         extent = (high - low).max()
@@ -227,7 +232,8 @@ def can_have_cells(solid: Polyhedron) -> bool:
 
 
 def lattice_of(solid: Polyhedron, budget: Budget) -> Lattice:
-    """Return the grid of a polyhedron, chosen once; so coarse that few cells list the same triangle."""
+    """Return the grid of a polyhedron, chosen at first use: halved in resolution until a sample shows that few cells
+    list the same triangle."""
 
     def find() -> Lattice:
         tree, most = tree_of(solid, budget.check), _MOST_CELLS
@@ -252,7 +258,8 @@ def count_triangles(mesh: Mesh, budget: Budget) -> IntArray:
 
 
 def _make_lattice(tree: TriangleTree, most: float) -> Lattice:
-    """Return a grid of at most `most` cells along the longest axis, of one cell along an axis without extent."""
+    """Return a grid over the triangles of a tree, with at most `most` cells along its longest axis, and one along an
+    axis without extent."""
     extent = np.subtract(tree.high, tree.low)
     largest = float(extent.max())
     size = _power_of_two(largest / min(most, max(8.0, _WANTED * len(tree.triangles) ** (1.0 / 3.0))))

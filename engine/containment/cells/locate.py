@@ -39,9 +39,9 @@ _AHEAD: Final = 6
 def _look_up_statuses(
     points: Any, start: Any, end: Any, cells: Any, locations: Any, item_of: Any, n_undecided: Any
 ) -> Any:
-    """Write the cell statuses of points start .. end - 1 to locations, and append the indices of UNDECIDED points to
-    item_of. Returns the new length of item_of, and how many points are outside the grid; these, and points with NaN,
-    get the last status. Without branches."""
+    """Write the cell statuses of points start .. end - 1 to locations, and append the numbers of UNDECIDED points to
+    item_of, after the n_undecided there. Returns the new length of item_of, and how many points are outside the grid;
+    these, and points with NaN, get the last status. Without branches."""
     low, scale, n, statuses = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.statuses
     nx, ny, beyond = np.int32(n[0]), np.int32(n[1]), np.uint32(n[0] * n[1] * n[2])
     x_end, y_end, z_end = float(n[0]), float(n[1]), float(n[2])
@@ -63,8 +63,9 @@ def _look_up_statuses(
 
 @merged
 def _look_up_codes(points: Any, cells: Any, undecided: Any, n_undecided: int) -> Any:
-    """Look up the cell codes of the UNDECIDED points; return how many of their cells have a list of triangles.
-    undecided: scratch (item_of, code_of, places, waiting), see `locate_by_cells`."""
+    """Look up the cell codes of the n_undecided UNDECIDED points; return how many of their cells have a list of
+    triangles. undecided: (item_of, code_of, places, waiting): of each the point, the code, the cell's indices; and
+    those with a list."""
     low, scale, n, codes = cells.lattice.low, cells.lattice.scale, cells.lattice.n, cells.codes
     item_of, code_of, places, waiting = undecided
     n_waiting = np.uint64(0)
@@ -82,7 +83,8 @@ def _look_up_codes(points: Any, cells: Any, undecided: Any, n_undecided: int) ->
 
 @merged
 def _query_lists(points: Any, cells: Any, undecided: Any, n_waiting: Any, locations: Any) -> None:
-    """Locate the UNDECIDED points whose cells have lists, by the parity of crossings from the reference point."""
+    """Write to locations those of the n_waiting UNDECIDED points whose cells have lists, by the parity of crossings
+    from the reference point. undecided: filled by `_look_up_codes`."""
     lattice, groups = cells.lattice, cells.groups
     item_of, code_of, places, waiting = undecided
     for turn in range(min(n_waiting, np.uint64(_AHEAD))):
@@ -100,9 +102,9 @@ def _query_lists(points: Any, cells: Any, undecided: Any, n_waiting: Any, locati
 
 @allocating_kernel
 def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: FlagArray) -> int:
-    """Fill locations (n,) int8 of points (n, 3) by `Cells`; return how many stay UNDECIDED, or NOT_FINITE. Points go
-    through the stages in blocks, so that memory loads of a stage overlap: status (enough for most points), code, parity
-    over the list. Only points outside the grid are tested for NaN and infinity."""
+    """Fill locations (n,) int8 of points (n, 3) by the `Cells` of a polyhedron; return how many stay UNDECIDED, or
+    NOT_FINITE. Points go through the stages in blocks, so that memory loads of a stage overlap: status (enough for most
+    points), code, parity over the list. Only points outside the grid are tested for NaN and infinity."""
     room = _FEWEST + _BLOCK + 1
     item_of, waiting = np.empty(room, np.uint64), np.empty(room, np.uint64)
     undecided = item_of, np.empty(room, np.int32), np.empty((room, 3), np.int32), waiting
@@ -126,8 +128,9 @@ def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: 
 
 @inline
 def side_in_cell(frames: FloatArray, places: IntArray, row: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of a blurred point p = (x, y, z) where one cell contains its whole blur, else UNDECIDED.
-    frames (n, 6), places (n, 4): `frame` and `place` of the `Sides` of each polyhedron; row: the polyhedron."""
+    """Return the location of the blurred point p = (x, y, z), whose coordinates are known to +- blur, if one cell
+    contains all of its blur, else UNDECIDED. frames (n, 6), places (n, 4): `frame` and `place` of the `Sides` of each
+    polyhedron; row: the polyhedron."""
     x, y, z = p
     x_low, y_low, z_low = frames[row, 0], frames[row, 1], frames[row, 2]
     x_scale, y_scale, z_scale = frames[row, 3], frames[row, 4], frames[row, 5]

@@ -44,7 +44,7 @@ from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, Int8Array,
 
 
 class Frames(NamedTuple):
-    """The poses of many bodies with their inverses; 2D poses fill the upper left block."""
+    """The poses of many bodies with their inverses; 2D poses fill the upper left block of a matrix."""
 
     rows: Int32Array
     """Row of each body's pose in the arrays below, -1 for a body without a pose."""
@@ -58,7 +58,8 @@ class Frames(NamedTuple):
 
 
 def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
-    """Return `Frames` of the poses that are not the identity; `rows` tells the row of each body's pose."""
+    """Return `Frames` of the poses that are not the identity; their `rows` has the row of each body's pose, -1 for the
+    others."""
     given = [(body, pose) for body, pose in enumerate(poses) if pose is not None]
     rotations, translations = np.zeros((len(given), 3, 3)), np.zeros((len(given), 3))
     rotations[:, 2, 2] = 1.0
@@ -76,7 +77,8 @@ def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
 
 
 def _inverses(rotations: FloatArray) -> FloatArray:
-    """Return R^-1 = adj(R) / det(R) for matrices (n, 3, 3); exact where R permutes the axes."""
+    """Return R^-1 = adj(R) / det(R) for matrices (n, 3, 3), rounded; exact where R only permutes the axes, up to sign.
+    """
     after = (1, 2, 0)
     adjugates = np.empty_like(rotations)
     for i in range(3):
@@ -93,8 +95,8 @@ _BLUR: Final = 16.0 * 2.0**-53
 
 @inline
 def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
-    """Return a point (x, y, z) in the frame of a pose, and its blur (0.0: exact). frames: inverses (n, 3, 3),
-    translations (n, 3), is_turn (n,): whether R only permutes axes, up to sign. frame: row of the pose, -1 for none."""
+    """Return point p = (x, y, z) in the frame of a pose, R^-1 (p - t), and its blur: twice the error bound of a
+    coordinate, 0.0 if it is exact. frame: row of the pose in `frames`, -1 for none."""
     if frame < 0:
         return p, 0.0
     inverses, translations = frames.inverses, frames.translations
@@ -111,7 +113,8 @@ def to_frame(frames: Frames, frame: int, p: tuple[float, ...]) -> Any:
 
 @kernel
 def move_to_body_frame(points: FloatArray, frames: Frames, moved: FloatArray, blurs: FloatArray) -> None:
-    """Fill moved (n, dim) and blurs (n,) with the preimages of points under the only pose in `frames`."""
+    """Fill moved (n, dim) and blurs (n,) with the preimages of points (n, dim) under the only pose in `frames`, and
+    their blurs."""
     for item in range(len(points)):
         p, blurs[item] = to_frame(frames, 0, in_space(points, item))
         moved[item, 0], moved[item, 1] = p[0], p[1]
@@ -149,9 +152,8 @@ def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
 def side_of_box(
     low: tuple[float, ...], high: tuple[float, ...], is_flat: bool, p: tuple[float, ...], blur: float
 ) -> int:
-    """Return the location of a blurred point (x, y, z) in a box: 1 inside, 0 boundary, -1 outside, UNDECIDED. is_flat:
-    a planar box; all z are 0.
-    """
+    """Return the location of a blurred point p = (x, y, z) in the box low .. high: 1 inside, 0 boundary, -1 outside,
+    UNDECIDED if not all of its blur has one. is_flat: a planar box; all z are 0."""
     is_out = (p[0] + blur < low[0]) | (p[0] - blur > high[0])
     is_out |= (p[1] + blur < low[1]) | (p[1] - blur > high[1])
     is_out |= (p[2] + blur < low[2]) | (p[2] - blur > high[2])
@@ -167,7 +169,8 @@ def side_of_box(
 
 @inline
 def side_of_rows(rows: FloatArray, first: int, last: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of a blurred point (x, y, z) by plane rows first .. last - 1 (n, 4): 1, -1 or UNDECIDED."""
+    """Return the location of a blurred point p = (x, y, z) in the intersection of the half-spaces first .. last - 1 of
+    plane rows (n, 4): 1 inside, -1 outside, or UNDECIDED."""
     location = 1
     for row in range(first, last):
         ax, by, cz, d = rows[row, 0] * p[0], rows[row, 1] * p[1], rows[row, 2] * p[2], rows[row, 3]
@@ -258,7 +261,7 @@ _BALL_BLOCK: Final = 64
 @merged
 def location_in_ball(dx: float, dy: float, dz: float, square: float, reach: float, blur: float) -> float:
     """Return 1.0 (inside), -1.0 (outside) or 2.0 (UNDECIDED) for a point that differs from a ball's centre by (dx, dy,
-    dz). square: r^2. reach: r + 2 blur. blur: bound on the error of a coordinate of the centre."""
+    dz), by doubles. square: r^2; reach: r + 2 blur; blur: bound on the error of a coordinate of the centre."""
     ax, ay, az = abs(dx), abs(dy), abs(dz)
     total = dx * dx + dy * dy + dz * dz
     excess, bound = square - total, _BALL_SLACK * (square + total) + _TINY
@@ -274,8 +277,8 @@ def _has_exact_square(value: float) -> bool:
 
 @called
 def _settle(points: FloatArray, item: int, center: FloatArray, radius: float, expansion: Any) -> int:
-    """Return the location of a point in a ball by exact sums: 1, 0, -1; UNDECIDED if a difference or a square is no
-    exact pair."""
+    """Return the location of point `item` in a ball by the exact sign of r^2 - |p - c|^2: 1, 0, -1; UNDECIDED if a
+    difference is not exact or a square no exact pair. expansion: scratch."""
     if not _has_exact_square(radius):
         return UNDECIDED
     n = grow_product(expansion, 0, radius, radius)

@@ -51,7 +51,8 @@ def _row(planes: FloatArray, row: int, is_flat: bool) -> HalfSpace3:
 
 @inline
 def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: BoolArray) -> tuple[int, bool]:
-    """Return the location of point `item` of (n, 2 or 3), and whether the filter left a plane open."""
+    """Return the location of point `item` of (n, 2 or 3) in an intersection of half-spaces, and whether the filter left
+    a plane open. is_exact: by row of planes, as in `locate_in_half_spaces`."""
     x, y, z = in_space(points, item)
     p, location, is_unsure = Point3(x, y, z), 1, False
     for row in range(len(planes)):
@@ -73,7 +74,8 @@ def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: Boo
 
 @inline
 def _largest(values: FloatArray, folded: FloatArray) -> float:
-    """Return max |values| of a block (_BLOCK,), folded by halves so that the compiler vectorises it."""
+    """Return max |values| of a block (_BLOCK,), folded by halves so that the compiler vectorises it. folded: scratch.
+    """
     half = _BLOCK // 2
     for k in range(half):
         folded[k] = max(abs(values[k]), abs(values[k + half]))
@@ -93,9 +95,9 @@ def _value(h: HalfSpace3, x: float, y: float, z: float, is_flat: bool) -> Any:
 def locate_in_half_spaces(
     points: FloatArray, planes: FloatArray, is_exact: BoolArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill locations (n,) int8 of points (n, dim) in an intersection of half-spaces; UNDECIDED beyond the exponents'
-    range. planes: (m, dim + 1). is_exact: (m,) bool, False for a row that is rounded from a rational one. Returns how
-    many points the filter left open, or NOT_FINITE. Stops early once flag[0] is set."""
+    """Fill locations (n,) int8 of points (n, dim) in an intersection of half-spaces; UNDECIDED where exponents are out
+    of range. planes: (m, dim + 1). is_exact: (m,) bool, False for a row that is rounded from a rational one. Returns
+    how many points the filter left open, or NOT_FINITE. Stops early once flag[0] is set."""
     is_flat = planes.shape[1] == 3
     if has_not_finite(points):
         return NOT_FINITE

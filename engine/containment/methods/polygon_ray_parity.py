@@ -1,4 +1,4 @@
-"""Point location in a polygon by ray parity: even-odd over all edges of all rings, exact, one ray a point.
+"""Point location in a polygon by ray parity (crossing number, even-odd over all rings), exact, one ray a point.
 
 The ray goes right from q, moved up by an infinitesimal eps (simulation of simplicity), so it misses every vertex:
 
@@ -59,8 +59,8 @@ class Rings(NamedTuple):
 
 @merged
 def _crosses_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float, blur: float) -> tuple[bool, bool]:
-    """Return whether the ray to the right from q = (x, y) crosses edge ab, and whether the filter cannot prove the
-    answer."""
+    """Return whether the ray to the right from q = (x, y) crosses edge ab, and whether the filter fails to prove that
+    for all of the blur of q."""
     above = ay - y
     left = (ax - x) * (by - y)
     right = above * (bx - x)
@@ -76,7 +76,8 @@ def _crosses_edge(ax: float, ay: float, bx: float, by: float, x: float, y: float
 def _count_crossings(
     xs: FloatArray, ys: FloatArray, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, int]:
-    """Return how many edges between vertices first .. last the ray crosses, and how many the filter cannot decide."""
+    """Return how many of the edges from vertex first to vertex last (consecutive in xs, ys) the ray to the right from
+    the blurred point (x, y) crosses, and for how many the filter cannot tell."""
     n_crossed = n_unsure = 0
     for edge in range(np.uint64(first), np.uint64(last)):  # unsigned: no index that counts from the end
         follow = edge + np.uint64(1)
@@ -107,8 +108,8 @@ def meet_edge(a: Point2, b: Point2, q: Point2) -> int:
 
 @called
 def _locate_edge_by_edge(xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, q: Point2) -> int:
-    """Return the location of q by exact signs at the edges of runs first .. last - 1: 1, 0, -1, or UNDECIDED (exponent
-    range)."""
+    """Return the location of q by exact signs at the edges of runs first .. last - 1: 1, 0, -1, or UNDECIDED where
+    exponents are out of range."""
     is_odd, is_open = False, False
     for run in range(first, last):
         for edge in range(runs[run, 0], runs[run, 1]):
@@ -127,8 +128,8 @@ def _locate_edge_by_edge(xs: FloatArray, ys: FloatArray, runs: Int32Array, first
 def locate_in_runs(
     xs: FloatArray, ys: FloatArray, runs: Int32Array, first: int, last: int, x: float, y: float, blur: float
 ) -> tuple[int, bool]:
-    """Return the location of (x, y) by the runs first .. last - 1, and whether the filter left an edge open. Caller
-    guarantees that these runs have every edge at the height of the point."""
+    """Return the location of a blurred point (x, y) by the runs first .. last - 1 (1, 0, -1, UNDECIDED), and whether
+    the filter left an edge open. Caller guarantees that these runs have every edge at the height of the point."""
     n_crossed = n_unsure = 0
     for run in range(first, last):
         crossed, unsure = _count_crossings(xs, ys, runs[run, 0], runs[run, 1], x, y, blur)

@@ -26,8 +26,8 @@ _ODD, _ON_FACE, _OPEN, _BEYOND = 1, 2, 4, 8
 
 @inline
 def _sort_into_cells(points: FloatArray, u: Axis, v: Axis, firsts: IntArray, order: Int32Array) -> None:
-    """Sort points (n, 3) by grid cell into order (n,) int32, and fill firsts (n_cells + 1,) with the offsets of the
-    cells. u, v: the grid's axes along x and y. firsts: int64, zero on entry."""
+    """Sort the numbers of points (n, 3) by grid cell into order (n,) int32, and fill firsts (n_cells + 1,) int64, zero
+    on entry, with the offsets of the cells. u, v: the grid's axes along x and y."""
     for item in range(len(points)):
         firsts[_cell_at(points, item, u, v) + 1] += 1
     for cell in range(1, len(firsts)):
@@ -49,7 +49,7 @@ def _cell_at(points: FloatArray, item: int, u: Axis, v: Axis) -> int:
 
 @inline
 def _record(states: FlagArray, item: int, met: int) -> None:
-    """Update a point's state by `met`, a result of `meet_upwards`."""
+    """Update the state of point `item` by `met`, how its upward ray meets one triangle (result of `meet_upwards`)."""
     if met & BEYOND:
         states[item] |= _BEYOND
     met &= 3
@@ -83,7 +83,7 @@ def _cast_rays(
     flag: FlagArray,
 ) -> None:  # fmt: skip
     """Record in states (n,) uint8 how the upward rays from points (n, 3) meet the triangles (m, 3). cells: (u, v,
-    firsts, order), see `_sort_into_cells`. z_min: least z of the points."""
+    firsts, order), the grid over the points (`_sort_into_cells`). z_min: least z of the points."""
     u, v, firsts, order = cells
     for triangle in range(len(triangles)):
         if flag[0]:
@@ -110,8 +110,8 @@ def _cast_rays(
 
 @inline
 def _axis_over(points: FloatArray, axis: int, n_cells: int) -> Axis:
-    """Return an `Axis` of `n_cells` cells over the range of the points' coordinates, of one cell if that range is
-    empty."""
+    """Return an `Axis` of `n_cells` cells over the range of coordinate `axis` of the points, or of one cell if that
+    range is empty."""
     low = high = float(points[0, axis])
     for item in range(1, len(points)):
         low, high = min(low, float(points[item, axis])), max(high, float(points[item, axis]))

@@ -1,4 +1,4 @@
-"""Point location in a polyhedron by ray parity: even-odd over all triangles, exact, one ray a point.
+"""Point location in a polyhedron by ray parity (crossing number, even-odd over triangles), exact, one ray a point.
 
 The ray goes straight up from q = (x, y, z), moved by the symbolic (eps, eps^2, 0) (simulation of simplicity). So moved,
 no vertex, no edge and no vertical triangle is above q, and every other triangle is crossed in its interior or missed:
@@ -62,7 +62,7 @@ _ABOVE_ALL: Final = np.float32(8.0)
 
 @inline
 def orient2d_with_stage(a: Point2, b: Point2, c: Point2) -> Any:
-    """Return the exact sign of orient2d, and 0 if the filter proved it, else BEYOND."""
+    """Return the exact sign of orient2d(a, b, c), and 0 if the filter proved it, else BEYOND."""
     turn = orient2d_filter(a, b, c)
     if turn != UNDECIDED:
         return turn, 0
@@ -176,8 +176,8 @@ def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> in
 
 @merged
 def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, bool]:
-    """Return q in tree coordinates with its z rounded up, the float32 box (low, high) of its upward rays, the blur
-    there, and whether q is near enough to the tree for that."""
+    """Return (q in tree coordinates, its z rounded up; low, high: the float32 box of the upward rays from all of q's
+    blur; the blur in tree coordinates; whether q is near enough to the tree for these to hold)."""
     origin, scale = tree.origin, tree.scale
     x, y, z, wide = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale, blur / scale
     u, v, w = _SLACK * abs(x) + wide + LEAST, _SLACK * abs(y) + wide + LEAST, _SLACK * abs(z) + wide + LEAST
@@ -189,9 +189,9 @@ def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, b
 
 @allocating_kernel
 def list_uncertain(tree: Any, x: float, y: float, z: float, blur: float, uncertain: IntArray) -> tuple[int, bool]:
-    """List the triangles that the upward rays from a blurred point (x, y, z) may meet differently. Fills uncertain (n,)
-    int64 with rows of `tree.triangles`; returns their number, and whether the rays cross an odd number of the other
-    triangles. The number is -1 if there is no room, or the point is too far from the tree."""
+    """List the triangles that the upward rays from all points of the blurred (x, y, z) may meet differently: fill
+    uncertain (n,) int64 with rows of `tree.triangles`. Return their number, and whether the rays cross an odd number of
+    the other triangles. The number is -1 if there is no room, or the point is too far from the tree."""
     q, stack, n_uncertain, is_odd, n_stack = Point3(x, y, z), np.empty(STACK, np.int32), 0, False, 1
     _, least, most, _, is_near = _in_tree(tree, q, blur)
     if not is_near:
@@ -222,8 +222,8 @@ def list_uncertain(tree: Any, x: float, y: float, z: float, blur: float, uncerta
 @inline
 def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: FlagArray) -> tuple[int, bool]:
     """Return the location of a blurred q by a `TriangleTree` (1, 0, -1 or UNDECIDED), and whether the filter left it
-    open. stack: (STACK,) int32, scratch. A point far outside the tree's coordinates is outside, or UNDECIDED for its
-    blur."""
+    open. stack: (STACK,) int32, scratch. A point so far from the tree that its coordinates there have no bound is
+    outside, or UNDECIDED if it has a blur."""
     low, high = tree.low, tree.high
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
     if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
@@ -273,8 +273,8 @@ def locate_by_tree(points: FloatArray, blurs: FloatArray, tree: Any, locations: 
 def _locate_each(
     points: FloatArray, blurs: FloatArray, tree: Any, locations: Int8Array, stack: Int32Array, flag: FlagArray
 ) -> int:
-    """Do the work of `locate_by_tree`, as a call of its own, so that the tree's arrays are not reference-counted at
-    each point."""
+    """Do the work of `locate_by_tree` (arguments and result as there), in a function of its own so that the tree's
+    arrays are not reference-counted at each point. stack: scratch."""
     n_beyond = 0
     for item in range(len(points)):
         if flag[0]:
@@ -299,8 +299,9 @@ def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatA
 def reorder_by_tree(
     vertices: FloatArray, triangles: IntArray, tree: Bvh, child: Int32Array, ordered: Int32Array, blocks: Float32Array
 ) -> None:
-    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and renumber the items in child
-    accordingly. blocks: (n_nodes, 8, 8) float32, zero on entry; filled with what `overhead` takes."""
+    """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and child with its children, triangles
+    renumbered accordingly. blocks: (n_nodes, 8, 8) float32, zero on entry; filled with the triangles of each node as
+    `overhead` takes them."""
     place, origin, scale = 0, tree.origin, tree.scale
     for node in range(len(child)):
         centre_x, centre_y = float(tree.boxes[node, 0, 0]), float(tree.boxes[node, 1, 0])

@@ -84,7 +84,7 @@ def _is_on_closed_triangle(a: Integers, b: Integers, c: Integers, q: Integers) -
 
 def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
     """Return ON_FACE if q lies on triangle abc, CROSSED if the upward ray from q + (eps, eps^2, 0) crosses it, else
-    MISSED."""
+    MISSED. All coordinates are integers over one denominator."""
     area = _orient2d(a, b, c)
     if area != 0:
         turns = [_orient2d(p, r, q) for p, r in ((a, b), (b, c), (c, a))]
@@ -101,7 +101,7 @@ def _cross_upwards(a: Integers, b: Integers, c: Integers, q: Integers) -> int:
 
 
 def _enclosing_floats(value: Number) -> tuple[float, float]:
-    """Return doubles (low, high) with low <= value <= high, equal where value is a double."""
+    """Return doubles (low, high) with low <= value <= high, equal where value is a double; infinite beyond float64."""
     try:
         near = float(value)
     except OverflowError:
@@ -112,7 +112,7 @@ def _enclosing_floats(value: Number) -> tuple[float, float]:
 
 
 def triangle_boxes(solid: Polyhedron) -> FloatArray:
-    """Return (6, n_triangles): rows xmin, xmax, ymin, ymax, zmin, zmax, made once."""
+    """Return (6, n_triangles): rows xmin, xmax, ymin, ymax, zmin, zmax of the boxes of the triangles, made once."""
 
     def build() -> FloatArray:
         boxes = np.empty((len(solid.triangles), 6))
@@ -124,7 +124,7 @@ def triangle_boxes(solid: Polyhedron) -> FloatArray:
 
 def _uncertain_triangles(point: Sequence[Number], solid: Polyhedron) -> tuple[IntArray, bool]:
     """Return the triangles (n, 3) that the upward ray from a point may meet, and whether it crosses an odd number of
-    others. Found by the tree if it is built, else by comparison with all boxes."""
+    the others: by the tree if it is built, else by comparison with all boxes."""
     near = [_enclosing_floats(value) for value in point]
     tree, uncertain = solid.cached("tree"), np.empty(_MOST_UNSURE, np.int64)
     if tree is not None:
@@ -264,7 +264,7 @@ def exact_inverse(pose: Pose) -> tuple[list[list[int]], int]:
 
 
 def to_world_frame(point: Sequence[Number], pose: Pose) -> list[Fraction]:
-    """Return R point + t, exactly."""
+    """Return R point + t, the exact image of `point` under `pose`."""
     entries, below = common_integers(pose.rotation.ravel().tolist())
     numbers, common = common_integers((*point, *pose.translation.tolist()))
     n, sums = len(point), [below * shift for shift in numbers[len(point) :]]
@@ -295,8 +295,8 @@ def rational_location(point: Sequence[Number], solid: Solid, pose: Pose | None =
 
 
 def combine(operation: str, located: Sequence[Any]) -> Any:
-    """Return the location in a union (max), intersection (min) or difference (min(A, -B)) from those in the operands.
-    located: numbers 1, 0, -1, or int8 arrays of one shape."""
+    """Return the location in a union (max), intersection (min) or difference (min(A, -B)) from the locations in the
+    operands. located: numbers 1, 0, -1, or int8 arrays of one shape, one for each operand."""
     if operation == "difference":
         first, second = located
         return np.minimum(first, -second)
@@ -304,8 +304,8 @@ def combine(operation: str, located: Sequence[Any]) -> Any:
 
 
 def fold_csg_tree(solid: Csg, of_leaf: Callable[[Solid], Any], join: Callable[[str, list[Any]], Any]) -> Any:
-    """Evaluate each distinct leaf of a CSG tree once by `of_leaf`, and join the results of operands bottom-up by
-    `join`."""
+    """Evaluate a CSG tree bottom-up: of_leaf(leaf), once for each distinct leaf, and join(operation, results of the
+    operands) at each inner node; return the result at the root."""
     known: dict[int, Any] = {}
 
     def visit(node: Solid) -> Any:
