@@ -43,7 +43,8 @@ _LISTED: Final = 4
 
 class Bodies(Preparing):
     """Checked solids with a pose or None each, and their cached structures; safe to share between threads. whole: the
-    bodies of which these are a subset; both share what does not depend on poses. owners: the solid of each."""
+    bodies of which these are a subset, with which they share what does not depend on poses. owners: by body the number
+    of its solid among the distinct ones of ``whole``."""
 
     def __init__(
         self, solids: tuple[Solid, ...], poses: tuple[Pose | None, ...], whole: Bodies | None = None, owners: Any = None
@@ -72,8 +73,8 @@ class Bodies(Preparing):
     def _place_odd(
         self, names: IntArray, poses: Sequence[Pose | None], low: FloatArray, high: FloatArray, budget: Budget
     ) -> None:
-        """Set the boxes low, high of the CSG trees among bodies ``names``, combined from their operands' boxes under
-        the poses."""
+        """Set the boxes low, high (m, d) of those of the m bodies ``names`` that are CSG trees, combined from their
+        operands' boxes under the poses (m of them)."""
         arrays = self.arrays(budget)
         odd = self.prepared("odd", lambda: [k for k, solid in enumerate(arrays.distinct) if isinstance(solid, Csg)])
         for place in np.flatnonzero(np.isin(arrays.kinds[names], odd)).tolist() if odd else ():
@@ -83,8 +84,8 @@ class Bodies(Preparing):
     def under(
         self, names: IntArray, poses: Sequence[Pose | None], budget: Budget
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return rotations (m, d, d), translations (m, d), and low and high of the boxes of bodies ``names`` under
-        other poses."""
+        """Return rotations (m, d, d), translations (m, d), and low and high (m, d) of the boxes of the m bodies
+        ``names``, all under other poses than their own."""
         arrays, m, d = self.arrays(budget), len(names), self.solids[0].dimension
         turns, moves = motions_of(poses, d)
         low, high, rows = np.empty((m, d)), np.empty((m, d)), np.arange(m)
@@ -159,14 +160,15 @@ class Bodies(Preparing):
         return self.prepared("table", lambda: Table(self.solids, self.poses, like), budget.check)
 
     def words(self, budget: Budget) -> tuple[list[int], Any]:
-        """Return a row of integers that encodes the `BodyTree` of all bodies for segment kernels, and the arrays whose
-        addresses it has."""
+        """Return the row of integers that encodes the `BodyTree` of all bodies for segment kernels (`words_of`), and
+        the arrays whose addresses are in it, which must outlive it."""
         return self.prepared(
             "words", lambda: words_of(self.tree(budget), NOBODY, self.table(budget).rows), budget.check
         )
 
     def prepare(self, body: int, wanted: int, budget: Budget) -> None:
-        """Build the kernel input `wanted` (WANTS_BODY, WANTS_TREE) for one body."""
+        """Build a kernel input for one body: its row of the segment table (wanted is WANTS_BODY) or its solid's
+        location tree (WANTS_TREE)."""
         table = self.table(budget)
         with self._lock:
             table.prepare(body, wanted)
@@ -207,8 +209,8 @@ _AS_GIVEN: Final = read_only(np.arange(_MANY))
 
 
 def body_tree(low: FloatArray, high: FloatArray, most_listed: int) -> BodyTree:
-    """Return the tree over bodies with boxes low, high (n, dimension). Up to most_listed bodies are listed without a
-    tree, and so are bodies so near each other that 1 / scale is not finite."""
+    """Return the tree over bodies with boxes low, high (n, dimension). If there are at most most_listed bodies, or all
+    are so near each other that 1 / scale is not finite, they are listed, to be tested one by one, without a tree."""
     n, dimension = low.shape
     every = BodyTree(low, high, _NO_TREE, 1.0, NOBODY, np.arange(n))
     if n <= most_listed:
@@ -238,8 +240,8 @@ NO_BODIES: Final = {d: BodyTree(np.empty((0, d)), np.empty((0, d)), _NO_TREE, 1.
 
 
 def words_of(bodies: BodyTree, names: IntArray, placed: IntArray) -> tuple[list[int], Any]:
-    """Return a row of integers that encodes a `BodyTree` (columns of near_boxes.py), and the arrays whose addresses it
-    has. names: indices of the bodies in the scene; placed: rows of their `Table`."""
+    """Return the row of integers that encodes a `BodyTree` (columns of near_boxes.py), and the arrays whose addresses
+    are in it. names: indices in the scene of moved bodies; placed: the rows of the bodies' `Table`."""
     tree = bodies.tree
     numbers = _NO_NUMBERS if tree is _NO_TREE else np.array([bodies.inverse, *tree.origin.tolist()])
     read = bodies.low, bodies.high, tree.boxes, tree.child, bodies.bounded, bodies.listed, numbers, names, placed

@@ -63,8 +63,8 @@ def clip_all(
 
 
 def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exact:
-    """Return a function that gives the exact parameters of both ends of a piece; it caches the pieces of the last
-    bodies."""
+    """Return a function (source, body, number) that gives the exact parameters of both ends of that piece of a segment
+    in a body; it caches the pieces computed last."""
 
     @lru_cache(_CACHED_PIECES)
     def pieces(source: int, body: int) -> list[ExactPiece]:
@@ -196,8 +196,8 @@ def _parts(
 def _cut_near(
     segments: FloatArray, order: IntArray, first: int, last: int, scene: Placements, budget: Budget
 ) -> tuple[list[LoosePieces], list[IntArray], bool]:
-    """Return the pieces of segments order[first:last], the pairs (segment, body) that kernels leave open, and a flag.
-    Flag: all numbers are in the kernels' range (NaN is not)."""
+    """Return the pieces of segments order[first:last], arrays of the pairs (segment, body) that kernels leave open, and
+    whether all numbers are in the kernels' range (NaN is not)."""
     parts, left, n = list[LoosePieces](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
     words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(scene.n_rows)
@@ -254,9 +254,9 @@ def _cut(
 
 
 def _on_body(segments: FloatArray, solid: Solid, pose: Pose | None, budget: Budget) -> tuple[Pieces, Any, bool]:
-    """Return the pieces of segments (n, 2, dim) within one placed solid, sorted by source and t; indices of the
-    segments that took rational arithmetic; and a flag. All indices if it is unknown which. Flag: the other pieces come
-    from boundary_cut.py."""
+    """Return the pieces of segments (n, 2, dim) within one placed solid, sorted by source and t; the indices of the
+    segments that took rational arithmetic, all if it is unknown which; and whether the pieces of the others come from
+    boundary_cut.py."""
     n, every, shape = len(segments), np.arange(len(segments)), cast(Any, solid)
     if pose is None and solid.type in ("half_space", "convex", "aabb", "sphere"):
         plan = plan_for(shape)

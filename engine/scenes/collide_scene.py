@@ -216,7 +216,8 @@ def collide_bodies(
 def _settle(
     bodies: SceneBodies, pairs: IntArray, answers: Answers, workers: int | None, progress: Progress | None
 ) -> None:
-    """Decide the pairs of a block that the batches left UNSETTLED, one by one, in parallel chunks."""
+    """Decide the pairs (n, 2) of a block that the batches left UNSETTLED, one by one, in parallel chunks; write to
+    `answers`."""
     left = answers.left()
     if progress is not None and len(left) < len(pairs):
         progress(len(pairs) - len(left))
@@ -234,7 +235,8 @@ def _settle(
 def _measure_gaps(
     batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, workers: int | None
 ) -> FloatArray:
-    """Return the distance of each pair of a block: 0 if they meet, infinite if not below the gap."""
+    """Return the distance of each pair (n, 2) of a block: 0.0 if they meet, infinite if not below the gap. answers: the
+    relations of the pairs, and options."""
     distances, disjoint = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
     is_measured = not answers.boolean
     distances[disjoint] = distances_below(batches, pairs[disjoint], gap, is_measured, answers.budget, workers)
@@ -242,7 +244,8 @@ def _measure_gaps(
 
 
 def _select_pairs(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:
-    """Return the pairs of a block that collide or are nearer than the gap; near: the distances, None without a gap."""
+    """Return the pairs (n, 2) of a block that collide or are nearer than the gap. answers: their relations; near: their
+    distances, infinite if not below the gap; None without a gap."""
     meet = answers.relations != Relation.DISJOINT
     if answers.boolean:
         answers.relations[meet] = Relation.TOUCHING
@@ -278,8 +281,9 @@ def _have_interiors(bodies: SceneBodies, pairs: IntArray, budget: Budget) -> Boo
 def _candidates(
     bodies: SceneBodies, low: FloatArray, wanted: IntArray | None, skipped: IntArray | None, budget: Budget
 ) -> Iterator[IntArray]:
-    """Yield sorted blocks of pairs whose boxes intersect. low: corners of the boxes, moved outward by the gap. wanted,
-    skipped: keys first * n + second to which pairs are restricted, and that are left out; None for no restriction."""
+    """Yield sorted blocks of pairs (m, 2) whose boxes intersect (broad phase). low: low corners of the boxes, moved
+    outward by the gap. wanted, skipped: keys first * n + second to which pairs are restricted, and that are left out;
+    None for no restriction."""
     n_bodies = len(bodies.solids)
     if n_bodies < 2 or (wanted is not None and not len(wanted)):
         return
@@ -289,7 +293,8 @@ def _candidates(
 
 
 def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntArray]:
-    """Yield blocks of those pairs, among the given keys first * n + second, whose boxes intersect."""
+    """Yield blocks (m, 2) of those pairs, among the given keys first * n + second, whose boxes low, high (n, d)
+    intersect."""
     for start in range(0, len(keys), BLOCK):
         first, second = np.divmod(keys[start : start + BLOCK], len(low))
         meet = (first < second) & ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
@@ -297,8 +302,8 @@ def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntA
 
 
 def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
-    """Return the keys first * n_bodies + second, first < second, of the caller's pairs. Raises if `named` is no such
-    array."""
+    """Return the keys first * n_bodies + second, first < second, of the caller's pairs `named`. name: of the argument,
+    for errors. Raises InvalidArrayError or IndexOutOfRangeError for what is no array of pairs of bodies."""
     try:
         array = np.asarray(named)
     except ValueError:
@@ -378,8 +383,9 @@ def distances_below(
 def _distances_of_group(
     bodies: SceneBodies, pairs: IntArray, places: IntArray, gap: float, is_measured: bool, budget: Budget
 ) -> FloatArray:
-    """Return distances (n,) of disjoint pairs of the same two solids, infinite for those not nearer than the gap;
-    exact. places (n, 2): the rows of their poses. is_measured: if False, pairs nearer than the gap get 0.0."""
+    """Return the distances (n,) of disjoint pairs of bodies (n, 2), all of the same two solids; exact; infinite for
+    those not nearer than the gap. places (n, 2): the rows of their poses. is_measured: if False, pairs nearer than the
+    gap get 0.0 instead of their distance."""
     first, second = (bodies.solids[number] for number in pairs[0].tolist())
     distances = np.full(len(pairs), np.nan)
     if has_plane(first, second):

@@ -121,7 +121,8 @@ def sort_pieces(
 
 
 def _sort_exactly(pieces: LoosePieces, exact: Exact) -> tuple[Any, ...]:
-    """Return the arrays of `ScenePieces` for pieces of segments whose ends round alike, sorted by exact parameters."""
+    """Return the arrays of `ScenePieces` for pieces of segments whose ends round alike, sorted by exact parameters.
+    exact: gives the parameters of both ends of a piece, by source, body and number."""
     pieces, ranks = (
         take_pieces(pieces, np.lexsort((pieces.body, pieces.source))),
         np.empty((len(pieces.source), 2), np.int64),
@@ -215,7 +216,7 @@ def sort_rounded(
 
 @inline
 def _sort_ends(order: IntArray, first: int, last: int, body: IntArray, t: FloatArray) -> None:
-    """Sort order[first:last], ends coded as 2 * piece + side, by parameter, body and piece."""
+    """Sort order[first:last], ends coded as 2 * piece + side (0: start), by parameter t (m, 2), body (m,) and piece."""
     gap = (last - first) // 2
     while gap > 0:  # bound: gap is halved; Shell's sort, n^1.5 steps
         for i in range(first + gap, last):

@@ -82,8 +82,9 @@ def locate_near(
     """Write the bodies that contain points first .. last - 1 of (n, dim), or may, as keys, until there is no more room.
 
     keys (room,): 4 (point n_bodies + body) + location, ascending; UNDECIDED is possible. query_counts (n_meshes,):
-    number of points for which each mesh is a candidate. Returns the numbers of points done, of keys, of locations that
-    took more than a filter, and whether the keys ascend.
+    raised by the number of points for which each mesh is a candidate. room: work space of `scratch_for`. Returns the
+    point reached, the number of keys, the number of locations that took more than a filter, and whether the keys
+    ascend.
     """
     scratch, n, is_flat, is_sorted = scratch_at(room), where.together.low.shape[0], points.shape[1] == 2, True
     n_keys, n_beyond, done = 0, 0, first
@@ -120,7 +121,8 @@ def locate_pairs(
     points: FloatArray, owners: IntArray, bodies: IntArray, tables: LocateTables, room: IntArray, located: Int8Array,
     flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill located (n,) int8 for pairs of point owners[i] and body bodies[i]; UNDECIDED if the tables do not decide."""
+    """Fill located (n,) int8 with the locations of pairs of point owners[i] and body bodies[i]; UNDECIDED if the tables
+    do not decide. room: work space of `scratch_for`."""
     scratch, is_flat = scratch_at(room), points.shape[1] == 2
     for pair in range(owners.size):
         if flag[0]:
@@ -224,8 +226,9 @@ def _locate_exactly(
     points: FloatArray, owners: IntArray, bodies: IntArray, scene: Placements, has_new: bool, budget: Budget,
     workers: int | None,
 ) -> tuple[Int8Array, Counts]:  # fmt: skip
-    """Return the locations of pairs of point owners[i] and body bodies[i], by each body's own locator, and their
-    counts. has_new: a tree was built since the kernel ran, so it is run again first."""
+    """Return the locations of pairs of point owners[i] and body bodies[i], by each body's own locator, and how many
+    points were beyond the filter and decided in rationals. has_new: a tree was built since the kernel ran, so the
+    kernel runs again first."""
     locations, order = np.full(len(owners), UNDECIDED, np.int8), np.argsort(bodies, kind="stable")
     if has_new:
         tables, names, scratch = scene.tables(budget), scene.rows_of(bodies), scratch_for(scene.n_rows)
@@ -256,7 +259,8 @@ def _locate_exactly(
 
 
 def _build_trees(scene: Placements, query_counts: IntArray, budget: Budget, workers: int | None) -> bool:
-    """Build trees and cells of polyhedra queried often enough; return whether the scene's tables lack one of these."""
+    """Build trees and cells of polyhedra queried often enough; return whether the scene's tables lack one of these.
+    query_counts: by mesh the number of points for which it was a candidate."""
     chosen = list[tuple[Polyhedron, int]]()
     for solid, n_queries in zip(scene.base.solid_tables(budget).meshes, query_counts.tolist()):
         if n_queries and len(solid.triangles) <= MOST_FACES:

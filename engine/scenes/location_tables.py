@@ -86,8 +86,8 @@ class LocateTables(NamedTuple):
 def locate_in_body(
     tables: LocateTables, body: int, is_flat: bool, p: tuple[float, ...], stack: Int32Array, flag: FlagArray
 ) -> tuple[int, bool]:
-    """Return the location of point p in a body, and whether it took more than a filter. 1, 0, -1 (inside, boundary,
-    outside) or UNDECIDED. stack: (STACK,), scratch."""
+    """Return the location of point p in a body by the tables (1 inside, 0 boundary, -1 outside, UNDECIDED), and whether
+    it took more than a filter. body: its number; is_flat: 2D; stack: (STACK,), scratch."""
     kind, slot = tables.kinds[body], tables.slots[body]
     q, blur = to_frame(tables, tables.frames[body], p)
     if kind == BodyKind.RINGS:
@@ -142,7 +142,8 @@ class Tables:
         self._fixed = lows, highs, *rows, *rings, *_meshes(self.meshes)
 
     def _chosen(self, indices: list[int], kind: int) -> list[Any]:
-        """Return the solids with the given indices, and record their kind and, in this order, their slots."""
+        """Return the solids with the given indices, and record in the tables their kind (`BodyKind`) and, in this
+        order, their slots: rows in the arrays of that kind."""
         self.kinds[indices], self.slots[indices] = kind, np.arange(len(indices))
         return [self._solids[index] for index in indices]
 
@@ -190,7 +191,8 @@ class Tables:
 
 
 def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
-    """Return the arrays cell_frames, cell_places, addresses, sizes, places of polyhedra, 0 for what is not cached."""
+    """Return, by polyhedron, the arrays cell_frames, cell_places, addresses, sizes and places of `LocateTables`; rows
+    of 0 for cells and trees that are not cached."""
     cells, trees = [solid.cached("sides") for solid in solids], [solid.cached("tree") for solid in solids]
     lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_row(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())

@@ -50,7 +50,8 @@ _AT: Final = tuple(8 * (2 + sum(_SIZES[:k])) for k in range(len(_SIZES) + 1))
 
 
 def scratch_for(n_bodies: int) -> IntArray:
-    """Return the work space of one segment, for `scratch_at`, in a scene of n_bodies; cached per thread."""
+    """Return the work space of one segment in a scene of n_bodies, one array that `scratch_at` reads; cached per
+    thread."""
     scratch: IntArray | None = getattr(_here, "scratch", None)
     if scratch is None or scratch[1] <= n_bodies:
         scratch = np.empty(_AT[-1] // 8 + n_bodies + 1, np.int64)
@@ -113,7 +114,7 @@ def place_in(names: IntArray, body: int) -> int:
 
 @merged
 def tree_in(row: IntArray, dimension: int) -> BodyTree:
-    """Return the `BodyTree` encoded in a row of integers."""
+    """Return the `BodyTree` encoded in a row of integers by `words_of`."""
     n, numbers = row[N_BODIES], array_at(row[NUMBERS], (4,), np.float64)
     boxes = array_at(row[BOXES], (row[N_NODES], BOX_ROWS, WIDTH), np.float32)
     child = array_at(row[CHILD], (row[N_NODES], WIDTH), np.int32)
@@ -125,14 +126,16 @@ def tree_in(row: IntArray, dimension: int) -> BodyTree:
 
 @inline
 def name_in(words: IntArray, body: int) -> int:
-    """Return the index in the scene of body number ``body``: moved bodies are numbered from n on."""
+    """Return the index in the scene of body number ``body`` of kernels, which number moved bodies from n on. words:
+    both rows of `words_of`."""
     n, m = words[0, N_BODIES], words[1, N_BODIES]
     return body if body < n else array_at(words[1, NAMES], (m,), np.int64)[body - n]
 
 
 @inline
 def has_moved(words: IntArray, body: int) -> bool:
-    """Return whether body ``body`` < n has been moved, so that its first placement no longer counts."""
+    """Return whether body ``body`` < n has been moved, so that its first placement no longer counts. words: both rows
+    of `words_of`."""
     m = words[1, N_BODIES]
     return m > 0 and place_in(array_at(words[1, NAMES], (m,), np.int64), body) >= 0
 
@@ -154,8 +157,8 @@ def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
 
 @inline
 def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last: float, scratch: Scratch) -> int:
-    """Return the next body whose box the segment may enter before parameter `last`, roughly in order of entry; -1 for
-    none."""
+    """Return the next body whose box the segment may enter before parameter `last`, roughly in order of entry,
+    continuing the traversal of `begin_way`; -1 if there is no more."""
     depths = scratch.depths
     while depths[0] > 0:  # bound: each node, and each body, waits once
         depths[0] -= 1
@@ -192,8 +195,8 @@ def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray
 
 @inline
 def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) -> bool:
-    """Return whether a segment may meet the box of a body (slab test). error: (box - start) / (end - start) is off by 4
-    units of rounding on each axis, or 2^-1074 on underflow; differences beyond `_MOST_WAY`, which may be infinite,
+    """Return whether a segment may meet the box of a body (slab test, in doubles). (box - start) / (end - start) is off
+    by 4 units of rounding on each axis, or 2^-1074 on underflow; differences beyond `_MOST_WAY`, which may be infinite,
     decide nothing."""
     meet, enters, leaves = True, 0.0, 1.0
     for k in range(segments.shape[2]):
@@ -209,8 +212,8 @@ def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) ->
 
 @inline
 def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, depth: int) -> int:
-    """Push the children of a node whose boxes the segment enters before `last` on scratch.waiting, the nearest one on
-    top. Returns the new depth."""
+    """Push the children of a node whose boxes the segment enters before `last` on scratch.waiting, of which depth
+    entries are used, the nearest one on top. Returns the new depth."""
     waiting, keys, least, nearest = scratch.waiting, scratch.keys, np.float32(np.inf), depth
     bits = enter_boxes(tree.boxes, node, way.middle, way.inverse, way.slack, last, scratch.entered)
     while bits != 0:
@@ -228,8 +231,8 @@ def _open_node(tree: Bvh, node: int, way: Way, last: float, scratch: Scratch, de
 
 @inline
 def bodies_in(low: FloatArray, high: FloatArray, where: Where, stack: Int32Array, hits: IntArray) -> int:
-    """Fill `hits` with the numbers of the bodies whose boxes intersect the box low .. high (dim,), maybe infinite;
-    return how many."""
+    """Fill `hits` with the numbers of the bodies whose boxes intersect the box low .. high (dim,), maybe infinite
+    (broad phase); return how many. stack: scratch."""
     n_hits, names = _of_box(low, high, where.together, 0, where.names, stack, hits, 0), where.names
     if names.size > 0:
         n_hits = _of_box(low, high, where.moved, where.together.low.shape[0], names[:0], stack, hits, n_hits)
@@ -248,7 +251,8 @@ def _is_met(low: FloatArray, high: FloatArray, bodies: BodyTree, body: int, left
 
 @inline
 def _local(value: float, inverse: float, way: float) -> Any:
-    """Return a coordinate in a tree's scale, enlarged outward: way 1.0 upward, -1.0 downward."""
+    """Return value * inverse, a coordinate in a tree's scale, as float32 enlarged outward: up for way 1.0, down for
+    -1.0."""
     return np.float32(value * inverse + way * _SLACK)
 
 
@@ -257,8 +261,8 @@ def _of_box(
     low: FloatArray, high: FloatArray, bodies: BodyTree, n_before: int, left_out: IntArray, stack: Int32Array,
     hits: IntArray, n_hits: int,
 ) -> int:  # fmt: skip
-    """Append to `hits` n_before + each body of a `BodyTree` whose box intersects low .. high; return the new number.
-    left_out: ascending bodies to skip."""
+    """Append to the n_hits `hits` the number n_before + i of each body i of a `BodyTree` whose box intersects low ..
+    high; return their number then. left_out: ascending bodies to skip. stack: scratch."""
     tree, inverse, depth, stack[0] = bodies.tree, bodies.inverse, 1, 0
     is_flat, x, y, z = low.size == 2, tree.origin[0], tree.origin[1], tree.origin[2]
     bottom, top = (0.0 if is_flat else low[2]) - z, (0.0 if is_flat else high[2]) - z

@@ -106,7 +106,8 @@ class Placements(Preparing):
         return (self._placed or self.placed_numbers(budget))[0]
 
     def placed_numbers(self, budget: Budget) -> tuple[Where, FloatArray, FloatArray]:
-        """Return the positions of all bodies, rotations and translations of the moved ones, the identity for None."""
+        """Return the positions of all bodies, and the rotations (m, d, d) and translations (m, d) of the m moved ones,
+        the identity for None."""
         if self._placed is None:  # who comes second makes the same
             tree, names = self.base.tree(budget), self.names
             if self.moved:
@@ -118,7 +119,8 @@ class Placements(Preparing):
         return self._placed
 
     def words(self, budget: Budget) -> IntArray:
-        """Return two rows of integers from which segment kernels read all bodies, and the moved ones (`words_of`)."""
+        """Return two rows of integers from which segment kernels read the bodies as first placed, and the moved ones
+        (`words_of`)."""
         if self._words is None:
             together, moved, arrays = self.base.words(budget), _NO_WORDS, ()
             if self.moved:
@@ -146,9 +148,9 @@ class Placements(Preparing):
         return boxes
 
     def pairs_with(self, named: IntArray, reach: float, boolean: bool, budget: Budget) -> tuple[IntArray, Int8Array]:
-        """Return the keys first * n + second of the pairs of a named body and another whose boxes meet, and their
-        relations. Boxes are enlarged by `reach`; keys are unsorted; relations are those of the batch of convex bodies,
-        else UNSETTLED. Raises: as `collide_scene` for an unsupported body."""
+        """Return the keys first * n + second, unsorted, of the pairs of a named body and another whose boxes, enlarged
+        by `reach`, meet; and their relations by the batch of convex bodies, else UNSETTLED. boolean: only whether they
+        meet matters. Raises: as `collide_scene` for an unsupported body."""
         batches, (where, *moves), room = self.base.batches(budget), self.placed_numbers(budget), 16 + 6 * len(named)
         arrays, d = batches.bodies, batches.bodies.dimension
         still, moved = Placed(arrays.kinds, arrays.rotations, arrays.translations), Placed(arrays.kinds, *moves)
@@ -205,7 +207,8 @@ those of pair i in rows 2 i + 1 and 2 i + 2; row 0 is the identity."""
 
 @inline
 def _put_row(rows: PairRows, row: int, still: Placed, moved: Placed, body: int, name: int) -> None:
-    """Fill row ``row`` with a body at its current pose; body: its number, name: its index in the scene."""
+    """Fill row ``row`` of rows with the solid and the current pose of a body. body: its number in kernels, name: its
+    index in the scene; still, moved: `Placed` of the bodies as first placed and of those moved since."""
     n = still.kinds.size
     rows.kinds[row] = still.kinds[name]
     for i in range(rows.translations.shape[1]):

@@ -34,7 +34,8 @@ Frame = tuple[Vector, float, Vector, float]
 
 @inline
 def _row(m: FloatArray, i: int, v: Vector) -> Pair:
-    """Return row i of M times v, in double-double; M (3, 7), entries as double-doubles."""
+    """Return row i of M times the vector v, in double-double. m (3, 7): the frame of a pose, entries of M as
+    double-doubles."""
     ah, al = dd_mul(m[i, 0], m[i, 1], v[0][0], v[0][1])
     bh, bl = dd_mul(m[i, 2], m[i, 3], v[1][0], v[1][1])
     ch, cl = dd_mul(m[i, 4], m[i, 5], v[2][0], v[2][1])
@@ -44,15 +45,17 @@ def _row(m: FloatArray, i: int, v: Vector) -> Pair:
 
 @inline
 def _turned(m: FloatArray, v: Vector) -> tuple[Vector, float]:
-    """Return M v in double-doubles, v exact, and the error bound of each coordinate."""
+    """Return M v in double-doubles, for exact v, and an error bound of each coordinate. m (3, 7): the frame of a pose.
+    """
     bound = _FRAME_BOUND * (abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0]))
     return (_row(m, 0, v), _row(m, 1, v), _row(m, 2, v)), bound
 
 
 @inline
 def in_frame(body: IntArray, segments: FloatArray, item: int) -> Frame:
-    """Return start p' and vector e' of a segment in the frame of a body, each with the error bound of its coordinates.
-    body: row (4,) of a `Table`; without a pose both bounds are 0."""
+    """Return (p', bound, e', bound) of segment ``item`` in the pose frame of a body: start and vector in
+    double-doubles, each with the error bound of its coordinates. body: row (4,) of a `Table`; without a pose both
+    bounds are 0.0."""
     is_flat = segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     way = difference(p, q)
@@ -66,7 +69,8 @@ def in_frame(body: IntArray, segments: FloatArray, item: int) -> Frame:
 
 @inline
 def _plane_at(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float, float]:
-    """Return dot(n, v) + offset as a double-double, and its error bound; blur: error of each coordinate of v."""
+    """Return dot(n, v) + offset as a double-double, and its error bound. row: (4,), its first three numbers are n;
+    blur: error of each coordinate of v."""
     ah, al = dd_scale(v[0][0], v[0][1], row[0])
     bh, bl = dd_scale(v[1][0], v[1][1], row[1])
     ch, cl = dd_scale(v[2][0], v[2][1], row[2])
@@ -79,8 +83,10 @@ def _plane_at(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[f
 
 @inline
 def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[float, float]:
-    """Return dot(n, v) + offset in doubles, and its error bound; blur: error of each coordinate of v. Three sums, a
-    product and the low part of v: ``|error| <= 5 u (|x| + |y| + |z| + |offset|)``, x, y, z the products."""
+    """Return dot(n, v) + offset in doubles, and its error bound. row: (4,), its first three numbers are n; blur: error
+    of each coordinate of v. Three sums, a product and the low part of v: ``|error| <= 5 u (|x| + |y| + |z| +
+    |offset|)``, x, y, z the products.
+    """
     x, y, z = row[0] * v[0][0], row[1] * v[1][0], row[2] * v[2][0]
     size = abs(x) + abs(y) + abs(z) + abs(offset)
     return x + y + z + offset, 2.0**-50 * size + 1.01 * blur * (abs(row[0]) + abs(row[1]) + abs(row[2]))
@@ -88,9 +94,9 @@ def _value(row: FloatArray, v: Vector, offset: float, blur: float) -> tuple[floa
 
 @inline
 def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
-    """Return 1 if a segment provably meets the intersection of half-spaces, -1 if not, or UNDECIDED; and, for 1, the
-    rows of the planes that cut it first and last, -1 for none; in doubles. Each parameter t = -s / d has the error r =
-    1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000."""
+    """Return (meets, first, last), by doubles: 1 if a segment provably meets the intersection of the half-spaces rows
+    (n, 4), -1 if not, or UNDECIDED; and the rows of the last plane entered and the first one left, -1 for none. A
+    parameter t = -s / d has the error r = 1.01 (s' + t d') / |d| + 2^-51 t for bounds s' and d' < |d| / 1000."""
     own, blur, along, along_blur = frame
     enters, leaves, first, last, is_proven = (-1.0, -1.0), (2.0, 2.0), -1, -1, True
     for face in range(rows.shape[0]):
@@ -124,8 +130,8 @@ def _planes_cut(rows: FloatArray, frame: Frame) -> tuple[int, int, int]:
 
 @inline
 def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return 1 if a segment meets a body bounded by planes, -1 if not, or UNDECIDED, and both ends of the piece.
-    is_any: the ends are not computed. Ends are those that `put_piece` takes."""
+    """Return 1 if a segment meets a body bounded by planes, -1 if not, or UNDECIDED; and both ends (t, t_low, slack,
+    face) of the piece, not computed if is_any. body: row (4,) of a `Table`."""
     frame, rows = in_frame(body, segments, item), array_at(body[2], (body[1], 4), np.float64)
     own, blur, along, along_blur = frame
     meets, entered, left = _planes_cut(rows, frame)
@@ -144,8 +150,9 @@ def between_planes(body: IntArray, segments: FloatArray, item: int, is_any: bool
 
 @inline
 def in_ball(body: IntArray, segments: FloatArray, item: int, is_any: bool) -> tuple[int, End, End]:
-    """Return 1 if a segment meets a posed ball, -1 if not, or UNDECIDED, and both ends of the piece (not if is_any). d
-    = q - p, and f = p - c for the centre c, off by the rounding of the posed c."""
+    """Return 1 if a segment meets a posed ball, -1 if not, or UNDECIDED; and both ends (t, t_low, slack, face) of the
+    piece, not computed if is_any. body: row (4,) of a `Table`. d = q - p, and f = p - c for the centre c, off by the
+    rounding of the posed c."""
     c, is_flat = array_at(body[2], (7,), np.float64), segments.shape[2] == 2
     p, q = point_of(segments, item, 0, is_flat), point_of(segments, item, 1, is_flat)
     along = difference(p, q)

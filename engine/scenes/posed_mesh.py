@@ -67,7 +67,7 @@ def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
 
 @inline
 def _tree_of(address: int) -> Any:
-    """Return the location tree of a mesh encoded at an address."""
+    """Return the location tree of a mesh whose MESH_WORDS numbers are at an address."""
     lines = _Lines(
         array_at(address + 8 * TREE, (1, 5), np.int64),
         array_at(address + 8 * (TREE + 5), (1, 3), np.int64),
@@ -78,8 +78,9 @@ def _tree_of(address: int) -> Any:
 
 @inline
 def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_any: bool, scratch: Scratch) -> int:
-    """Fill cuts.met and cuts.codes with the triangles that segment pq crosses, and how; return their number. UNSURE if
-    one is not proven. With `is_any`, the first triangle proven to be met ends the search with 1."""
+    """Fill cuts.met and cuts.codes of scratch with the triangles that segment p q meets, and the code of each contact;
+    return their number, or UNSURE if one is not proven. With `is_any`, the first triangle proven to be met ends the
+    search with 1. blur: error of each coordinate of p and q."""
     cuts = scratch.cuts
     waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
     n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
@@ -93,9 +94,10 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
 
 @inline
 def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
-    """Merge sorted crossings in one point; return the number of crossings left, or UNSURE. If the location does not
-    flip, a closed mesh is met in a point, or not left: such a point is written twice, the second time as -2 - face. At
-    least two crossings make such a point, so 4 n places suffice."""
+    """Merge those of n sorted crossings that are one point; return the number of crossings left, or UNSURE. is_in: the
+    segment starts inside. Where the location does not flip, the segment touches a closed mesh from outside in a point
+    (written twice, the second time with face -2 - face), or stays inside (left out). At least two crossings make such a
+    point, so 4 n places suffice."""
     cuts, order, n_out, begin = scratch.cuts, scratch.cuts.order, 2 * n, 0
     if 4 * n > MOST_MET:
         return UNSURE
@@ -129,17 +131,16 @@ def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_c
 
 @inline
 def _values(at_p: tuple[float, ...], blur: float, normal: Any) -> Any:
-    """Return a dot product h + low with a bound on its error. at_p: the product and its own rounding, 4 u^2; blur:
-    error of each coordinate of the vector.
-    """
+    """Return (h, low, bound): the dot product of a normal and a vector, whose coordinates are off by blur, with a bound
+    on its error. at_p: the same for the rounded vector, its bound covering 4 u^2; normal: of `normal_of`."""
     h, low, bound = at_p
     return h, low, 1.5 * bound + 1.01 * blur * (normal[0][2] + normal[1][2] + normal[2][2])
 
 
 @inline
 def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame: Any, scratch: Scratch) -> bool:
-    """Compute crossing ``place`` (t and point), equal to an earlier one in the same corner or edge; return whether all
-    coordinates are correctly rounded."""
+    """Compute t and point of crossing ``place``, equal to an earlier one in the same corner or edge; return whether all
+    are proven nearest doubles. frame: of `in_frame`."""
     (own, blur, along, along_blur), cuts, element = frame, scratch.cuts, scratch.cuts.met[place]
     if not (mesh.are_safe or is_item_safe(mesh.elements, element)):
         return False
@@ -176,7 +177,8 @@ def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame
 
 @inline
 def _ends_of(own: Vector, blur: float, along: Vector, along_blur: float, is_placed: bool) -> tuple[Point3, Any, float]:
-    """Return both ends of a segment in a frame, as doubles, and a bound on the error of their coordinates."""
+    """Return the ends p' and p' + e' of a segment in the pose frame, as doubles, and a bound on the error of their
+    coordinates, 0.0 unless is_placed. own, along: p', e' of `in_frame`; blur, along_blur: their error bounds."""
     p = Point3(own[0][0], own[1][0], own[2][0])
     q = Point3(p.x + along[0][0], p.y + along[1][0], p.z + along[2][0])
     size = max(abs(p.x), abs(p.y), abs(p.z), abs(q.x), abs(q.y), abs(q.z))
@@ -188,8 +190,8 @@ def crossings_in(
     body: IntArray, segments: FloatArray, item: int, is_any: bool, words: IntArray, stop: FlagArray
 ) -> tuple[int, bool]:
     """Compute the crossings of a segment with a placed mesh, in order; return their number, and whether its start is
-    inside. The number may be UNSURE, WANTS_BODY or WANTS_TREE. With `is_any` crossings are not computed, and any
-    positive number means that there is one."""
+    inside. body: row (4,) of a `Table`; words: work space of `scratch_for`. The number may be UNSURE, or WANTS_BODY or
+    WANTS_TREE for what must be prepared. With `is_any` any positive number means that there is a crossing."""
     is_placed, is_closed, scratch = body[3] != 0, body[1] != 0, scratch_at(words)
     lines, numbers = array_at(body[2], (MESH_WORDS,), np.int64), array_at(body[2], (MESH_WORDS,), np.float64)
     frame = in_frame(body, segments, item)

@@ -357,7 +357,8 @@ class Scene(Immutable):
         return result, Accuracy("exact", 0.5, n, n_beyond, n_rational, "body_boxes")
 
     def _named(self, bodies: object, name: str) -> list[int]:
-        """Return indices of bodies, each once, ascending. Raises: IndexOutOfRangeError, InvalidArrayError."""
+        """Return the indices of the caller's bodies, each once, ascending. name: of the argument, for errors. Raises:
+        IndexOutOfRangeError, InvalidArrayError."""
         if not isinstance(bodies, (list, tuple, set, frozenset, np.ndarray)) or getattr(bodies, "ndim", 1) != 1:
             raise InvalidArrayError(f"{name} must be a list of bodies, got {type(bodies).__name__}", (name,))
         if type(bodies) is list and set(map(type, bodies)) == {int}:

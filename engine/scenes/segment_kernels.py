@@ -53,10 +53,9 @@ def _cut_on(
     words: IntArray, name: int, segments: FloatArray, item: int, is_any: bool, scratch: IntArray, stop: FlagArray,
     out: Pieces, row: int,
 ) -> int:  # fmt: skip
-    """Write the pieces of a segment within one body to `out` from row `row` on; return their number, or a code. Codes:
-    UNSURE, WANTS_BODY, WANTS_TREE. With `is_any` nothing is written, and a positive number means that there are some. A
-    piece of one point has the second face -2 - face.
-    """
+    """Write the pieces of a segment within one body to `out` from row `row` on; return their number, or a code: UNSURE,
+    WANTS_BODY, WANTS_TREE. words: both rows of `words_of`; name: number of the body. With `is_any` nothing is written,
+    and a positive number means that there are some. A piece of one point has the second face -2 - face."""
     n = words[0, N_BODIES]
     address = words[0, PLACED] + 32 * name if name < n else words[1, PLACED] + 32 * (name - n)
     body = array_at(address, (4,), np.int64)
@@ -143,8 +142,9 @@ def cut_near(
 
 @inline
 def _record_first_hit(scratch: Scratch, name: int) -> None:
-    """Store the piece in row 0 as first piece of the segment, if no stored one begins before it; name: its body. hit[1]
-    is set if both begin at parameters that round alike."""
+    """Store the piece in row 0 of scratch.room as the first piece of the segment, unless one stored begins before it,
+    or in the same point with a lower body. name: its body. hit[1] is set if both begin at parameters that round alike.
+    """
     room, best, hit = scratch.room, scratch.best, scratch.hit
     t = room.t[0, 0]
     if t > best[0]:
@@ -165,7 +165,7 @@ def _record_first_hit(scratch: Scratch, name: int) -> None:
 
 @inline
 def _write_first_hit(scratch: Scratch, out: Firsts, row: int, item: int) -> None:
-    """Write the first piece of segment ``item`` to a row of `out`."""
+    """Write the first piece of segment ``item``, stored in scratch, to row `row` of `out`."""
     piece, is_long = scratch.room, scratch.room.faces[MOST_MET, 1] >= -1
     out.source[row], out.body[row], out.ranks[row, 0], out.ranks[row, 1] = item, scratch.hit[0], 0, is_long
     for k in range(out.start.shape[1]):
@@ -178,8 +178,9 @@ def _write_first_hit(scratch: Scratch, out: Firsts, row: int, item: int) -> None
 def _query_body(
     words: IntArray, body: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
-    """Clip a segment to one body for its first piece, or any. Returns SETTLED to continue with the next body, MET or
-    OPEN to end, or WANTS_BODY, WANTS_TREE."""
+    """Clip a segment to body number ``body``, and store its piece if it is the first so far. Returns SETTLED: continue
+    with the next body; MET (with `is_any`) or OPEN: end; or WANTS_BODY, WANTS_TREE. words: both rows of `words_of`;
+    room: work space of `scratch_for`."""
     scratch = scratch_at(room)
     n_pieces = _cut_on(words, body, segments, item, is_any, room, stop, scratch.room, 0)
     if n_pieces < UNSURE:
@@ -198,9 +199,10 @@ def _query_body(
 
 @inline
 def _first_hit_bound(scratch: Scratch, bodies: BodyTree, way: Way) -> Any:
-    """Return a bound beyond the start of the first piece so far, as parameter of the segment in tree coordinates. On
-    the longest axis k, t = (x - m) / e. The slack exceeds the rounding of m and e; it is taken twice. That of x, the
-    nearest double, is half an ulp where it was computed: much, in the tree, for a scene far from the origin."""
+    """Return a float32 upper bound on the parameter, along the segment `way` in tree coordinates (-1 .. 1), at which
+    the first piece so far begins; 1.0 if there is none. On the longest axis k, t = (x - m) / e for middle m and half e.
+    The slack exceeds the rounding of m and e; it is taken twice. That of x, the nearest double, is half an ulp where it
+    was computed: much, in the tree, for a scene far from the origin."""
     k = longest_axis(way.half)
     if scratch.hit[0] < 0 or way.half[k] == 0.0:
         return np.float32(1.0)
@@ -215,8 +217,8 @@ def _search_tree(
     words: IntArray, side: int, segments: FloatArray, item: int, is_any: bool, room: IntArray, stop: FlagArray
 ) -> int:
     """Clip a segment to the bodies of one `BodyTree`, about in order of entry, until none can have an earlier piece.
-    side: 0 for the bodies as first placed, 1 for moved ones. With is_any one met body ends the search. Returns SETTLED
-    to continue with the next tree, MET or OPEN to end, or WANTS_BODY, WANTS_TREE."""
+    side: 0 for the bodies as first placed, 1 for moved ones. Returns SETTLED: continue with the next tree; MET (with
+    `is_any`, at the first body met) or OPEN: end; or WANTS_BODY, WANTS_TREE."""
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
     way, last = way_of(segments, item, bodies), np.float32(1.0)
     begin_way(bodies, way, scratch)

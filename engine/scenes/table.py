@@ -57,7 +57,7 @@ class Table:
             self.rows[body, 0] = self._fill(self.rows[body], solid, self._poses[body])
 
     def _fill(self, row: IntArray, solid: Any, pose: Pose | None) -> int:
-        """Fill the row of a body except its kind; return the kind, OTHER if kernels do not take the body."""
+        """Fill a body's row (4,) except its kind; return the kind, OTHER if kernels cannot take the body."""
         kind = row_of(solid).kind
         if kind == BodyKind.BALL:
             if not _are_safe([*solid.center, solid.radius, *(() if pose is None else pose.translation)]):
@@ -88,7 +88,7 @@ class Table:
 
 
 def unready(n: int) -> IntArray:
-    """Return the rows of n bodies of which none is prepared."""
+    """Return the rows (n, 4) of n bodies of which none is prepared."""
     rows = np.zeros((n, 4), np.int64)
     rows[:, 0] = BodyKind.UNREADY
     return rows

@@ -128,9 +128,8 @@ def locate_by_cells(points: FloatArray, cells: Any, locations: Int8Array, flag: 
 
 @inline
 def side_in_cell(frames: FloatArray, places: IntArray, row: int, p: tuple[float, ...], blur: float) -> int:
-    """Return the location of the blurred point p = (x, y, z), whose coordinates are known to +- blur, if one cell
-    contains all of its blur, else UNDECIDED. frames (n, 6), places (n, 4): `frame` and `place` of the `Sides` of each
-    polyhedron; row: the polyhedron."""
+    """Return the location of a blurred point p = (x, y, z) if the box p +- blur lies in one cell, else UNDECIDED.
+    frames (n, 6), places (n, 4): `frame` and `place` of the `Sides` of each polyhedron; row: the polyhedron."""
     x, y, z = p
     x_low, y_low, z_low = frames[row, 0], frames[row, 1], frames[row, 2]
     x_scale, y_scale, z_scale = frames[row, 3], frames[row, 4], frames[row, 5]

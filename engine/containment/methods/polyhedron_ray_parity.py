@@ -222,8 +222,8 @@ def list_uncertain(tree: Any, x: float, y: float, z: float, blur: float, uncerta
 @inline
 def locate_in_tree(tree: Any, q: Point3, blur: float, stack: Int32Array, flag: FlagArray) -> tuple[int, bool]:
     """Return the location of a blurred q by a `TriangleTree` (1, 0, -1 or UNDECIDED), and whether the filter left it
-    open. stack: (STACK,) int32, scratch. A point so far from the tree that its coordinates there have no bound is
-    outside, or UNDECIDED if it has a blur."""
+    open. stack: (STACK,) int32, scratch. A point whose blur misses the tree's box is outside; one with a blur too large
+    for the tree's coordinates is UNDECIDED."""
     low, high = tree.low, tree.high
     is_out = (q.x + blur < low[0]) | (q.x - blur > high[0]) | (q.y + blur < low[1]) | (q.y - blur > high[1])
     if is_out | (q.z + blur < low[2]) | (q.z - blur > high[2]):
