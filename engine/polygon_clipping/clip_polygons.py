@@ -203,7 +203,8 @@ def clip_polygons(
 
 
 def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> ClippedPolygons | None:
-    """Clip an array of few polygons; None if the general path is needed, which checks the array."""
+    """Clip an array of few polygons (n, size, dim) on a fast path; None if the general path is needed, which also
+    checks the array."""
     if plan.tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], dimension):
         return None
     n, size, _ = polygons.shape
@@ -238,7 +239,8 @@ class Contours(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """Polygons, planes, and the arrays to fill: see `Clipped` and `ClippedPolygons`."""
+    """A batch as chunks take it. contours, plan, scene: polygons and planes; the other fields: arrays to fill, see
+    `Clipped` and `ClippedPolygons`."""
 
     contours: Contours
     plan: Plan
@@ -346,7 +348,8 @@ def clip_chunk(batch: Batch, first: int, last: int, budget: Budget) -> FloatArra
 
 
 def _clip_in_integers(batch: Batch, i: int, budget: Budget) -> FloatArray:
-    """Return the vertices left of polygon i by exact integers, and fill its other results."""
+    """Return the vertices (n, dim) left of polygon i, clipped in Python's integers, and fill its other results in
+    `batch`."""
     d, vertices, ring_offsets, polygon_offsets, _ = batch.contours
     rings, points = range(polygon_offsets[i], polygon_offsets[i + 1]), vertices.reshape(-1, d)
     contours = [points[ring_offsets[j] : ring_offsets[j + 1]].tolist() for j in rings]
@@ -387,8 +390,8 @@ def _clip(
 def _clip_few(
     vertices: FloatArray, tables: PlaneTables, ring_offsets: IntArray, polygon_offsets: IntArray, budget: Budget
 ) -> tuple[ClippedPolygons, int] | None:
-    """Clip few polygons (flat vertices) in one call; return the result, and the number of polygons beyond the filter.
-    None if one is left open, or does not fit."""
+    """Clip few polygons, flat vertices (m * dim,), in one call of the kernel; return the result, and the number of
+    polygons beyond the filter. None if one is left open, or does not fit."""
     d = tables.high.shape[1] - 1
     n, n_rings, clip = len(polygon_offsets) - 1, len(ring_offsets) - 1, entry_of(clip_rings, d)
     if clip is clip_rings:
@@ -413,7 +416,8 @@ def _clip_few(
 def _assemble(
     vertices: FloatArray, sizes: IntArray, polygon_offsets: IntArray, status: Int8Array, may_have_bridges: BoolArray
 ) -> ClippedPolygons:
-    """Return the clipped polygons; sizes: number of vertices of each ring, 0 for rings that vanished."""
+    """Return the clipped polygons. vertices (n, dim): ring after ring; sizes: number of vertices left of each ring, 0
+    for rings that vanished; polygon_offsets: of polygons into all given rings."""
     left = np.flatnonzero(sizes)
     if len(polygon_offsets) == len(sizes) + 1:  # a ring each
         contours = np.zeros(len(left), np.int64)

@@ -46,7 +46,8 @@ Triple = tuple[float, float, float]
 
 @inline
 def edge_parameter(a: float, b: float, place: float) -> tuple[float, float, bool]:
-    """Return t = (a - place) / (a - b) as a double-double, for place between a and b; and False if it underflows."""
+    """Return (th, tl, is_safe): t = (a - place) / (a - b) as a double-double, for place between a and b; is_safe is
+    False if it may underflow."""
     h, low = two_diff(a, place)
     length, rest = two_diff(a, b)
     inverse = 1.0 / length
@@ -56,7 +57,8 @@ def edge_parameter(a: float, b: float, place: float) -> tuple[float, float, bool
 
 @inline
 def point_on_edge(x: float, y: float, th: float, tl: float) -> tuple[float, float, float]:
-    """Return x + t (y - x) as a double and its remainder, and the error bound; x and y are exact."""
+    """Return (h, rest, bound): x + t (y - x), t = th + tl, as a double and its remainder, with an error bound; x and y
+    are exact."""
     h, low, mh, _ = point_along(x, y, th, tl)
     h, rest = two_sum(h, low)
     return h, rest, (EDGE_BOUND * (abs(x) + abs(mh)) + TINY if x != y else 0.0)
@@ -81,7 +83,8 @@ def is_exactly_at(x: float, y: float, a: float, b: float, place: float, guess: f
 
 @inline
 def distance_across(x: float, low: float, bound: float, at: float) -> tuple[float, float, float]:
-    """Return x + low - at as a double-double, and its error bound; bound: of x + low."""
+    """Return (h, rest, bound): x + low - at, the value of a plane across an axis, as a double-double with an error
+    bound. bound: error bound of x + low."""
     if low == 0.0:
         h, rest = two_diff(x, at)
         return h, rest, bound
@@ -90,8 +93,8 @@ def distance_across(x: float, low: float, bound: float, at: float) -> tuple[floa
 
 
 class CutWeights(NamedTuple):
-    """Where an edge p q is cut: |value| at p and q, their sum, t = |p| / sum, as double-doubles; r: relative error of
-    t."""
+    """Where an edge p q is cut. ph + pl, qh + ql: |value| of the plane at p and q; sum_h + sum_l: their sum; th + tl: t
+    = |p| / sum, all double-doubles; r: relative error of t."""
 
     ph: float
     pl: float
@@ -106,7 +109,8 @@ class CutWeights(NamedTuple):
 
 @inline
 def interpolate(x: Triple, y: Triple, s: CutWeights) -> Triple:
-    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x); x, y and the result as double, rest and error bound."""
+    """Return (x |q| + y |p|) / (|p| + |q|) = x + t (y - x) for the weights s; x, y and the result are (double,
+    remainder, error bound)."""
     x_h, x_low, x_bound = x
     y_h, y_low, y_bound = y
     if x_low != 0.0 or y_low != 0.0 or x_bound != 0.0 or y_bound != 0.0:
@@ -146,7 +150,8 @@ def are_same(s: Vertices, v: int, u: int) -> bool:
 
 @merged
 def coordinate(s: Vertices, v: int, k: int, n_ring: int) -> Triple:
-    """Return coordinate k of vertex v: its double, remainder and error bound; vertices below n_ring are exact."""
+    """Return coordinate k of vertex v as (double, remainder, error bound); the vertices below n_ring are original ones,
+    exact."""
     place = v * len(s.names) + k
     rest, bound = (s.rests[2 * place], s.rests[2 * place + 1]) if v >= n_ring else (0.0, 0.0)
     return s.pool[place], rest, bound
@@ -161,7 +166,8 @@ def set_coordinate(s: Vertices, v: int, k: int, h: float, rest: float, bound: fl
 
 @merged
 def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
-    """Return the value of a plane at vertex v as a double-double, and its error bound."""
+    """Return (h, low, bound): the value of a plane at vertex v as a double-double, with an error bound. Vertices below
+    n_ring are original ones."""
     if plane.axis >= 0:
         x, rest, bound = coordinate(s, v, plane.axis, n_ring)
         return distance_across(x, rest, bound, plane.place)
@@ -178,8 +184,8 @@ def value_of(s: Vertices, plane: Plane, v: int, n_ring: int) -> Triple:
 
 @merged
 def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
-    """Set vertex j to the crossing of original edge p q with a plane across an axis; return whether it is correctly
-    rounded."""
+    """Set vertex j to the crossing of the edge p q, both original vertices, with a plane across an axis; return whether
+    all its doubles are proven nearest."""
     d, axis, place = len(s.names), plane.axis, plane.place
     a, b = s.pool[p * d + axis], s.pool[q * d + axis]
     th, tl, is_certified = edge_parameter(a, b, place)
@@ -199,7 +205,8 @@ def cut_original(s: Vertices, plane: Plane, p: int, q: int, j: int) -> bool:
 
 @merged
 def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
-    """Return whether p and q have the same coordinates, all doubles, except along one axis."""
+    """Return whether vertices p and q have the same coordinates, all doubles, except along axis `axis`. Vertices below
+    n_ring are original ones."""
     d, is_along = len(s.names), True
     for k in range(d):
         is_double = (p < n_ring or s.rests[2 * (p * d + k) + 1] == 0.0) and (
@@ -211,8 +218,8 @@ def is_along_axis(s: Vertices, axis: int, p: int, q: int, n_ring: int) -> bool:
 
 @merged
 def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to the crossing of edge p q, between any vertices, with a plane; return whether it is correctly
-    rounded."""
+    """Set vertex j to the crossing of edge p q, between original or cut vertices, with a plane; return whether all its
+    doubles are proven nearest. Vertices below n_ring are original ones."""
     d = len(s.names)
     ph, pl, p_bound = value_of(s, plane, p, n_ring)
     qh, ql, q_bound = value_of(s, plane, q, n_ring)
@@ -237,8 +244,8 @@ def recompute_intersection(s: Vertices, plane: Plane, p: int, q: int, n_ring: in
 
 @merged
 def cut_edge(s: Vertices, plane: Plane, v: int, w: int, n_ring: int, j: int) -> bool:
-    """Set vertex j to the crossing of edge v w with a plane; return whether it is correctly rounded. A part of an
-    original edge is cut as the whole edge."""
+    """Set vertex j to the crossing of edge v w with a plane; return whether all its doubles are proven nearest. A part
+    of an original edge is cut as the whole edge. Vertices below n_ring are original ones."""
     edge, p, q = s.edges[v], v, w
     if edge >= 0:
         p, q = edge, edge + 1 if edge + 1 < n_ring else 0

@@ -95,8 +95,8 @@ def exact_scratch(room: int, dimension: int, row_heap: IntArray, row_places: Int
 
 @inline
 def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
-    """Set ``loaded[side]`` to the heap indices of vertex v's coordinates x, y[, z], w; an original vertex is stored
-    first."""
+    """Set ``loaded[side]``, side 0 or 1, to the heap indices of the coordinates x, y[, z], w of vertex v. An original
+    vertex (v < n_ring) is stored in the heap first."""
     d = s.points.shape[1]
     for k in range(d + 1):
         if v >= n_ring:
@@ -110,7 +110,8 @@ def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
 
 @inline
 def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
-    """Store the value of a plane at loaded vertex ``side`` at heap index `place`; False if it is too long."""
+    """Store the value of a plane at the vertex ``loaded[side]`` at heap index `place`; False if it has too many digits.
+    """
     n = s.loaded.shape[1]
     for k in range(n):
         s.terms[k, 0], s.terms[k, 1], s.terms[k, 2] = s.rows[plane, k], s.loaded[side, k], 1
@@ -162,9 +163,8 @@ def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
 
 @inline
 def store_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
-    """Set coordinate k of vertex `place` to the sum of two terms, on top of the heap; False if it is too long. carry:
-    digits to reserve for one.
-    """
+    """Set coordinate k of vertex `place` to the sum of the two products ``terms[:2]``, stored on top of the heap; False
+    if it has too many digits. carry: digits to reserve for one."""
     top = s.used[1]
     if top + SLOT > s.heap.size or not sum_products(s.heap, s.terms, 2, top) or s.heap[top] > MOST:
         return False
@@ -175,7 +175,7 @@ def store_sums(s: ExactScratch, place: int, k: int, carry: int) -> bool:
 
 @inline
 def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -> bool:
-    """Compute vertex j, the crossing of edge p q with a plane, as exact integers; False if these are too long."""
+    """Set vertex j to the crossing of edge p q with a plane, in exact integers; False if these have too many digits."""
     load_vertex(s, p, n_ring, 0)
     load_vertex(s, q, n_ring, 1)
     if not (value_at(s, plane, 0, _VALUES) and value_at(s, plane, 1, _VALUES + SLOT)):
@@ -191,7 +191,8 @@ def cut_edge(s: ExactScratch, plane: int, p: int, q: int, n_ring: int, j: int) -
 
 @inline
 def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
-    """Compute vertex j, the intersection of two planes (lines) in 2D, in exact integers; False if they are too long."""
+    """Set vertex j to the intersection of the lines `plane` and `other` of 2D, in exact integers; False if these have
+    too many digits."""
     for k in range(3):  # the cross product of both rows
         a, b = (k + 1) % 3, (k + 2) % 3
         s.terms[0, 0], s.terms[0, 1], s.terms[0, 2] = s.rows[plane, a], s.rows[other, b], 1
@@ -206,8 +207,8 @@ def cut_corner(s: ExactScratch, plane: int, other: int, j: int) -> bool:
 
 @inline
 def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_ring: int) -> int:
-    """Return the new vertex at the crossing of edge v w with a plane; TOO_LONG. is_left: the edge leaves the plane's
-    inner side."""
+    """Make the vertex at the crossing of edge v w with a plane; return its number, or TOO_LONG. is_left: the edge
+    leaves the plane's inner side. Vertices below n_ring are original ones."""
     j, edge, d = s.used[0], s.edges[v], s.points.shape[1]
     if j + 1 >= s.points.shape[0]:
         return TOO_LONG
@@ -228,8 +229,8 @@ def cut_vertex(s: ExactScratch, plane: int, v: int, w: int, is_left: bool, n_rin
 
 @inline
 def append_vertex(s: ExactScratch, made: IntArray, n_left: int, v: int, is_on: bool, n_ring: int) -> int:
-    """Append vertex v to a ring of n_left vertices; return their number then, or TOO_LONG. is_on: v lies on the plane.
-    A duplicate of the previous vertex is merged into it, and its outgoing edge inherited."""
+    """Append vertex v to the ring `made` of n_left vertices; return their number then, or TOO_LONG. is_on: v lies on
+    the plane. A duplicate of the previous vertex is merged into it, and its outgoing edge inherited."""
     s.on_plane[n_left] = is_on
     if n_left > 0 and is_on and s.on_plane[n_left - 1]:
         before = made[n_left - 1]
@@ -245,7 +246,7 @@ def append_vertex(s: ExactScratch, made: IntArray, n_left: int, v: int, is_on: b
 
 @inline
 def close_ring(s: ExactScratch, made: IntArray, n_left: int, n_ring: int) -> int:
-    """Drop last vertices of a ring that equal the first; return the number of vertices, or TOO_LONG."""
+    """Drop the last vertices of the ring `made` that equal its first; return the number of vertices, or TOO_LONG."""
     while n_left > 1 and s.on_plane[n_left - 1] and s.on_plane[0]:
         is_same, is_known = are_same(s, made[n_left - 1], made[0], n_ring)
         if not is_known:
@@ -258,8 +259,8 @@ def close_ring(s: ExactScratch, made: IntArray, n_left: int, n_ring: int) -> int
 
 @inline
 def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int) -> tuple[int, int]:
-    """Set the signs of the n vertices of a ring at a plane; return how many are outside (or TOO_LONG), and how many on
-    it."""
+    """Set s.signs to the signs of a plane at the n vertices of a ring; return how many are outside (or TOO_LONG), and
+    how many on it."""
     n_out, n_on = 0, 0
     for i in range(n):
         s.signs[i], is_known = sign_of_vertex(s, plane, ring[i], n_ring)
@@ -293,7 +294,8 @@ def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray
 
 @inline
 def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> int:
-    """Load a ring, repeated vertices merged, cyclically; return the number of its vertices."""
+    """Load the ring of vertices first .. last - 1, repeated ones merged, also the last with the first; return their
+    number. vertices: flat."""
     n, d = 0, s.points.shape[1]
     for i in range(first, last):
         is_same = n > 0
@@ -317,8 +319,9 @@ def load_ring(s: ExactScratch, vertices: FloatArray, first: int, last: int) -> i
 def cut_by_planes(
     s: ExactScratch, planes: PlaneTables, cutting: Cutting, n_cutting: int, n_ring: int, stop: FlagArray
 ) -> tuple[int, int]:
-    """Clip the loaded ring by the planes in order; return the number of its vertices, and its row in `rings`. TOO_LONG
-    or NO_ROOM in place of the number. Counts the contacts with each plane, and notes which dropped a vertex."""
+    """Clip the loaded ring by the n_cutting planes of `cutting` in order; return the number of its vertices, or
+    TOO_LONG or NO_ROOM, and its row in `rings`. Adds to `cutting.contacts` the points in which each plane was met, and
+    notes in `dropped` which one dropped a vertex."""
     n, now = n_ring, 0
     for i_plane in range(n_cutting):
         if n <= 0:
@@ -341,8 +344,9 @@ def clip_exactly(
     s: ExactScratch, polygons: Polygons, polygon: int, planes: PlaneTables, cutting: Cutting, n_cutting: int,
     stop: FlagArray, clipped: Clipped, written: int,
 ) -> int:  # fmt: skip
-    """Clip a polygon by the planes of `cutting`, whose contacts are reset, after `written` vertices of others. Returns
-    the number of vertices then, or NO_ROOM. A polygon with too long numbers is left OPEN."""
+    """Clip a polygon by the n_cutting planes of `cutting`, whose contacts are reset, and write its vertices to
+    `clipped` after the `written` ones there. Returns the number of vertices then, or NO_ROOM. A polygon whose numbers
+    have too many digits is left OPEN."""
     written_before, d = written, s.points.shape[1]
     first_ring, last_ring = polygons.polygon_offsets[polygon], polygons.polygon_offsets[polygon + 1]
     for i in range(n_cutting):

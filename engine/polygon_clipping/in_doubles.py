@@ -72,7 +72,8 @@ class Scratch(NamedTuple):
 
 @allocating
 def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
-    """Allocate scratch for rings that grow to `room` vertices, dropped ones included."""
+    """Allocate scratch for rings that grow to `room` vertices, dropped ones included, and n_planes planes. names: its
+    length is the dimension."""
     d = len(names)
     return Scratch(
         Vertices(np.empty(room * d), np.empty(2 * room * d), np.empty(room, np.int32), names),
@@ -92,8 +93,8 @@ def scratch_for(room: int, n_planes: int, names: Any) -> Scratch:
 def load_ring(
     s: Scratch, vertices: FloatArray, begin: int, end: int
 ) -> tuple[int, float, float, float, float, float, float]:
-    """Load a ring, repeated vertices merged; return the number of its vertices, and low and high bound of each axis.
-    Zeros become +0.0. The first vertex may still be repeated at the end."""
+    """Load the ring of vertices begin .. end - 1 (flat array), repeated ones merged; return (number of vertices, x_low,
+    x_high, y_low, y_high, z_low, z_high). Zeros become +0.0. The first vertex may still be repeated at the end."""
     pool, d = s.vertices.pool, len(s.vertices.names)
     x, y, z = vertices[begin * d], vertices[begin * d + 1], 0.0 if d == 2 else vertices[begin * d + 2]
     pool[0], pool[1] = x + 0.0, y + 0.0
@@ -116,7 +117,7 @@ def load_ring(
 @merged
 def load_box(s: Scratch, polygons: Polygons, first: int, last: int) -> int:
     """Set s.lows and s.highs to the box of rings first .. last - 1; return the number of vertices of the last ring,
-    loaded."""
+    which stays loaded."""
     vertices, offsets = polygons.vertices, polygons.ring_offsets
     n, x_low, x_high, y_low, y_high, z_low, z_high = load_ring(s, vertices, offsets[first], offsets[first + 1])
     for ring in range(first + 1, last):
@@ -174,7 +175,8 @@ def value_at(s: Scratch, row: tuple[float, float, float, float], v: int) -> floa
 
 @merged
 def mark_sides(s: Scratch, planes: PlaneTables, n_cutting: int, n: int) -> None:
-    """Set the codes of n vertices: a bit for each plane that a vertex is outside of, ALONE if it is on or near one."""
+    """Set s.codes of the n loaded vertices: bit i for the side of plane i of s.cutting on which the vertex lies, ALONE
+    if it is on or near one of the n_cutting planes."""
     pool, codes, d = s.vertices.pool, s.codes, len(s.vertices.names)
     for i in range(n):
         codes[i] = 0
@@ -217,8 +219,8 @@ def group_into_runs(s: Scratch, planes: PlaneTables, n_cutting: int, n_ring: int
 
 @merged
 def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: int) -> tuple[int, int]:
-    """Set the signs of n vertices at a plane across an axis; return how many are not outside (or DOUBT), and how many
-    on it."""
+    """Set s.signs of n vertices at a plane across an axis; return how many are inside or on it (or DOUBT), and how many
+    on it. Vertices below n_ring are original ones."""
     pool, rests, d, axis, place = s.vertices.pool, s.vertices.rests, len(s.vertices.names), plane.axis, plane.place
     sense, n_in, n_on = 1 if plane.high[plane.number, axis] > 0.0 else -1, 0, 0
     for i in range(n):
@@ -239,7 +241,7 @@ def classify_across(s: Scratch, plane: Plane, ring: Int32Array, n: int, n_ring: 
 
 @merged
 def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n: int) -> tuple[int, int]:
-    """Set the signs of n vertices at an oblique plane by float values; return (number of vertices inside, 0). (DOUBT,
+    """Set s.signs of n vertices at an oblique plane by float values; return (number of vertices inside, 0), or (DOUBT,
     0) if a value is within `near` of zero: no vertex is proven to be on the plane."""
     row, n_in = row_of(s, plane), 0
     for i in range(n):
@@ -255,9 +257,9 @@ def classify_by_value(s: Scratch, plane: Plane, near: float, ring: Int32Array, n
 def cut_ring(
     s: Scratch, plane: Plane, ring: Int32Array, n: int, made: Int32Array, n_ring: int, n_made: int
 ) -> tuple[int, int]:
-    """Clip a ring of n vertices, whose signs are set, by a plane into `made`: append, cross or drop each edge. n_made:
-    number of vertices, cut ones included. Returns the number of vertices left (or DOUBT), and n_made then.
-    """
+    """Clip a ring of n vertices, whose signs are set, by a plane into `made`: append, cross or drop each edge. Returns
+    the number of vertices left, or DOUBT; and the number of vertices of all kinds then, n_made before, cut ones being
+    numbered from there on."""
     signs, edges = s.signs, s.vertices.edges
     n_left, was_on, first_on = 0, False, False
     signs[n] = signs[0]
@@ -317,7 +319,8 @@ def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_rin
 
 @merged
 def emit(s: Scratch, ring: Int32Array, n: int, n_ring: int, out: FloatArray, place: int) -> int:
-    """Write the vertices of n runs to ``out[place:]``; return the index after them."""
+    """Write the vertices of n runs of a ring to the flat array `out` from index `place` on; return the index after
+    them."""
     d = len(s.vertices.names)
     for i in range(n):
         v = ring[i]

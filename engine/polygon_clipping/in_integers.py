@@ -26,7 +26,7 @@ MOST_BITS = 1 << 17
 
 
 def integer_row(row: Sequence[float]) -> Row:
-    """Return a plane's row as integers, times a positive factor."""
+    """Return a plane's row (a, b[, c], d) as integers, times a positive factor."""
     numbers, _ = common_integers(row)
     return tuple(numbers)
 

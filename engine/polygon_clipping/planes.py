@@ -51,7 +51,7 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
 
 
 class Plan(NamedTuple):
-    """The planes of a region, cached with it: integer rows in clipping order without duplicates; tables: for the
+    """The planes of a region, cached with it. rows: as integers, in clipping order, without duplicates; tables: for the
     kernel, None if exponents are too far apart."""
 
     rows: list[Row]
@@ -59,8 +59,8 @@ class Plan(NamedTuple):
 
 
 def plan_of(region: Solid, check: Check) -> Plan:
-    """Return the planes of a region, cached with it. Raises: UnsupportedSolidError, for a polyhedron that is not convex
-    naming a face and a vertex beyond it."""
+    """Return the `Plan` of a region, cached with it. Raises UnsupportedSolidError; for a polyhedron that is not convex
+    its message names a face and a vertex beyond it."""
     planes = row_of(region).planes
     if planes is None:
         more = " that is convex, or use overlay for polygons in the plane"
@@ -89,7 +89,7 @@ def planes_of_faces(region: Polyhedron, check: Check) -> Iterable[Row]:
 
 
 class KernelScene(NamedTuple):
-    """Input of the kernel: vertices (m, dim) float64 times 2^-exponent, and the planes for them."""
+    """Input of the kernel: flat vertices (m * dim,), already times 2^-exponent, and the planes for them."""
 
     vertices: FloatArray
     exponent: int
@@ -97,8 +97,9 @@ class KernelScene(NamedTuple):
 
 
 def kernel_scene(plan: Plan, vertices: FloatArray, largest: float, check: Check) -> KernelScene | None:
-    """Return the input of the kernel, scaled if necessary; None if exponents are too far apart. largest: magnitude of
-    any coordinate."""
+    """Return the input of the kernel, scaled if necessary; None if exponents are too far apart. largest: the largest
+    |coordinate| of the vertices.
+    """
     exponent = exponent_above(largest)
     points = shifted(vertices, -exponent) if exponent else vertices
     if points is None or exponent < _DEEPEST:

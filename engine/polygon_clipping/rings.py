@@ -30,7 +30,8 @@ PlaneTables = namedtuple("PlaneTables", "high low axes at row_heap row_places")
 
 
 class Plane(NamedTuple):
-    """One of the planes of the tables: its number, and the axis that it crosses at `place`; axis -1 for others."""
+    """One of the planes of the tables. high, low: all rows; number: its row; axis: the axis that it crosses at
+    coordinate `place`, -1 for an oblique plane."""
 
     high: Any
     low: Any

@@ -28,8 +28,8 @@ from engine.types import BoolArray, FlagArray, FloatArray, IntArray
 
 @inline
 def room_for(ring_offsets: IntArray, first: int, last: int, n_planes: int) -> int:
-    """Return the number of vertices, dropped ones included, to which a ring may grow; polygons that exceed it are left
-    open. A convex ring gains one vertex a plane."""
+    """Return the number of vertices, dropped ones included, to which a ring of polygons first .. last - 1 may grow; a
+    polygon that exceeds it is left open. A convex ring gains one vertex a plane."""
     largest = 0
     for ring in range(first, last):
         largest = max(largest, ring_offsets[ring + 1] - ring_offsets[ring])
@@ -42,9 +42,8 @@ def clip_rings(
     stop: FlagArray, out: FloatArray, sizes: IntArray, state: FlagArray, may_have_bridges: BoolArray, names: Any,
 ) -> tuple[int, int]:  # fmt: skip
     """Clip polygons first .. last - 1 by all planes; return the polygon reached and the number of vertices written.
-    vertices .. polygon_offsets: see `Polygons`; out .. may_have_bridges: see `Clipped`. stop: one uint8, polled. names:
-    see `Vertices`. Stops before a polygon that does not fit `out`.
-    """
+    vertices .. polygon_offsets: see `Polygons`; out .. may_have_bridges: fields of `Clipped`. stop: one uint8, polled.
+    names: its length is the dimension (`Vertices`). Stops before a polygon that does not fit `out`."""
     polygons, clipped = Polygons(vertices, ring_offsets, polygon_offsets), Clipped(out, sizes, state, may_have_bridges)
     n_planes = planes.high.shape[0]
     room = room_for(ring_offsets, polygon_offsets[first], polygon_offsets[last], n_planes)

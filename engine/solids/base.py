@@ -98,7 +98,7 @@ class Solid(Preparing, Immutable):
     """Names of the fields in a pickle: the constructor's arguments, unless `restored` takes others."""
 
     def _set(self, **values: object) -> None:
-        """Set the fields, once; called at the end of a constructor, after all checks."""
+        """Set the fields by name, once; called at the end of a constructor, after all checks."""
         if hasattr(self, "_prepared"):
             raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
         for name, value in values.items():
@@ -147,7 +147,8 @@ class Solid(Preparing, Immutable):
 
 
 def _collect_arrays(start: object, sizes: dict[int, int], seen: set[int]) -> None:
-    """Fill sizes, a dict from id to bytes, with every array reachable from `start`; views count as their base."""
+    """Add to sizes, a dict from id to bytes, every array reachable from `start`; views count as their base. seen: ids
+    of the objects visited."""
     waiting = [start]
     while waiting:  # bound: each object enters once, by its id
         value = waiting.pop()

@@ -1,4 +1,4 @@
-"""Public: bounds(solid), the axis-aligned box and the minimal sphere; the boxes that posed ones are made from."""
+"""Public: bounds(solid), the box and the minimal enclosing ball (sphere); the boxes that posed ones are made from."""
 
 from __future__ import annotations
 
@@ -131,17 +131,18 @@ def _bounds_of(solid: Solid, budget: Budget) -> Reported:
 
 
 def bounds_of_sphere(solid: Sphere, _: Budget) -> Reported:
-    """Return box and sphere of a ball, for `Row.bounds`."""
+    """Return box and sphere of a ball and the accuracy report, for `Row.bounds`."""
     return Bounds(_box_of_sphere(solid), solid), _accuracy("sphere", 1)
 
 
 def bounds_of_box(solid: Aabb, budget: Budget) -> Reported:
-    """Return box and minimal sphere of an axis-aligned box, for `Row.bounds`."""
+    """Return box and minimal sphere of an axis-aligned box and the accuracy report, for `Row.bounds`."""
     return _around(corners_of_box(solid.min, solid.max), budget, solid)
 
 
 def bounds_of_vertices(solid: Mesh | Polygon | Triangle, budget: Budget) -> Reported:
-    """Return box and minimal sphere of a solid that is bounded by its vertices, for `Row.bounds`."""
+    """Return box and minimal sphere of a solid that is bounded by its vertices and the accuracy report, for
+    `Row.bounds`."""
     return _around(vertices_in_use(solid), budget)
 
 
@@ -161,7 +162,8 @@ def vertices_in_use(mesh: Mesh | Polygon | Triangle) -> FloatArray:
 
 
 def bounds_of_convex(solid: Convex, budget: Budget) -> Reported:
-    """Return box and minimal sphere of an intersection of half-spaces, from its exact corners, for `Row.bounds`."""
+    """Return box and minimal sphere of an intersection of half-spaces, from its exact corners, and the accuracy report,
+    for `Row.bounds`."""
     corners = corners_of_half_spaces(solid.planes.tolist(), budget)
     if corners.is_empty:
         raise EmptyGeometryError("no point satisfies all rows of this convex, so it has no bounds", ("solid", "planes"))
@@ -192,18 +194,20 @@ def _accuracy(method: str, n_items: int, ball: MinimalSphere | None = None) -> A
 
 
 def vertices_box(solid: Mesh | Polygon | Triangle, check: Check) -> Box:
-    """Return box and reach of a solid with vertices, for `Row.box`; computed once."""
+    """Return the `Box` (low, high, reach) of a solid with vertices, for `Row.box`; computed once. check: see
+    `Solid.prepared`."""
     return solid.prepared("own_box", lambda: _box_of_vertices(solid), check)
 
 
 def triangle_box(solid: Triangle, check: Check) -> Box:
-    """Return box and reach of a planar triangle, for `Row.box`; in space the prism over the triangle is unbounded."""
+    """Return the `Box` (low, high, reach) of a planar triangle, for `Row.box`; infinite for a triangle in space, whose
+    prism is unbounded. check: see `Solid.prepared`."""
     return vertices_box(solid, check) if solid.dimension == 2 else unbounded(solid)
 
 
 def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, FloatArray, float]:
-    """Return low, high and a bound on the distance of a vertex from the box's centre. The square underflows for
-    distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings."""
+    """Return (low, high, reach): the box of the vertices in use, and an upper bound on their distance from its centre.
+    The square underflows for distances below 2^-537, for which 2^-500 is added; 2^-40 covers some ten roundings."""
     points = vertices_in_use(body)
     low, high = box_of_points(points)
     with np.errstate(all="ignore"):

@@ -37,7 +37,7 @@ _FEW: Final = 24
 
 
 def spell(where: Where) -> str:
-    """Return a path as Python writes it: ``points[3][1]``, ``operands[0].faces``."""
+    """Return the path of an argument as Python writes it: ``points[3][1]``, ``operands[0].faces``."""
     text = ""
     for part in where:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -45,7 +45,7 @@ def spell(where: Where) -> str:
 
 
 def digits(point: npt.ArrayLike) -> str:
-    """Return the coordinates with all their digits: ``[0.1, 2.0, -3.5]``."""
+    """Return the coordinates of a point as text with all their digits: ``[0.1, 2.0, -3.5]``."""
     return repr(np.asarray(point, np.float64).tolist())
 
 
@@ -61,7 +61,8 @@ _SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 80
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """Return a short text of a caller's value for a message; works for any object, of any length or depth."""
+    """Return a text of at most some `limit` characters of a caller's value, for a message; works for any object, of any
+    length or depth."""
     try:
         text = _SHORT.repr(value)
     except Exception:  # an integer beyond Python's own limit of digits, a broken __repr__
@@ -156,9 +157,8 @@ def _check_converted(array: npt.NDArray[Any], result: FloatArray, where: Where) 
 
 
 def plain_floats(values: Any, depth: int) -> FloatArray | None:
-    """Return a list of numbers (depth 1), or of lists of numbers (depth 2), as a float64 array, else None. Numbers:
-    finite floats and integers up to 2^53.
-    """
+    """Return a list of numbers (depth 1), or of lists of numbers (depth 2), as a float64 array; None if it is anything
+    else. Numbers: finite floats, and integers of magnitude up to 2^53."""
     try:
         items = values if depth == 1 else list(chain.from_iterable(values))
         is_plain = depth == 1 or (depth == 2 and set(map(type, values)) <= {list, tuple})
@@ -187,8 +187,8 @@ def _plain_parts(values: list[Any] | tuple[Any, ...], depth: int) -> FloatArray 
 
 
 def _from_lists(values: list[Any] | tuple[Any, ...], depth: int, where: Where) -> FloatArray:
-    """Return nested lists of depth `depth` as an array; raise for unequal lengths at a level, or a wrong type of a
-    leaf."""
+    """Return lists nested to `depth` levels as an array. Raises InvalidArrayError for unequal lengths at a level, or a
+    leaf that is no number."""
     if (plain := _plain_parts(values, depth)) is not None:
         return plain
     shape, items = [len(values)], list(values)
@@ -234,7 +234,8 @@ def check_finite(array: FloatArray, where: Where) -> None:
 
 
 def check_dimension(n_columns: int, dimension: int | None, where: Where, what: str = "positions of") -> None:
-    """Raise unless `n_columns`, the coordinates of a position, is `dimension` (None: 2 or 3)."""
+    """Raise unless `n_columns`, the number of coordinates of a position, is `dimension` (None: 2 or 3). what: begins
+    the noun phrase of the message."""
     allowed = DIMENSIONS if dimension is None else (dimension,)
     if n_columns not in allowed:
         wanted = " or ".join(map(str, allowed))
@@ -248,7 +249,7 @@ def check_given_dimension(dimension: object) -> None:
 
 
 def check_not_empty(count: int, what: str, where: Where) -> None:
-    """Raise if `count` is 0."""
+    """Raise EmptyGeometryError if `count` is 0. what: the things counted, for the message."""
     if count == 0:
         raise EmptyGeometryError(f"{spell(where)} is empty; at least one {what} is needed", where)
 
@@ -310,7 +311,7 @@ def frozen(array: FloatArray) -> FloatArray:
 
 
 def as_offsets(offsets: object, n_items: int, where: Where) -> IntArray:
-    """Return `offsets` as int64; raise unless they are whole numbers, ascending, within 0 .. `n_items`."""
+    """Return `offsets` as int64. Raises unless they are whole numbers, ascending, within 0 .. `n_items`."""
     try:
         array = np.asarray(offsets)
     except ValueError:  # ragged

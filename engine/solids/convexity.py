@@ -30,8 +30,8 @@ _TRIES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Convexity:
-    """Certificate that a polyhedron is convex. center: a point strictly inside. is_outward: whether the faces are
-    counter-clockwise seen from outside."""
+    """Certificate that a polyhedron is convex. center: a point strictly inside. is_outward: the faces are
+    counter-clockwise seen from outside, else clockwise."""
 
     center: FloatArray
     is_outward: bool
@@ -79,9 +79,8 @@ def _common_side(vertices: FloatArray, triangles: IntArray, center: FloatArray) 
 @kernel
 def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, center: FloatArray, side: int) -> bool:
     """Return whether the mesh is locally convex at every edge, and some half-line from the centre crosses one triangle.
-    others: the edge that starts at corner k of triangle i has index 3 i + k; others[that] is the opposite edge. side:
-    see `_common_side`.
-    """
+    others (3 m,): the edge that starts at corner k of triangle i has number 3 i + k; by edge the number of the opposite
+    one. side: result of `_common_side`."""
     for corner in range(others.shape[0]):
         other = others[corner]
         a, b, c = corners_of(vertices, triangles, corner // 3)
@@ -93,9 +92,9 @@ def _is_convex(vertices: FloatArray, triangles: IntArray, others: IntArray, cent
 
 @inline
 def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side: int) -> bool:
-    """Return whether a half-line from o that meets no edge crosses exactly one triangle; up to `_TRIES` half-lines. A
-    half-line through q crosses triangle abc if q is on the inner side (the opposite of `side`) of the planes oab, obc,
-    oca."""
+    """Return whether a half-line from o that meets no edge crosses exactly one triangle; False if none of up to
+    `_TRIES` half-lines avoids all edges. A half-line through q crosses triangle abc if q is on the inner side (the
+    opposite of `side`) of the planes oab, obc, oca."""
     for attempt in range(min(_TRIES, triangles.shape[0])):
         a, b, c = corners_of(vertices, triangles, attempt)
         q = Point3(

@@ -58,9 +58,9 @@ class Ring(NamedTuple):
 
 
 class Corners(NamedTuple):
-    """Scratch of `cut_ears`, one number for each corner. before, after: the neighbours among the corners not cut yet.
-    is_blunt: whether the corner is blunt. blocker: the blunt corner that blocks it, or -1. blunt: the corners that were
-    blunt at first. n_passed: how many of `blunt` a corner has been compared with."""
+    """Scratch of `cut_ears`, by corner of the ring. before, after: its neighbours among the corners not cut yet.
+    is_blunt: 1 if it is blunt. blocker: the blunt corner that blocks it, or -1. n_passed: how many of `blunt` it has
+    been compared with. blunt: the corners that were blunt at first, one after another."""
 
     before: Any
     after: Any
@@ -156,7 +156,8 @@ def _at(vertices: FloatArray, merged: IntArray, corner: int, axis: int, scale: f
 def _area(
     vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float
 ) -> tuple[float, float]:
-    """Return twice the area of a face projected along an axis, and an error bound; corners: its range in `merged`."""
+    """Return twice the area of a face projected along an axis, times scale^2, and an error bound. corners: (first,
+    end), the range of the face in `merged`."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
     u0, v0 = _at(vertices, merged, first, a, scale), _at(vertices, merged, first, b, scale)
@@ -174,7 +175,8 @@ def _area(
 def _turns_once(
     vertices: FloatArray, merged: IntArray, corners: tuple[int, int], axis: int, scale: float, is_left: bool
 ) -> bool:
-    """Return whether a projected face certainly turns strictly to one side at every corner, and around once."""
+    """Return whether a face projected along an axis certainly turns strictly left (is_left) or right at every corner,
+    and around once. corners: (first, end), the range of the face in `merged`; scale: brings it to size 1."""
     first, last = corners
     a, b = (axis + 1) % 3, (axis + 2) % 3
     u, v = _at(vertices, merged, last - 1, a, scale), _at(vertices, merged, last - 1, b, scale)
@@ -199,8 +201,8 @@ def _turns_once(
 
 @inline
 def _projection(vertices: FloatArray, merged: IntArray, corners: tuple[int, int]) -> int:
-    """Return CONVEX if certain, else 1, 2 or 3 with the sign of the area, see `_projection_of_largest_area`; UNSURE if
-    rounding leaves the axis open."""
+    """Return CONVEX if the face is certainly convex; else 1, 2 or 3 for the axis of largest projected area, negative if
+    that area is; UNSURE if rounding leaves the axis open. corners: (first, end), the range of the face in `merged`."""
     largest, least, projection, is_convex = 0.0, -1.0, 0, True
     for corner in range(corners[0], corners[1]):
         for axis in range(3):
@@ -241,8 +243,8 @@ def cut_convex_faces(
 
 @inline
 def turn(ring: Ring, i: int, j: int, k: int) -> int:
-    """Return the sign of the turn i, j, k at corner j; 0, with the turn written to `wanted`, if it is neither decided
-    nor settled."""
+    """Return the sign of the turn at corner j on the way from corner i to corner k: 1 left, -1 right, 0 straight. 0
+    also, with the turn written to `wanted`, if it is neither decided nor settled."""
     x, y = ring.x, ring.y
     side = orient2d(Point2(x[i], y[i]), Point2(x[j], y[j]), Point2(x[k], y[k]))
     if side != UNDECIDED:
@@ -330,8 +332,8 @@ def cut_ears(ring: Ring, corners: Corners, ears: IntArray, flag: FlagArray) -> i
 
 @inline
 def _is_blocked(ring: Ring, corners: Corners, tip: int, n_blunt: int) -> bool:
-    """Return whether a blunt corner lies in the closed triangle at a convex corner `tip`; continues the last search
-    there. Blunt corners are never cut."""
+    """Return whether a blunt corner lies in the closed triangle at the convex corner `tip`. The search goes on where
+    the last one at this corner stopped. n_blunt: length of `corners.blunt`; blunt corners are never cut."""
     left, right, x, y = corners.before[tip], corners.after[tip], ring.x, ring.y
     if corners.blocker[tip] >= 0 and corners.is_blunt[corners.blocker[tip]] != 0:
         return True

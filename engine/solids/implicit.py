@@ -145,7 +145,8 @@ def _from_terms(terms: object) -> tuple[npt.NDArray[Any], FloatArray]:
 
 
 def _as_powers(powers: object, where: tuple[str | int, ...], *, one: bool = False) -> npt.NDArray[Any]:
-    """Return powers as an integer array ``(n, dimension)``; raise for other types or dimensions."""
+    """Return powers as an integer array ``(n, dimension)``; raise for other types or dimensions. one: the powers of a
+    single term are given."""
     try:
         array = np.asarray(powers)
     except ValueError:  # ragged

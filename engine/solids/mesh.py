@@ -170,8 +170,8 @@ def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]
 
 
 def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
-    """Return the number of corners of each face in a list, and the vertex indices of all faces; raise for one that is
-    no whole number."""
+    """Return the number of corners of each face in a list, and the vertex indices of all faces, one after another.
+    Raises InvalidArrayError for an index that is no whole number."""
     parts = []
     for first in range(0, len(faces) or 1, _BLOCK):
         poll()
@@ -182,7 +182,8 @@ def _flatten(faces: Sequence[Any]) -> tuple[IntArray, npt.NDArray[Any]]:
 
 
 def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArray[Any]]:
-    """Return what `_flatten` does for a part of the list, whose first face has number `first`."""
+    """Return the numbers of corners, and the vertex indices, of some faces of a list, whose first has number `first`
+    there."""
     rows = faces
     if not set(map(type, faces)) <= {list, tuple}:
         rows = [face.tolist() if isinstance(face, np.ndarray) else face for face in faces]
@@ -209,7 +210,8 @@ def _flatten_some(faces: Sequence[Any], first: int) -> tuple[IntArray, npt.NDArr
 
 
 def _place(offsets: IntArray | None, position: int) -> tuple[int, int]:
-    """Return (face, corner in that face) of an index into the flat list of vertex indices."""
+    """Return (face, corner in that face) for a position in the flat list of vertex indices. offsets: of faces, None if
+    all are triangles."""
     if offsets is None:
         return position // 3, position % 3
     i_face = int(np.searchsorted(offsets, position, side="right")) - 1
@@ -241,7 +243,8 @@ def _repeated_index(i_face: int, face: IntArray) -> RepeatedIndexError:
 def _unbalanced_edges(
     vertices: FloatArray, indices: IntArray, named: IntArray, n_odd: int, n_turned: int
 ) -> NotClosedError | InconsistentOrientationError:
-    """Return the error for edges that are not used equally often in both directions, with some of these edges."""
+    """Return the error for edges that are not used equally often in both directions, with some of these. indices:
+    vertex at each corner; named: filled by `check_topology`; n_odd, n_turned: its two counts."""
     kind: type[NotClosedError | InconsistentOrientationError]
     if n_odd > 0:
         kind, n, claim = NotClosedError, n_odd, "are open"

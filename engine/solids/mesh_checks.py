@@ -26,7 +26,7 @@ _TURNED: Final = 2
 
 @inline
 def _mixed(bits: Any, row: int) -> Any:
-    """Return a hash of the three uint64 in a row of bits (n, 3)."""
+    """Return a hash, uint64, of row `row` of bits (n, 3) uint64."""
     mixed = bits[row, 0] * _ODD
     for column in range(1, 3):
         mixed = (mixed ^ (mixed >> _HALF)) + bits[row, column]
@@ -83,7 +83,8 @@ def _find_repeat(offsets: IntArray, indices: IntArray, n_vertices: int, flag: Fl
 
 @inline
 def _following(offsets: IntArray, face: int, corner: int) -> int:
-    """Return the index of the corner that follows `corner` in a face, in the flat list of corners."""
+    """Return the position of the corner that follows `corner` in face `face`; both are positions in the flat list of
+    corners."""
     return corner + 1 if corner + 1 < offsets[face + 1] else offsets[face]
 
 
@@ -113,8 +114,8 @@ def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: I
 @allocating
 def _count_unbalanced(starts: IntArray, ends: IntArray, marks: Int8Array, flag: FlagArray) -> tuple[int, int]:
     """Return how many edges are used an odd number of times, and how many others are used more often in one direction.
-    starts, ends: from `_group_edges`. marks: int8, filled with _ODD_USES or _TURNED at every use of such an edge, else
-    0."""
+    starts, ends: from `_group_edges`. marks (len(ends),): filled with _ODD_USES or _TURNED at every use of such an
+    edge, else 0."""
     uses, n_odd, n_turned = np.zeros(starts.shape[0], np.int64), 0, 0
     for low in range(starts.shape[0] - 2):
         if low & _POLL == 0 and flag[0] != 0:
@@ -143,8 +144,8 @@ def _name_unbalanced(
     offsets: IntArray, corners: IntArray, starts: IntArray, ends: IntArray, marks: Int8Array, wanted: int,
     named: IntArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill named (k, 5) with the first edges marked `wanted`: face, corner where it starts, corner where it ends,
-    number of uses in this direction, number in the other."""
+    """Fill named (k, 5) with the first k edges marked `wanted`: face, position of the corner where it starts, of that
+    where it ends, number of uses in this direction, number in the other. corners: vertex at each position."""
     places = np.empty_like(starts)
     for vertex in range(len(starts)):
         places[vertex] = starts[vertex]

@@ -80,7 +80,8 @@ class Polygon(Solid):
 
     @classmethod
     def of_arrays(cls, vertices: FloatArray, ring_offsets: IntArray) -> Polygon:
-        """Return a polygon of these arrays without a copy or checks: read-only, no -0.0, no repeated last vertex."""
+        """Return a polygon of these arrays without a copy or checks. Caller guarantees that they are read-only, have no
+        -0.0 and no repeated last vertex."""
         polygon = object.__new__(cls)
         polygon._set(dimension=2, vertices=vertices, ring_offsets=ring_offsets)
         return polygon
@@ -100,7 +101,8 @@ class Polygon(Solid):
         return len(self.ring_offsets) - 1
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
-        """Return as `Preparing.prepared`; raise for an empty polygon, which only overlays accept."""
+        """Return the structure cached under `key`, as `Preparing.prepared`; raise for an empty polygon, which only
+        overlays accept."""
         self.check_not_empty()
         return super().prepared(key, build, check)
 

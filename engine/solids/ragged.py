@@ -80,7 +80,7 @@ def summed(sizes: Sequence[int] | IntArray | BoolArray) -> IntArray:
 
 
 def within(offsets: IntArray, items: IntArray) -> IntArray:
-    """Return the group of each item: group g has the items offsets[g] .. offsets[g + 1] - 1."""
+    """Return, by item number, the group that contains it: group g has the items offsets[g] .. offsets[g + 1] - 1."""
     return np.searchsorted(offsets, items, "right") - 1
 
 
@@ -169,7 +169,8 @@ def parted(
 
 
 def _of_rings(vertices: FloatArray, starts: list[int], ends: list[int], ring: int) -> Polygon:
-    """Return the polygon of these rings; ring: index of the first of them among the caller's rings, for messages."""
+    """Return the polygon of the rings vertices[starts[k] : ends[k]]. ring: number of the first of them among the
+    caller's rings, for messages."""
     try:
         return Polygon([vertices[start:end] for start, end in zip(starts, ends)])
     except EngineError as error:
@@ -187,7 +188,8 @@ def closed_rings(vertices: FloatArray, ring_offsets: IntArray) -> tuple[FloatArr
 
 
 def as_geojson(vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntArray) -> dict[str, Any]:
-    """Return pieces (each a shell and its holes) as a GeoJSON MultiPolygon; a single piece as a Polygon."""
+    """Return pieces (each a shell and its holes) as a GeoJSON MultiPolygon; a single piece as a Polygon. ring_offsets:
+    of rings into vertices; piece_offsets: of pieces into rings."""
     positions, offsets = closed_rings(vertices, ring_offsets)
     rings = [positions[start:stop].tolist() for start, stop in pairwise(offsets.tolist())]
     pieces = [rings[start:stop] for start, stop in pairwise(piece_offsets.tolist())]
