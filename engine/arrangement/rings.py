@@ -179,8 +179,7 @@ class ExactRings:
         return len(self.rings)
 
     def exact_rings(self) -> ExactRings:
-        """Return self: `ImplicitRings`, used in the same places, has a method of this name that computes the vertices.
-        """
+        """Return self: `ImplicitRings`, used in the same places, has a method of this name that computes vertices."""
         return self
 
     def some(self, rings: Sequence[int]) -> ExactRings:

@@ -43,8 +43,7 @@ Fill = Callable[[FloatArray, Int8Array, Budget], "Counts"]
 
 
 class Counts(NamedTuple):
-    """Counts of a chunk of points. beyond: how many the filter left open; rational: how many were decided in rationals.
-    """
+    """Counts of a chunk of points. beyond: how many the filter left open; rational: how many rationals decided."""
 
     beyond: int
     rational: int

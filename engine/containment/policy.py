@@ -77,8 +77,7 @@ def choose_for_mesh(solid: Polyhedron, n_points: int) -> Choice:
 
 
 def _cells_amortize(solid: Polyhedron, seen: int) -> bool:
-    """Return whether locating `seen` points by the tree would have cost more than building cells, which are possible.
-    """
+    """Return whether cells are possible, and locating `seen` points by the tree would have cost more than them."""
     n_faces = len(solid.triangles)
     least = _CELLS + _CELLS_A_FACE * n_faces
     if seen * (IN_TREE + IN_TREE_A_FACE_OVER * n_faces) <= least or seen * cost_in_tree(solid) <= least:

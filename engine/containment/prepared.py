@@ -96,8 +96,7 @@ def _place(value: float, axis: Axis) -> float:
 def mark_cells(
     xs: FloatArray, ys: FloatArray, runs: Int32Array, u: Axis, v: Axis, statuses: Int8Array, flag: FlagArray
 ) -> None:
-    """Set to MIXED the status of every cell, of a grid with the axes u and v, that an edge of the runs may reach into.
-    """
+    """Set to MIXED the status of every cell of the grid over axes u, v that an edge of the runs may reach into."""
     for run in range(len(runs)):
         bu, bv = _place(xs[runs[run, 0]], u), _place(ys[runs[run, 0]], v)
         for edge in range(runs[run, 0], runs[run, 1]):

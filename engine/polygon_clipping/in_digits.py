@@ -110,8 +110,7 @@ def load_vertex(s: ExactScratch, v: int, n_ring: int, side: int) -> None:
 
 @inline
 def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
-    """Store the value of a plane at the vertex ``loaded[side]`` at heap index `place`; False if it has too many digits.
-    """
+    """Store the value of a plane at vertex ``loaded[side]`` at heap index `place`; False if it has too many digits."""
     n = s.loaded.shape[1]
     for k in range(n):
         s.terms[k, 0], s.terms[k, 1], s.terms[k, 2] = s.rows[plane, k], s.loaded[side, k], 1

@@ -292,8 +292,8 @@ def cut_ring(
 
 @merged
 def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
-    """Clip the ring of n runs by the planes in order; return the number of vertices left (or DOUBT), and its row in
-    `rings`."""
+    """Clip the ring of n runs by the n_cutting planes of s.cutting in order; return the number of vertices left (or
+    DOUBT), and its row in `rings`. Vertices below n_ring are original ones."""
     n_made, now, cutting = n_ring, 0, s.cutting
     for i_plane in range(n_cutting):
         plane = plane_of(planes, cutting.planes[i_plane])
@@ -319,8 +319,8 @@ def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_rin
 
 @merged
 def emit(s: Scratch, ring: Int32Array, n: int, n_ring: int, out: FloatArray, place: int) -> int:
-    """Write the vertices of n runs of a ring to the flat array `out` from index `place` on; return the index after
-    them."""
+    """Write the vertices of the n runs of a ring to the flat array `out` from index `place` on; return the index after
+    them. Vertices below n_ring are original ones, at which runs begin; others stand for themselves."""
     d = len(s.vertices.names)
     for i in range(n):
         v = ring[i]

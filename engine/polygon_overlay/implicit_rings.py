@@ -138,8 +138,7 @@ class ImplicitRings(NamedTuple):
 
 
 def as_implicit_rings(vertices: FloatArray, offsets: IntArray) -> ImplicitRings:
-    """Return rings of doubles (vertices (n, 2), offsets of rings) as `ImplicitRings` whose input they are themselves.
-    """
+    """Return rings of doubles (vertices (n, 2), offsets of rings) as `ImplicitRings` that are their own input."""
     own = RingArrays(read_only(vertices), read_only(offsets))
     n, few = len(vertices), _FEW_IDENTITY_SOURCES
     sources = few[:n] if n <= len(few) else _identity_sources(n)

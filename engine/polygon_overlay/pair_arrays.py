@@ -202,7 +202,7 @@ def polygon_arrays_of(polygons: Sequence[Polygon]) -> PolygonArrays:
 
 
 class PolygonSelection(Sequence[Polygon]):
-    """A sequence of polygons of flat arrays, by their numbers; indexing makes an object."""
+    """The polygons with some numbers among flat arrays, as a sequence; indexing makes a `Polygon`."""
 
     def __init__(self, arrays: PolygonArrays, numbers: IntArray) -> None:
         self._arrays, self._numbers = arrays, numbers

@@ -203,8 +203,7 @@ def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touch
 
 
 def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
-    """Return the edges of a ring, split at its vertices that lie on them (exact), each once, as sorted pairs of points.
-    """
+    """Return the edges of a ring, split at its vertices that lie on them (exact), once each, as sorted pairs."""
     places = np.array(sorted(set(ring)))
     edges: set[tuple[Place, Place]] = set()
     for start, end in zip(ring, ring[1:] + ring[:1]):
@@ -222,8 +221,7 @@ def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
 
 
 def _join_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
-    """Return the polylines that edges (pairs of points) form when they are joined at each point where exactly two meet.
-    """
+    """Return the polylines of edges (pairs of points) that are joined at each point where exactly two meet."""
     neighbours: dict[Place, list[Place]] = {}
     for start, end in edges:
         neighbours.setdefault(start, []).append(end)

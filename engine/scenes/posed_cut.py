@@ -45,8 +45,7 @@ def _row(m: FloatArray, i: int, v: Vector) -> Pair:
 
 @inline
 def _turned(m: FloatArray, v: Vector) -> tuple[Vector, float]:
-    """Return M v in double-doubles, for exact v, and an error bound of each coordinate. m (3, 7): the frame of a pose.
-    """
+    """Return M v in double-doubles, for exact v, and an error bound of each coordinate. m (3, 7): frame of a pose."""
     bound = _FRAME_BOUND * (abs(v[0][0]) + abs(v[1][0]) + abs(v[2][0]))
     return (_row(m, 0, v), _row(m, 1, v), _row(m, 2, v)), bound
 

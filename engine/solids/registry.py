@@ -51,8 +51,7 @@ class Field(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """What is known of one type of solid. Fields from `exact` on are functions; None: the operation refuses the type.
-    """
+    """What is known of one type of solid. Fields from `exact` on are functions; None: the operation refuses it."""
 
     solid: type[Solid]
     about: str

@@ -77,8 +77,7 @@ def frames_of(poses: Sequence[Pose | None], dimension: int) -> Frames:
 
 
 def _inverses(rotations: FloatArray) -> FloatArray:
-    """Return R^-1 = adj(R) / det(R) for matrices (n, 3, 3), rounded; exact where R only permutes the axes, up to sign.
-    """
+    """Return R^-1 = adj(R) / det(R) for matrices (n, 3, 3), rounded; exact where R permutes the axes, up to sign."""
     after = (1, 2, 0)
     adjugates = np.empty_like(rotations)
     for i in range(3):

@@ -74,8 +74,7 @@ def _locate_one(points: FloatArray, item: int, planes: FloatArray, is_exact: Boo
 
 @inline
 def _largest(values: FloatArray, folded: FloatArray) -> float:
-    """Return max |values| of a block (_BLOCK,), folded by halves so that the compiler vectorises it. folded: scratch.
-    """
+    """Return max |values| of a block (_BLOCK,), by halves so that the compiler vectorises it. folded: scratch."""
     half = _BLOCK // 2
     for k in range(half):
         folded[k] = max(abs(values[k]), abs(values[k + half]))

@@ -111,8 +111,7 @@ def leaving_edge(chains: Chains, half: int) -> int:
 
 @merged
 def _node(stars: Stars, n_nodes: int, point: int) -> tuple[int, int]:
-    """Return the node at a point, and the number of nodes then: a node is made, number n_nodes, if the point has none.
-    """
+    """Return the node at a point, made as number n_nodes if there is none, and the number of nodes then."""
     if stars.node_of[point] < 0:
         stars.node_of[point] = n_nodes
         stars.point[n_nodes], stars.starts[n_nodes], stars.ends[n_nodes] = point, NOT_YET, 0

@@ -175,8 +175,7 @@ def _weight_from_expansion(x: float, y: float, others: Ends) -> tuple[float, flo
 
 @inline
 def leading(e: Any, n: int) -> tuple[float, float]:
-    """Return the sum of an expansion e of n components, as a double-double (high, low) of its two leading components.
-    """
+    """Return the sum of an expansion e of n components as a double-double (high, low): its two leading ones."""
     n = compress(e, n)
     if n == 0:
         return 0.0, 0.0

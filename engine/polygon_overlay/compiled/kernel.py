@@ -91,8 +91,7 @@ class PairStatus(IntEnum):
 
 
 class _Span(NamedTuple):
-    """The numbers of the rings of a pair: first .. first_end - 1 of its subject, second .. second_end - 1 of its clip.
-    """
+    """The numbers of a pair's rings: first .. first_end - 1 of its subject, second .. second_end - 1 of its clip."""
 
     first: int
     first_end: int

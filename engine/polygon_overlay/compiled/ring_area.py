@@ -151,8 +151,7 @@ def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
 
 @inline
 def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _Place:
-    """Return the exact point of row k of ``sources``, an input vertex or a crossing of two edges, relative to (ox, oy).
-    """
+    """Return the exact point of row k of ``sources``, a vertex or a crossing of two edges, relative to (ox, oy)."""
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
     vertices, v, _ = _polygon_vertex(pair, sources[k, 0])

@@ -124,8 +124,7 @@ def scratch_for(n_vertices: int, n_rings: int, n_contacts: int, n_out: int, n_ou
 
 
 def scratch_for_few() -> Scratch:
-    """Return scratch for one pair of up to `FEW_VERTICES` vertices; the caller appends it to `small_pool` afterwards.
-    """
+    """Return scratch for one pair of up to `FEW_VERTICES` vertices; the caller appends it to `small_pool` later."""
     try:
         return small_pool.pop()
     except IndexError:  # as in scratch_for
@@ -139,8 +138,7 @@ def first_contacts(n_vertices: int) -> int:
 
 
 def more_contacts(n: int) -> int:
-    """Return the room for contacts to try after n did not suffice: 8 n, or 2 n where that much memory may be refused.
-    """
+    """Return the room for contacts to try after n did not suffice: 8 n, or 2 n where memory may be refused."""
     return 8 * n if n < _MANY_CONTACTS else 2 * n
 
 
