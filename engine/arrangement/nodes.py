@@ -108,7 +108,7 @@ class NodeTable:
         return (c > d) - (c < d)
 
     def exact(self, number: int) -> tuple[Fraction, Fraction]:
-        """Return the coordinates of a point as fractions."""
+        """Return the coordinates of point `number` as fractions."""
         x, y, w = self.points[number]
         return Fraction(x << self._up, w << self._down), Fraction(y << self._up, w << self._down)
 

@@ -95,7 +95,7 @@ def cycles_of(following: Sequence[int]) -> tuple[list[int], int]:
 
 
 def subdivide(arrangement: Arrangement) -> Subdivision:
-    """Return the faces of `arrangement`; cost: linear, plus a vertical ray per connected component of the edges."""
+    """Return the faces of `arrangement` (DCEL). Cost: linear, plus a vertical ray for each component of its edges."""
     around = half_edges_around(arrangement)
     cycle, n_cycles = cycles_of(next_half_edges(around, 2 * len(arrangement.tails)))
     # Cycle n_cycles stands for the boundary at infinity; joined to it, a cycle bounds the unbounded face.

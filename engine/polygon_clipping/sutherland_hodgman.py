@@ -28,7 +28,7 @@ from engine.types import BoolArray, FlagArray, FloatArray, IntArray
 
 @inline
 def room_for(ring_offsets: IntArray, first: int, last: int, n_planes: int) -> int:
-    """Return the number of vertices, dropped ones included, to which a ring of polygons first .. last - 1 may grow; a
+    """Return the number of vertices, dropped ones included, to which one of the rings first .. last - 1 may grow; a
     polygon that exceeds it is left open. A convex ring gains one vertex a plane."""
     largest = 0
     for ring in range(first, last):

@@ -69,8 +69,8 @@ class Grid(NamedTuple):
         return read_only(units)
 
     def to_coordinates(self, units: FloatArray) -> tuple[FloatArray, float]:
-        """Return the doubles nearest to whole multiples of the grid, and their largest magnitude. Raises
-        `NotRepresentableError` beyond the largest double."""
+        """Return the doubles nearest to the coordinates of integers `units`, multiples of the grid, and their largest
+        magnitude. Raises `NotRepresentableError` beyond the largest double."""
         places = np.empty_like(units)
         largest = entry_of(scale)(units, *self.back, 0.0, 0.0, places)
         if not largest < inf:

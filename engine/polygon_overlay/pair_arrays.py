@@ -55,7 +55,7 @@ def one_pair(
     sources: Int32Array | None = None, status: int = PairStatus.DONE,
 ) -> PairResults:  # fmt: skip
     """Return the result of one pair. displacement: the largest by rounding; n_exact: edge pairs decided exactly;
-    sources: None for zeros."""
+    sources: None for zeros; status: `PairStatus`."""
     counts = np.array([[len(piece_offsets) - 1, len(ring_offsets) - 1, len(vertices), n_exact]])
     sources = np.zeros((len(vertices), 2), np.int32) if sources is None else sources
     outcome = np.array([status], np.int8), counts, np.array([displacement])

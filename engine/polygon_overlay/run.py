@@ -89,7 +89,8 @@ def run_blocks(
     subjects: PolygonArrays, clips: PolygonArrays, largest: tuple[int, int], selected: FlagArray, budget: Budget,
     nesting: Nesting = UNNAMED, size: int = 0, max_active: float = _MOST,
 ) -> PairResults | None:  # fmt: skip
-    """Overlay polygons pair by pair. largest: the largest numbers of vertices and rings of a pair.
+    """Overlay polygons pair by pair. largest: the largest numbers of vertices and rings of a pair; selected: by label
+    the part.
 
     size: if not 0, there is one pair, reduced by blocks of so many edges; None is returned if a fraction ``max_active``
     or more of the edges is active, or the pair is not DONE: doubtful rounded rings are arranged with all their

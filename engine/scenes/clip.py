@@ -109,7 +109,7 @@ def clip_first(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> ScenePieces:
     """Return the first piece of each segment that meets a body; of pieces that begin in one point, that of the lowest
-    body. searched: the result of `_first_hits`, if computed already."""
+    body. counts: filled; searched: the result of `_first_hits`, if computed already."""
     state, out = searched or _first_hits(segments, scene, False, budget, workers)
     left, sure = np.flatnonzero(state == OPEN), ScenePieces(*out)
     if not len(left):
@@ -128,7 +128,8 @@ def clip_first(
 def meets_any(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None, searched: Any = None
 ) -> BoolArray:
-    """Return for each segment whether it meets a body. searched: the result of `_first_hits`, if computed already."""
+    """Return for each segment whether it meets a body. counts: filled; searched: the result of `_first_hits`, if
+    computed already."""
     state, _ = searched or _first_hits(segments, scene, True, budget, workers)
     meets: BoolArray = state == MET
     left = np.flatnonzero(state == OPEN)

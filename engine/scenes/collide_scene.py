@@ -177,7 +177,7 @@ class PairQuery(NamedTuple):
 def collide_bodies(
     batches: SceneBatches, query: PairQuery, budget: Budget, workers: int | None, progress: Progress | None
 ) -> tuple[ScenePairs, Accuracy]:
-    """Return the colliding pairs of a prepared scene, and the accuracy report."""
+    """Return the pairs of a prepared scene that collide, or are nearer than ``query.gap``, and the accuracy report."""
     bodies, (skip, only, gap, witnesses, boolean, detail) = batches.bodies, query
     boolean, detail = bool(boolean), bool(detail)  # what is not a bool would compile kernels of its own
     if detail:

@@ -226,7 +226,8 @@ def crossings_in(
 
 @inline
 def _is_near_box(numbers: FloatArray, p: Point3, blur: float) -> bool:
-    """Return whether point p, each coordinate known to +- `blur`, may lie in the box of a mesh."""
+    """Return whether point p, each coordinate known to +- `blur`, may lie in the box of a mesh. numbers: its MESH_WORDS
+    as float64."""
     low, high = PLACES + 5, PLACES + 8
     is_out = (p.x + blur < numbers[low]) | (p.x - blur > numbers[high])
     is_out |= (p.y + blur < numbers[low + 1]) | (p.y - blur > numbers[high + 1])

@@ -100,8 +100,8 @@ def cut_near(
 ) -> None:  # fmt: skip
     """Clip segments order[n[0]:last] to the bodies that they may meet; write pieces to `out`.
 
-    names (2, m): of each piece the body, and whether it is longer than a point. left: pairs (segment, body) that are
-    OPEN.
+    words: both rows of `words_of`. names (2, m): of each piece the body, and whether it is longer than a point. left:
+    pairs (segment, body) that are OPEN.
 
     | n | meaning |
     |---|---|
@@ -241,8 +241,8 @@ def find_first(
 ) -> None:  # fmt: skip
     """Compute the first piece of segments order[n[0]:last]; with `is_any` only whether there is one.
 
-    state: (n,) uint8, SETTLED, MET or OPEN. out: the pieces of those that are MET, unless `is_any`. room: of
-    `scratch_for`.
+    words: both rows of `words_of`. state: (n,) uint8, SETTLED, MET or OPEN. out: the pieces of those that are MET,
+    unless `is_any`. room: of `scratch_for`.
 
     | n | meaning |
     |---|---|

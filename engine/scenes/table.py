@@ -44,7 +44,8 @@ class Table:
         """The same, of one body."""
 
     def prepare(self, body: int, wanted: int) -> None:
-        """Fill the row of a body, or the location tree of its solid (WANTS_TREE). Caller holds the bodies' lock."""
+        """Fill the row of a body (wanted is WANTS_BODY), or the location tree of its solid (WANTS_TREE). Caller holds
+        the bodies' lock."""
         solid = self._solids[body]
         if wanted == WANTS_TREE:
             assert isinstance(solid, Polyhedron)

@@ -89,7 +89,7 @@ def point_of(segments: FloatArray, item: int, end: int, is_flat: bool) -> Triple
 
 @merged
 def put_end(pieces: Pieces, row: int, end: int, point: Triple, is_flat: bool) -> None:
-    """Write ``point`` as end 0 or 1 of the piece in a row, -0.0 replaced by 0.0."""
+    """Write ``point`` as end 0 or 1 of the piece in a row, -0.0 replaced by 0.0. is_flat: 2D."""
     pieces.ends[end, row, 0], pieces.ends[end, row, 1] = point[0] + 0.0, point[1] + 0.0
     if not is_flat:
         pieces.ends[end, row, 2] = point[2] + 0.0
@@ -97,7 +97,7 @@ def put_end(pieces: Pieces, row: int, end: int, point: Triple, is_flat: bool) ->
 
 @merged
 def put_own_end(pieces: Pieces, row: int, end: int, segments: FloatArray, item: int, is_flat: bool) -> None:
-    """Write end 0 or 1 of segment ``item`` as that end of the piece in a row: t 0 or 1, face -1."""
+    """Write end 0 or 1 of segment ``item`` as that end of the piece in a row: t 0 or 1, face -1. is_flat: 2D."""
     pieces.t[row, end], pieces.faces[row, end] = end, -1
     put_end(pieces, row, end, point_of(segments, item, end, is_flat), is_flat)
 

@@ -298,7 +298,7 @@ def as_vector(vector: object, dimension: int | None, where: Where) -> FloatArray
 
 
 def frozen(array: FloatArray) -> FloatArray:
-    """Return a read-only C-contiguous copy with -0.0 replaced by 0.0."""
+    """Return a read-only C-contiguous copy of an array, with -0.0 replaced by 0.0."""
     if len(array) <= _BLOCK:
         copy = np.add(array, 0.0, dtype=np.float64, order="C")  # -0.0 + 0.0 = +0.0
     else:

@@ -110,7 +110,8 @@ def _is_crossed_once(vertices: FloatArray, triangles: IntArray, o: Point3, side:
 
 @inline
 def _crossings(vertices: FloatArray, triangles: IntArray, o: Point3, q: Point3, side: int) -> int:
-    """Return how many triangles the half-line from o through q crosses; -1 if it may meet an edge."""
+    """Return how many triangles the half-line from o through q crosses; -1 if it may meet an edge. side: as in
+    `_is_crossed_once`."""
     n_crossed = 0
     for item in range(triangles.shape[0]):
         a, b, c = corners_of(vertices, triangles, item)

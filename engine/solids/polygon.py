@@ -80,8 +80,8 @@ class Polygon(Solid):
 
     @classmethod
     def of_arrays(cls, vertices: FloatArray, ring_offsets: IntArray) -> Polygon:
-        """Return a polygon of these arrays without a copy or checks. Caller guarantees that they are read-only, have no
-        -0.0 and no repeated last vertex."""
+        """Return a polygon of these arrays without a copy or checks. ring_offsets: of rings into vertices. Caller
+        guarantees that they are read-only, have no -0.0 and no repeated last vertex."""
         polygon = object.__new__(cls)
         polygon._set(dimension=2, vertices=vertices, ring_offsets=ring_offsets)
         return polygon

@@ -138,8 +138,8 @@ def has_not_finite(points: FloatArray) -> bool:
 
 @inline
 def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
-    """Return the sign of orient2d(a, b, x) where it is the same, 1 or -1, for all points x of the blurred q, else
-    UNDECIDED."""
+    """Return the sign (1, -1) of orient2d(a, b, x) where it is the same, 1 or -1, for all points x of the blurred q,
+    else UNDECIDED."""
     left = (a.x - q.x) * (b.y - q.y)
     right = (a.y - q.y) * (b.x - q.x)
     turn = left - right

@@ -192,7 +192,7 @@ def walk_rings(
 
     is_named: also record in ``flood`` the regions on the other side of each ring. marks: by edge, BENT if the ring
     certainly turns at the edge's first vertex, RUN if the edge replaces several. sizes: the numbers of chains, nodes,
-    vertices and simple nodes.
+    vertices and simple nodes. walk: scratch.
     """
     n_chains, n_nodes, _, _ = sizes
     state, path, place = faces.state, walk.path, walk.place
@@ -289,7 +289,8 @@ def walk_crossings(
 ) -> tuple[int, int]:  # fmt: skip
     """Trace the boundary rings of two simple rings that only cross properly (`has_only_proper_crossings`); return the
     numbers of rings and points, written to ``rings``. Crossing c has the events 2 c, on its first edge, and 2 c + 1, on
-    its second. place: scratch, one entry an event. ``events.turn`` is overwritten."""
+    its second. selected: by label 0 .. 3 whether it is in the result. marks: by edge its bits BENT and RUN. place:
+    scratch, one entry an event. ``events.turn`` is overwritten."""
     edges, ring = given.edges, given.edges.ring
     for k in range(2 * n_crossings):
         place[along.order[k]] = k

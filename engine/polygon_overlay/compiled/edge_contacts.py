@@ -308,8 +308,9 @@ def find_contacts(
 @merged
 def _add_crossing(events: Events, at: int, crossing: int, edge: int, other: int, ends: Turns, margin: float) -> None:
     """Write event number ``at``: a proper crossing on ``edge``, proven by floats. crossing: its point; other: the other
-    edge; ends: orientations A, B of the two ends of ``edge`` relative to ``other``. ``t = |A| / (|A| + |B|)``; with A
-    and B off by at most r, ``error <= r / (|A| + |B|) + 3 roundings``."""
+    edge; margin: added to the reach; ends: orientations A, B of the two ends of ``edge`` relative to ``other``. ``t =
+    |A| / (|A| + |B|)``; with A and B off by at most r, ``error <= r / (|A| + |B|) + 3 roundings``.
+    """
     total = abs(ends.first) + abs(ends.second)
     _add_event(events, at, edge, crossing, other, abs(ends.first) / total, ends.bound / total + 2.0**-50)
     events.reach[at] += margin * ends.length / total

@@ -136,8 +136,9 @@ def _load_pair(
     is_named: bool, stop: FlagArray,
 ) -> tuple[int, int, bool]:  # fmt: skip
     """Load both polygons of a pair into ``w.given``; return the numbers of vertices and rings, and whether no nonzero
-    coordinate is below SMALLEST. common: the intersection of their boxes, outside of which stretches are shortened
-    where the result has no part. is_named: the mask of a ring is its number, not the bit of its polygon."""
+    coordinate is below SMALLEST. span: their rings; common: the intersection of their boxes, outside of which stretches
+    are shortened where the result has no part. is_named: the mask of a ring is its number, not the bit of its polygon.
+    """
     first, second = subjects.offsets[span.first], clips.offsets[span.second]
     n_subject = subjects.offsets[span.first_end] - first
     n, n_rings, is_in_range = load_rings(
@@ -192,7 +193,8 @@ def _arrange_chains(
     w: Workspace, loaded: Loaded, selected: FlagArray, nesting: Nesting, contacts: Contacts, stop: FlagArray
 ) -> tuple[int, int]:
     """Trace the boundary rings of a noded pair into ``w.rings`` by chains and faces; return the number of rings, or
-    NO_ROOM, and of points. contacts: the result of noding. If ``stop`` is set, the result is invalid."""
+    NO_ROOM, and of points. contacts: the result of noding; selected: by label the part of the result. If ``stop`` is
+    set, the result is invalid."""
     n, n_rings, edges, n_crossings = loaded.n, loaded.n_rings, w.given.edges, contacts.n_crossings
     w.stars.node_of[: n + n_crossings] = -1
     n_nodes, n_chains, n_loose = build_chains(

@@ -127,7 +127,8 @@ def _place_of_doubles(x: float, y: float, ox: float, oy: float) -> _Place:
 
 @inline
 def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
-    """Return the crossing of edges e and f relative to (ox, oy); exact if one is vertical and one horizontal."""
+    """Return the crossing of edges e and f of a pair, relative to (ox, oy); exact if one is vertical and one
+    horizontal."""
     ends, others = _edge(pair, e), _edge(pair, f)
     (x, has_x), (y, has_y) = common_places(ends, others)
     if has_x and has_y:
@@ -151,7 +152,7 @@ def _crossing(pair: _Pair, e: int, f: int, ox: float, oy: float) -> _Place:
 
 @inline
 def _place(pair: _Pair, sources: Int32Array, k: int, ox: float, oy: float) -> _Place:
-    """Return the exact point of row k of ``sources``, a vertex or a crossing of two edges, relative to (ox, oy)."""
+    """Return the point of row k of ``sources``, a vertex or a crossing of two edges, relative to (ox, oy)."""
     if sources[k, 1] >= 0:
         return _crossing(pair, sources[k, 0], sources[k, 1], ox, oy)
     vertices, v, _ = _polygon_vertex(pair, sources[k, 0])

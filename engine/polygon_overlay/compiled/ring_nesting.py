@@ -245,8 +245,8 @@ def write_evidence(
     h: FloodFill, ring: int, region: int, is_hole: bool, name: int, base: int, evidence: IntArray, n: int
 ) -> int:  # fmt: skip
     """Append to ``evidence``, after its n rows, a row (``name``, ``base`` + source ring) for each source ring of one
-    ring of the result; return the number of rows then, or NO_ROOM. The sources of a shell are those of its region
-    ``region``, the sources of a hole those of the regions on its other side."""
+    ring of the result; return the number of rows then, or NO_ROOM. h: the finished flood fill. The sources of a shell
+    are those of its region ``region``, the sources of a hole those of the regions on its other side."""
     for at in range(h.offset[ring] if is_hole else 0, h.offset[ring + 1] if is_hole else 1):
         k = h.region[h.beyond[at] if is_hole else region]
         while k >= 0:  # bound: the entries of the region

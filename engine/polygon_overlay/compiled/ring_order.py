@@ -33,7 +33,7 @@ in canonical order; spare: scratch."""
 @inline
 def _is_before(rings: Rings, ranking: Ranking, rounded: Rounded, i: int, j: int) -> bool:
     """Return whether ring i precedes ring j in canonical order: by piece, the shell before holes, then
-    lexicographically vertex by vertex."""
+    lexicographically by the doubles of each vertex. rounded: these doubles."""
     x, y = rounded.x, rounded.y
     if ranking.piece[i] != ranking.piece[j]:
         return ranking.piece[i] < ranking.piece[j]
@@ -122,8 +122,8 @@ def rank_rings(
     boxes: FloatArray, stop: FlagArray,
 ) -> int:  # fmt: skip
     """Fill ``ranking``, with the rings in canonical order; return the number of pieces, or -1 if a region has not
-    exactly one proven shell or ``stop`` is set. is_valid: rounding is proven to preserve the topology of the rings.
-    piece_of, boxes: scratch by region, by ring."""
+    exactly one proven shell or ``stop`` is set. rounded: the doubles of their points; is_valid: rounding is proven to
+    preserve the topology of the rings. piece_of, boxes: scratch by region, by ring."""
     if not is_valid and not find_shells(rings, n_rings, rounded, ranking, piece_of, boxes):
         return -1
     n_pieces = 0

@@ -152,7 +152,8 @@ def snap(
     vertices: FloatArray, offsets: IntArray, pieces: IntArray, stop: FlagArray, addresses: IntArray, pixels: FloatArray,
     corners: Int32Array, starts: IntArray, passages: Int32Array,
 ) -> tuple[int, int, int, bool]:  # fmt: skip
-    """Snap valid rings, coordinates below 2^51, to integer points.
+    """Snap valid rings, coordinates below 2^51, to integer points. offsets, pieces: of rings and pieces; addresses: of
+    a `Scratch`.
 
     | filled | dtype, shape | meaning |
     | --- | --- | --- |

@@ -187,7 +187,8 @@ def buffers_for(n_vertices: int, n_rings: int, n_contacts: int) -> Buffers:
 
 
 def addresses_of(buffers: Buffers, output: Output) -> IntArray:
-    """Return sizes, then addresses of all arrays, int64; the arrays must outlive the result."""
+    """Return the sizes, then the addresses, of the arrays in buffers and output, int64 (read by `workspace_at`); the
+    arrays must outlive the result."""
     sizes = (
         buffers.vertex_floats.shape[1], buffers.ring_integers.shape[1], buffers.contact_floats.shape[1],
         len(buffers.boxes), len(buffers.tree), len(output.vertices), len(output.rings),

@@ -265,7 +265,7 @@ def emit(
 
 @inline
 def all_proper(kinds: FlagArray, first: int, last: int) -> bool:
-    """Return whether contacts first .. last - 1 are all proper crossings."""
+    """Return whether contacts first .. last - 1 are all proper crossings, by their kinds (`Kind` or code)."""
     are_proper = True
     for i in range(first, last):
         are_proper &= kinds[i] == Kind.PROPER

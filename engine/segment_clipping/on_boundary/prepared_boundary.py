@@ -110,7 +110,8 @@ def build_box_tree(low: FloatArray, high: FloatArray, offsets: IntArray) -> tupl
 
 
 def _order(low: FloatArray, high: FloatArray, offsets: IntArray) -> IntArray:
-    """Return the elements ring by ring, rings sorted by the Morton codes of their centres."""
+    """Return the elements ring by ring, rings sorted by the Morton codes of their centres. low, high (n, dim): boxes of
+    the elements."""
     if len(offsets) == 2:
         return np.arange(len(low))
     starts = offsets[:-1]
