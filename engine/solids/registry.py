@@ -134,8 +134,8 @@ def kind_of(solid: object) -> str:
 def refused(
     solid: object, what: str, takes: Callable[[Row], object], more: str = "", where: Where = ()
 ) -> UnsupportedSolidError:
-    """Return the error for a solid that an operation does not take: "<what> a <type>; give a <types whose rows it
-    takes><more>". where: the path of the argument."""
+    """Return the error for a solid that an operation does not take; what: the beginning of the sentence, before the
+    solid."""
     kind = kind_of(solid)
     article = "an" if kind[0] in "aeiou" else "a"
     return UnsupportedSolidError(f"{what} {article} {kind}; give a {names(takes)}{more}", where)
