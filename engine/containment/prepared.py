@@ -324,7 +324,7 @@ def cost_in_tree(solid: Polyhedron) -> float:
 
 
 def prism_rows(solid: Triangle) -> tuple[FloatArray, BoolArray]:
-    """Return the walls of the prism over a triangle as `rounded_rows`, made at first use."""
+    """Return the plane rows (3, 4) of the prism's walls, rounded, and by row whether it is exact; made at first use."""
     return solid.prepared("rounded_walls", lambda: rounded_rows(prism_walls(solid)))
 
 

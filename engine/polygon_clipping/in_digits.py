@@ -119,7 +119,7 @@ def value_at(s: ExactScratch, plane: int, side: int, place: int) -> bool:
 
 @inline
 def sign_of_vertex(s: ExactScratch, plane: Plane, v: int, n_ring: int) -> tuple[int, bool]:
-    """Return the exact sign of a plane's value at vertex v; and False if numbers are too long."""
+    """Return the exact sign of a plane's value at vertex v, and True; False if numbers have too many digits."""
     d, number, axis = s.points.shape[1], plane.number, plane.axis
     if axis >= 0:
         x = s.points[v, axis]
@@ -141,7 +141,7 @@ def sign_of_vertex(s: ExactScratch, plane: Plane, v: int, n_ring: int) -> tuple[
 
 @inline
 def are_same(s: ExactScratch, v: int, u: int, n_ring: int) -> tuple[bool, bool]:
-    """Return whether vertices v and u are one point, exactly; the second result is False if numbers are too long."""
+    """Return whether vertices v and u are one point, exactly; and True; False if numbers have too many digits."""
     d = s.points.shape[1]
     for k in range(d):
         if s.points[v, k] != s.points[u, k]:
@@ -272,8 +272,8 @@ def classify(s: ExactScratch, plane: Plane, ring: IntArray, n: int, n_ring: int)
 
 @inline
 def cut_ring(s: ExactScratch, plane: int, ring: IntArray, n: int, made: IntArray, n_ring: int) -> tuple[int, int]:
-    """Clip a ring of n vertices, whose signs are set, by a plane into `made`; return the number of its vertices (or
-    TOO_LONG), and of cuts."""
+    """Clip a ring of n vertices, whose signs are set, by plane number `plane`, and write the rest to `made`; return the
+    number of its vertices (or TOO_LONG), and of cuts."""
     n_left, n_cuts = 0, 0
     for i in range(n):
         following = i + 1 if i + 1 < n else 0

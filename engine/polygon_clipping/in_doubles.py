@@ -336,8 +336,9 @@ def clip_in_doubles(
     polygons: Polygons, planes: PlaneTables, first: int, last: int, stop: FlagArray, clipped: Clipped, written: int,
     s: Scratch,
 ) -> tuple[int, int, int, int]:  # fmt: skip
-    """Clip polygons from `first` on until doubles do not decide one, after `written` vertices of earlier ones. Returns
-    the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may cut that polygon."""
+    """Clip polygons first .. last - 1 until doubles do not decide one; write vertices after the `written` ones of
+    earlier polygons. Returns the polygon reached, the vertices written, DONE, DOUBT or NO_ROOM, and how many planes may
+    cut that polygon."""
     d, offsets = len(s.vertices.names), polygons.ring_offsets
     for polygon in range(first, last):
         if stop[0]:

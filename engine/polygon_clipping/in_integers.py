@@ -49,8 +49,8 @@ def merge_repeated(contour: list[Vertex]) -> list[Vertex]:
 
 
 def clip_contour(contour: list[Vertex], row: Row) -> tuple[list[Vertex], int, bool]:
-    """Return a contour clipped by one plane, the number of points in which it met the plane, and whether a vertex was
-    dropped."""
+    """Return a contour clipped by one plane, the number of its points on the plane (cuts included), and whether a
+    vertex was dropped."""
     values = [sum(a * x for a, x in zip(row, vertex)) for vertex in contour]
     if min(values) >= 0:
         return contour, values.count(0), False

@@ -157,8 +157,8 @@ def snap_vertices(vertices: FloatArray, offsets: IntArray, piece_offsets: IntArr
 
 def snapped_to_units(rings: PairResults, budget: Budget, known: _SnappedRings | None = None) -> PairResults:
     """Return the valid rings of one pair snapped to integer points: status DONE, or MAY_CROSS where they must be
-    arranged again. Displacement is 0.0 if no vertex moved, else half a cell's diagonal. A row of sources is (v, v), v
-    the vertex whose edge continues there. known: the result of `snap_vertices` for these rings, if computed."""
+    arranged again. If a vertex moved, displacement is half a cell's diagonal. A row of sources is (v, v), v the vertex
+    whose edge continues there. known: the result of `snap_vertices` for these rings, if computed."""
     vertices, offsets = rings.vertices, rings.ring_offsets
     on_grid = known or snap_vertices(read_only(vertices), read_only(offsets), read_only(rings.piece_offsets), budget)
     edges = np.arange(len(vertices)) if on_grid.edges is None else on_grid.edges.astype(np.int64)

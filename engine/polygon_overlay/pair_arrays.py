@@ -153,7 +153,7 @@ class PolygonArrays(NamedTuple):
         return starts[1:] - starts[:-1]
 
     def largest_counts(self) -> tuple[int, int]:
-        """Return the largest number of vertices of one polygon, and the largest number of rings."""
+        """Return the largest number of vertices of one polygon, and the largest number of rings of one."""
         largest: tuple[int, int] = entry_of(largest_counts)(self.ring_offsets, self.polygon_offsets)
         return largest
 

@@ -181,9 +181,9 @@ class ValidPairs(NamedTuple):
 
 
 def make_pairs_valid(first: PairResults, rearrange: Arranger, budget: Budget) -> ValidPairs:
-    """Arrange the MAY_CROSS pairs of ``first`` until they are valid, all in one call of ``rearrange`` a round. Pairs
-    that become OPEN, or are not valid after the last round, are omitted. Only rings are returned: lost and joined parts
-    are computed for single pairs, on request. Raises as `Budget.check`."""
+    """Arrange the rounded rings of the MAY_CROSS pairs of ``first`` until they are valid, all in one call of
+    ``rearrange`` a round. Pairs that become OPEN, or are not valid after the last round, are omitted. Only rings are
+    returned: lost and joined parts are computed for single pairs, on request. Raises as `Budget.check`."""
     pairs = np.flatnonzero(first.status == PairStatus.MAY_CROSS)
     rings = take_pairs(first, pairs)
     displacement = rings.displacement

@@ -56,7 +56,7 @@ class Counts:
 def clip_all(
     segments: FloatArray, scene: Placements, counts: Counts, budget: Budget, workers: int | None
 ) -> ScenePieces:
-    """Return all pieces of segments (n, 2, dim) within the bodies of a scene, sorted."""
+    """Return all pieces of segments (n, 2, dim) within the bodies of a scene, sorted. counts: filled."""
     parts = _parts(segments, scene, counts, budget, workers)
     pieces = merge_parts(parts, segments.shape[2], budget, workers)
     return sort_pieces(pieces, len(segments), lambda: _exact_ends(segments, scene, budget), budget, workers)

@@ -155,7 +155,7 @@ class Tables:
         return vectors
 
     def _rings(self, indices: list[int]) -> tuple[Any, ...]:
-        """Return the arrays polygon_offsets, rings, xs, ys of the polygons with the given indices."""
+        """Return the arrays polygon_offsets, rings, xs, ys (`LocateTables`) of the polygons with the given indices."""
         solids = self._chosen(indices, BodyKind.RINGS)
         offsets = [solid.ring_offsets for solid in solids]
         polygon_offsets = summed([len(each) - 1 for each in offsets])
@@ -168,7 +168,7 @@ class Tables:
         return polygon_offsets, rings, xs, ys
 
     def _rows(self, indices: list[int]) -> tuple[Any, ...]:
-        """Return the arrays row_offsets, rows of the half-spaces and convexes with the given indices."""
+        """Return the arrays row_offsets, rows (`LocateTables`) of the half-spaces and convexes with given indices."""
         planes = [rows_of(solid) for solid in self._chosen(indices, BodyKind.ROWS)]
         rows = np.concatenate([np.zeros((0, self.dimension + 1)), *planes])
         return summed([len(each) for each in planes]), rows_in_space(rows)
@@ -216,8 +216,8 @@ def concatenated(first: LocateTables, then: LocateTables) -> LocateTables:
 
 
 def moved_boxes(lows: FloatArray, highs: FloatArray, frames: Frames, rows: Int32Array) -> tuple[FloatArray, FloatArray]:
-    """Return low and high of boxes around posed finite boxes (n, 2 or 3), rounded outward; rows: pose of each, -1 for
-    none."""
+    """Return low and high of boxes around posed finite boxes (n, 2 or 3), rounded outward; rows: of the pose of each in
+    frames, -1 for none."""
     low, high, n = np.empty_like(lows), np.empty_like(highs), len(rows)
     boxes, moves = np.stack([lows, highs], axis=1), (frames.rotations, frames.translations)
     with np.errstate(all="ignore"):

@@ -290,7 +290,8 @@ def _of_box(
 
 @kernel
 def put_keys(segments: Any, t: float, bodies: Any, keys: Any) -> None:
-    """Set keys (n,) to Morton codes, 32 cells an axis, of points at parameter t of segments (G. M. Morton, 1966)."""
+    """Set keys (n,) to Morton codes, 32 cells an axis, of points at parameter t of segments, in coordinates of a
+    `BodyTree` (G. M. Morton, 1966)."""
     origin, inverse = bodies.tree.origin, bodies.inverse
     for item in range(segments.shape[0]):
         key = 0

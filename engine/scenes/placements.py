@@ -260,8 +260,9 @@ def list_pairs(
 
 @inline
 def _outward(value: float, reach: float, side: int) -> float:
-    """Return a bound of a box moved outward (side 0: down, 1: up) by `reach`, stretched as by a pose. R'R = I + E with
-    |E_ij| <= 1e-12: |R v|^2 <= (1 + 3e-12) |v|^2, so |R v| < 1.001 |v|; `nextafter` covers the rounding.
+    """Return `value`, a coordinate of the low (side 0) or high (side 1) corner of a box, moved outward by `reach`,
+    stretched as a pose may stretch it. R'R = I + E with |E_ij| <= 1e-12: |R v|^2 <= (1 + 3e-12) |v|^2, so |R v| < 1.001
+    |v|; `nextafter` covers the rounding.
     """
     far = 1.001 * reach
     return np.nextafter(value - far, -np.inf) if side == 0 else np.nextafter(value + far, np.inf)

@@ -51,7 +51,8 @@ _Lines = namedtuple("_Lines", "addresses sizes places")
 
 @inline
 def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
-    """Return the mesh encoded in MESH_WORDS numbers; lines and numbers are one array, as int64 and as float64."""
+    """Return the mesh encoded in MESH_WORDS numbers (`_words_of`); lines and numbers are one array, as int64 and as
+    float64."""
     return PlacedMesh(
         array_at(lines[0], (lines[5], 3, 3), np.float64),
         array_at(lines[1], (lines[5],), np.int64),

@@ -81,7 +81,8 @@ def _cut_on(
 
 @inline
 def _emit_points(cuts: Crossings, n: int, source: int, out: Pieces, row: int) -> int:
-    """Write each of the n crossings with a surface as a one-point piece, second face -2 - face; return their number."""
+    """Write each of the n crossings with a surface to `out` from row `row` on, as a one-point piece of segment `source`
+    with second face -2 - face; return n."""
     for place in range(n):
         i = cuts.order[place]
         out.source[row + place] = source

@@ -195,7 +195,8 @@ def between_roots(d: Vector, f: Vector, blur: float, radius: float, of_p: int, o
 
 @inline
 def _ball_of(segments: FloatArray, item: int, center: FloatArray) -> tuple[Vector, Vector]:
-    """Return d = q - p and f = p - c of segment ``item``, z being 0 in 2D."""
+    """Return d = q - p and f = p - c of segment ``item``, p q, and a ball's centre c, by coordinate exact pairs, z
+    being 0 in 2D."""
     is_flat = segments.shape[2] == 2
     p, c = point_of(segments, item, 0, is_flat), (center[0], center[1], 0.0 if is_flat else center[2])
     return difference(p, point_of(segments, item, 1, is_flat)), difference(c, p)

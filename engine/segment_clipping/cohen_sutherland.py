@@ -162,7 +162,7 @@ def decide_in_double_doubles(p: Triple, q: Triple, low: Triple, high: Triple) ->
 
 @merged
 def corners_of(low: FloatArray, high: FloatArray) -> tuple[Triple, Triple]:
-    """Return the low and the high corner of a box as triples; a 2D box has z from -1 to 1."""
+    """Return the low and the high corner of a box as triples; a 2D box (points have z = 0) has z from -1 to 1."""
     is_flat = low.size == 2
     return (low[0], low[1], (-1.0 if is_flat else low[2])), (high[0], high[1], (1.0 if is_flat else high[2]))
 

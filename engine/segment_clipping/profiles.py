@@ -149,7 +149,8 @@ def located(p: Point, solid: Solid, pose: Pose | None, budget: Budget) -> int:
 def profile_of(
     p: list[float], q: list[float], solid: Solid, pose: Pose | None, budget: Budget, locations: Any = None
 ) -> list[Node]:
-    """Return the profile of segment p q (p and q differ) in a posed solid: its nodes from t = 0 to t = 1."""
+    """Return the profile of segment p q (p and q differ) in a posed solid: its nodes from t = 0 to t = 1. locations:
+    (-1, 0, 1) of p and q, None if unknown."""
     start, end = (p, q) if pose is None else (to_body_frame(p, pose), to_body_frame(q, pose))
     line = Line(p, q, start, end, pose, budget, locations)
 

@@ -69,7 +69,7 @@ def _find_equal_rows(bits: Any, first: IntArray, flag: FlagArray) -> int:
 
 @allocating
 def _find_repeat(offsets: IntArray, indices: IntArray, n_vertices: int, flag: FlagArray) -> int:
-    """Return the first face that has a vertex twice, or -1."""
+    """Return the first face that has a vertex twice, or -1. offsets, indices: the faces."""
     last_face = np.full(n_vertices, -1, np.int64)
     for face in range(offsets.shape[0] - 1):
         if face & _POLL == 0 and flag[0] != 0:
@@ -90,9 +90,9 @@ def _following(offsets: IntArray, face: int, corner: int) -> int:
 
 @called
 def _group_edges(offsets: IntArray, indices: IntArray, starts: IntArray, ends: IntArray, flag: FlagArray) -> None:
-    """Group the edges of all faces by their lower vertex v: ends[starts[v] : starts[v + 1]]. ends: h, the higher
-    vertex, for an edge directed from v to h; ~h for one directed from h to v. starts: zeros, (n_vertices + 2,). An edge
-    from a vertex to itself is skipped."""
+    """Group the edges of all faces (offsets, indices) by their lower vertex v: ends[starts[v] : starts[v + 1]]. ends:
+    h, the higher vertex, for an edge directed from v to h; ~h for one directed from h to v. starts: zeros, (n_vertices
+    + 2,). An edge from a vertex to itself is skipped."""
     for is_second in range(2):
         for face in range(offsets.shape[0] - 1):
             if face & _POLL == 0 and flag[0] != 0:
@@ -182,8 +182,9 @@ def check_topology(
     """Return the first face that has a vertex twice (-1: none), the number of distinct vertices, and the two counts of
     `_count_unbalanced` (0, 0 unless must_close).
 
-    bits: the vertices (n, 3), viewed as uint64. merged: filled with the first of all equal vertices at each corner, if
-    two are equal. named: filled by `_name_unbalanced` with edges of the first kind that occurs.
+    bits: the vertices (n, 3), viewed as uint64; offsets, indices: the faces. merged: filled with the first of all equal
+    vertices at each corner, if two are equal. named: filled by `_name_unbalanced` with edges of the first kind that
+    occurs.
     """
     n = bits.shape[0]
     repeated = _find_repeat(offsets, indices, n, flag)

@@ -138,8 +138,8 @@ def has_not_finite(points: FloatArray) -> bool:
 
 @inline
 def orient2d_blurred(a: Point2, b: Point2, q: Point2, blur: float) -> int:
-    """Return the sign (1, -1) of orient2d(a, b, x) where it is the same, 1 or -1, for all points x of the blurred q,
-    else UNDECIDED."""
+    """Return the sign (1, -1) of orient2d(a, b, x) where it is the same, 1 or -1, for all points x with coordinates
+    within blur / 2 of q's, else UNDECIDED."""
     left = (a.x - q.x) * (b.y - q.y)
     right = (a.y - q.y) * (b.x - q.x)
     turn = left - right
@@ -194,8 +194,8 @@ def in_space(points: FloatArray, item: int) -> Any:
 def locate_in_rows_blurred(
     points: FloatArray, blurs: FloatArray, rows: FloatArray, locations: Int8Array, flag: FlagArray
 ) -> int:
-    """Fill locations (n,) int8 of blurred points by plane rows (m, 4); return how many are UNDECIDED. rows: exact or
-    correctly rounded; in the plane the third coefficient is 0."""
+    """Fill locations (n,) int8 of blurred points in the half-spaces of plane rows (m, 4); blurs: (n,); return how many
+    are UNDECIDED. rows: exact or correctly rounded; in the plane the third coefficient is 0."""
     n_open = 0
     for item in range(len(points)):
         if flag[0]:

@@ -158,7 +158,8 @@ def meet_upwards(a: Point3, b: Point3, c: Point3, q: Point3) -> int:
 
 @inline
 def _meet_blurred(a: Point3, b: Point3, c: Point3, q: Point3, blur: float) -> int:
-    """Return CROSSED or MISSED if that holds for the upward rays from all points of the blurred q, else UNDECIDED."""
+    """Return CROSSED or MISSED if that holds for the upward rays from all points with coordinates within blur / 2 of
+    q's, else UNDECIDED."""
     if q.z - blur > max(a.z, b.z, c.z):
         return MISSED
     a2, b2, c2, q2 = Point2(a.x, a.y), Point2(b.x, b.y), Point2(c.x, c.y), Point2(q.x, q.y)

@@ -238,8 +238,8 @@ def walk_rings(
 def has_only_proper_crossings(
     given: Given, events: Events, contacts: Contacts, n_rings: int, selected: FlagArray
 ) -> bool:
-    """Return whether `walk_crossings` may trace the result: two simple rings of different polygons, all of whose
-    contacts are proper crossings proven by floats, and an odd number of the labels 1, 2, 3 is in ``selected``."""
+    """Return whether `walk_crossings` may trace the result: two simple rings of different polygons, whose contacts, one
+    or more, are all proper crossings proven by floats, and an odd number of the labels 1, 2, 3 is in ``selected``."""
     if (
         n_rings != 2
         or contacts.n_exact > 0

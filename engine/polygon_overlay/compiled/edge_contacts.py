@@ -227,7 +227,7 @@ class Turns(NamedTuple):
 
 @merged
 def turns(x: FloatArray, y: FloatArray, a: int, b: int, c: int, d: int) -> Turns:
-    """Return the orientations of vertices c and d relative to the segment ab, with their error bound."""
+    """Return the orientations of vertices c and d relative to the segment ab of vertices, with their error bound."""
     i, j, k, m = np.uint64(a), np.uint64(b), np.uint64(c), np.uint64(d)  # unsigned: no check for negative indices
     ux, uy = x[j] - x[i], y[j] - y[i]
     left, right = ux * (y[k] - y[i]), uy * (x[k] - x[i])

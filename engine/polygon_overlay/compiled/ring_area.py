@@ -86,8 +86,8 @@ def _polygon_vertex(pair: _Pair, v: int) -> tuple[Any, int, int]:
 
 @merged
 def _end_of(vertices: FloatArray, offsets: IntArray, v: int, last_rings: Any, side: int) -> int:
-    """Return the next vertex of v's ring whose position differs from that of v (v itself if there is none).
-    last_rings[side]: a guess of the ring that contains v, updated."""
+    """Return the next vertex of v's ring whose position differs from that of v (v itself if there is none). offsets: of
+    rings; last_rings[side]: a guess of the ring that contains v, updated."""
     low, n = int(last_rings[side]), offsets.shape[0] - 1
     if not offsets[low] <= v < offsets[low + 1]:
         low = (v - offsets[0]) * n // (offsets[n] - offsets[0])  # where all rings are of one size

@@ -187,7 +187,7 @@ class Filled(NamedTuple):
 
 @merged
 def has_room(output: Output, filled: Filled, n_vertices: int, n_rings: int) -> bool:
-    """Return whether n_vertices more vertices and n_rings more rings fit the output."""
+    """Return whether n_vertices more vertices and n_rings more rings fit the output, of which ``filled`` is taken."""
     return (filled.n_vertices + n_vertices <= output.vertices.shape[0]) & (
         filled.n_rings + n_rings < output.rings.shape[0]
     )
