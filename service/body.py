@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import mmap
+import re
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -38,10 +39,55 @@ _WINDOW: Final = 2**23
 """Largest window of a zstd body: the one that decoders should support (RFC 8878, 3.1.1.1.2)."""
 
 
+FILES: Final = {
+    "model/stl": "stl",
+    "model/obj": "obj",
+    "model/off": "off",
+    "model/ply": "ply",
+    "model/gltf-binary": "glb",
+}
+"""Formats of mesh files by media type."""
+MULTIPART: Final = "multipart/form-data"
+_BOUNDARY: Final = re.compile(r"""boundary=(?:"([^"]{1,70})"|([^\s;"]{1,70}))""", re.IGNORECASE)
+_FIELD: Final = re.compile(rb"""[;\s](name|filename)=(?:"([^"]*)"|([^\s;"]+))""", re.IGNORECASE)
+_MOST_PARTS: Final = 16
+
+
+def media_type_of(headers: dict[bytes, bytes]) -> str:
+    """Return the media type of a body without its parameters."""
+    return headers.get(b"content-type", b"").decode("latin-1").partition(";")[0].strip().lower()
+
+
+def fields_of(form: Body, content_type: str) -> dict[str, tuple[str, bytes]]:
+    """Return the fields of a form (multipart/form-data, RFC 7578) by name: the name of its file, if any, and its bytes.
+
+    Raises: `bad_request` for what is no form.
+    """
+    found = _BOUNDARY.search(content_type)
+    mark = b"" if found is None else b"--" + (found[1] or found[2]).encode("latin-1")
+    at = form.find(mark) if mark else -1
+    fields: dict[str, tuple[str, bytes]] = {}
+    while at >= 0 and len(fields) < _MOST_PARTS:  # bound: each turn goes on to the next mark
+        start = at + len(mark)
+        if bytes(form[start : start + 2]) == b"--":
+            return fields
+        end, head = form.find(b"\r\n" + mark, start), form.find(b"\r\n\r\n", start)
+        if not 0 <= head <= end:
+            break
+        named = {each[1].lower(): each[2] or each[3] or b"" for each in _FIELD.finditer(bytes(form[start:head]))}
+        name = named.get(b"name", b"").decode("utf-8", "replace")
+        if name in fields:
+            break
+        fields[name] = named.get(b"filename", b"").decode("utf-8", "replace"), bytes(form[head + 4 : end])
+        at = end + 2
+    detail = "the body is no form: a part, or its end, is missing or there twice; curl -F file=@NAME makes one"
+    raise ServiceError("bad_request", detail)
+
+
 def check_media_type(headers: dict[bytes, bytes], expected: str) -> None:
     """Raise unless the body has the media type of the route; octets need none, since they can be nothing else."""
     given = headers.get(b"content-type", b"").decode("latin-1")
-    kind = given.partition(";")[0].strip().lower()
+    kind = media_type_of(headers)
     is_json = expected == JSON and kind.startswith("application/") and kind.endswith("+json")
     if kind != expected and not is_json and (given or expected == JSON):
         got = f"got {given[:100]!r}" if given else "got none"

@@ -80,8 +80,8 @@ _MOST_PROBLEM: Final = 1000
 _MOST_PART: Final = 100
 """Characters of a sentence, and of a field's name in a pointer."""
 _CALLED_HERE: Final = {
-    "Polygon": "GeoJSON's Polygon is polygon here, with its coordinates as `rings`",
-    "MultiPolygon": "GeoJSON's MultiPolygon is one polygon here, with all its rings as `rings`",
+    "LineString": "a line is no solid; /v1/clip/lines takes it as lines, /v1/clip/segments as segments",
+    "Point": "a point is no solid; /v1/contains takes it as points",
     "xor": "here it is symmetric_difference",
     "and": "here it is intersection",
     "or": "here it is union",

@@ -36,10 +36,10 @@ def context() -> Any:
     return started
 
 
-def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
+def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -> Any:
     """Return the result of `engine.read_mesh`; `invalid_mesh` if the file cannot be read, in time or at all."""
-    if find_spec("trimesh") is None:
-        raise ServiceError("not_installed", "this service reads no mesh files; send vertices and faces as JSON")
+    if kind in ("glb", "ply") and find_spec("trimesh") is None:
+        raise ServiceError("not_installed", f"this service reads no {kind} files; send .stl, .obj or .off")
     around = context()
     mine, theirs = around.Pipe(duplex=False)
     room = _ROOM + _FOOTPRINT * len(octets)
@@ -53,7 +53,9 @@ def read(octets: bytes | bytearray | memoryview, kind: str, call: Call) -> Any:
         try:
             received = mine.recv()
         except EOFError:
-            raise ServiceError("invalid_mesh", f"the reader of {kind} files ended without an answer") from None
+            raise ServiceError(
+                "invalid_mesh", f"the reader of {kind or 'mesh'} files ended without an answer"
+            ) from None
     finally:
         starting.add_done_callback(lambda _: _end(child, mine, theirs))
     if isinstance(received, str):
@@ -71,7 +73,7 @@ def _end(child: Any, *pipe: Connection) -> None:
         child.join()
 
 
-def _child(answer: Connection, octets: bytes, kind: str, room: int, seconds: float) -> None:
+def _child(answer: Connection, octets: bytes, kind: str | None, room: int, seconds: float) -> None:
     """Send the content of a file, or a sentence that says why it cannot be read."""
     _limit(room, seconds)
     try:

@@ -77,6 +77,8 @@ def completed(made: dict[str, Any], settings: Settings) -> dict[str, Any]:
         schemas["Solid"]["type"] = "object"  # said by each member too; some programs look at the root alone
     made["components"]["schemas"] = dict(sorted(schemas.items()))
     done: dict[str, Any] = _finished(made, settings)
+    for name, schema in done["components"]["schemas"].items():
+        schema["title"] = name  # by which viewers tell the members of a union apart
     _illustrate(done)
     return done
 

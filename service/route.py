@@ -92,6 +92,8 @@ class GeometryRoute(APIRoute):
         }
 
         guard = _guard_of(self)
+        upload: Any = getattr(endpoint, "upload", None)
+        """What takes files of meshes in place of JSON."""
 
         async def handle(request: Request) -> Response:
             given = [] if guard is None else (await guard(request)).raw_headers
@@ -119,7 +121,12 @@ class GeometryRoute(APIRoute):
                 arguments = {**request.path_params, **_parse_query_params(request, query)}
                 job = _Job(endpoint, adapter, arguments, call, media_type is not None)
                 if media_type is not None:
-                    body.check_media_type(headers, media_type)
+                    kind = body.media_type_of(headers) if upload is not None else ""
+                    if kind in body.FILES or kind == body.MULTIPART:
+                        job.endpoint, job.adapter = upload, None
+                        arguments["content_type"] = headers[b"content-type"].decode("latin-1")
+                    else:
+                        body.check_media_type(headers, media_type)
                     job.coding = body.coding_of(headers)
                     declared = body.declared_length(headers, call.settings.max_body_bytes)
                     is_small = 0 < declared <= call.settings.inline_bytes
@@ -128,7 +135,7 @@ class GeometryRoute(APIRoute):
                     job.body = await body.read(_receive_of(request), declared, call)
                     call.start_clock()
                     state.metrics.bytes_in.inc(len(job.body))
-                if is_small and state.warm.is_set() and adapter is not None and job.coding is None:
+                if is_small and state.warm.is_set() and job.adapter is not None and job.coding is None:
                     job.decode()
                     call.is_light = is_light(job.question)
                 if call.is_light:

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Sized
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Final, TypeVar
 
 from fastapi import Depends
@@ -63,6 +64,13 @@ class _Phase:
         self._seconds[self._name] += time.perf_counter() - self._before
 
 
+@dataclass(frozen=True, slots=True)
+class Noted(Accuracy):
+    """A report with what was left out of the question."""
+
+    notes: list[str]
+
+
 class Call(Cancel):
     """One running request: its limits, the store, its deadline, the time of each phase, and its memory.
 
@@ -71,7 +79,7 @@ class Call(Cancel):
 
     __slots__ = (
         "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead",
-        "is_light", "may_wait", "media_type", "path", "seconds", "settings", "status", "store",
+        "is_light", "may_wait", "media_type", "notes", "path", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
@@ -91,6 +99,8 @@ class Call(Cancel):
         self.start_clock()
         self.seconds = dict.fromkeys(PHASES, 0.0)
         self.path = ""  # where the request asks
+        self.notes: list[str] = []
+        """What the report says of parts of the question that were left out."""
         self.status: int | None = None
         self.headers: dict[str, str] = {}
 
@@ -101,6 +111,11 @@ class Call(Cancel):
     def phase(self, name: str) -> _Phase:
         """Count the time spent inside under `name`."""
         return _Phase(self.seconds, name)
+
+    def note(self, text: str) -> None:
+        """Have the report of the answer say a sentence, once."""
+        if text not in self.notes:
+            self.notes.append(text)
 
     def take(self, n_bytes: int) -> None:
         """Account for n_bytes more (fewer if negative): of the body, of its values, of the answer.
@@ -224,7 +239,7 @@ class Call(Cancel):
                 if rewrite_error is not None:
                     rewrite_error(error)
                 raise
-        return result, accuracy
+        return result, accuracy if not self.notes else Noted(**asdict(accuracy), notes=self.notes)
 
     def timing(self) -> str:
         """Return the value of the header Server-Timing, in milliseconds."""

@@ -27,7 +27,7 @@ from engine.layers.json_text import NotJsonError, Path, key_of, text_of
 from engine.layers.rows import NONE, Layer, Limits, layer_of
 from engine.polygon_overlay.overlay import union_all
 from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
-from engine.running.budget import polled
+from engine.running.budget import UNLIMITED, Budget, polled
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
@@ -348,11 +348,18 @@ def polygon_of(geometry: Any) -> Polygon:
     >>> layers.polygon_of({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1], [0, 0]]]})
     Polygon(1 rings, 3 vertices)
     """
-    feature, limits = {"type": "Feature", "geometry": geometry}, Limits(None, None)
+    return _polygon_of(geometry, UNLIMITED)
+
+
+def _polygon_of(geometry: Any, budget: Budget) -> Polygon:
+    """Do the work of `polygon_of` within a budget."""
+    feature, limits = {"type": "Feature", "geometry": geometry}, Limits(budget.left(), budget.cancel)
     side = collection_of({"type": "FeatureCollection", "features": [feature]}, ("geometry",), limits)
     parts, offsets, _ = _parts_of(side, limits)
     polygons = [parts.polygon(k) for k in range(int(offsets[-1]))]
-    return polygons[0] if len(polygons) == 1 else Polygon(union_all(polygons).rings)
+    if len(polygons) == 1:
+        return polygons[0]
+    return Polygon(union_all(polygons, deadline=budget.left(), cancel=budget.cancel).rings)
 
 
-Polygon.geojson = polygon_of, lambda polygon: union_all([polygon]).__geo_interface__
+Polygon.geojson = _polygon_of, lambda polygon: union_all([polygon]).__geo_interface__

@@ -6,7 +6,8 @@ import heapq
 import os
 import threading
 import time
-from collections.abc import Iterable, Iterator
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -56,6 +57,16 @@ class Cancel:
         """
         with self._lock:
             self._flags = [other for other in self._flags if other is not flag]
+
+    def note(self, text: str) -> None:
+        """Take a remark on an argument that was read; a subclass that reports them overrides this. Others warn.
+
+        Parameters
+        ----------
+        text : str
+            What was left out, a sentence.
+        """
+        warnings.warn(text, stacklevel=2)
 
     def take(self, n_bytes: int) -> None:
         """Note that an answer is about to allocate memory; a subclass that bounds it overrides this, and raises.
@@ -151,6 +162,17 @@ def poll() -> None:
         budget = budget.around
 
 
+def note(text: str) -> None:
+    """Pass a remark on an argument to the switch of the call under which this thread works; without one, warn."""
+    budget: Budget | None = getattr(_here, "budget", None)
+    while budget is not None and budget.cancel is None:
+        budget = budget.around
+    (_WARNING if budget is None or budget.cancel is None else budget.cancel).note(text)
+
+
+_WARNING: Final = Cancel()
+
+
 def polled(items: Iterable[Item]) -> Iterator[Item]:
     """Yield items and poll every thousand: for loops of about a microsecond a turn.
 
@@ -181,36 +203,36 @@ class Budget:
         longest = threading.TIMEOUT_MAX  # of the timer, some centuries: more than that is no limit
         self.deadline = None if deadline is None or deadline > longest else float(max(deadline, -longest))
         self.flag: FlagArray = np.zeros(1, np.uint8)
-        self._cancel = cancel
+        self.cancel = cancel
         self._end = None if self.deadline is None else time.monotonic() + self.deadline
         self._waiting: _Waiting | None = None
         self.around: Budget | None = None
 
     def __enter__(self) -> Budget:
-        if self._cancel is None and self._end is None:  # nothing to poll for
+        if self.cancel is None and self._end is None:  # nothing to poll for
             return self
         self.around, _here.budget = getattr(_here, "budget", None), self
-        if self._cancel is not None:
-            self._cancel.attach(self.flag)
+        if self.cancel is not None:
+            self.cancel.attach(self.flag)
         if self._end is not None:
             self._waiting = _clock.add(self._end, self.flag)
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._cancel is None and self._end is None:
+        if self.cancel is None and self._end is None:
             return
         _here.budget = self.around
         if self._waiting is not None:
             _clock.drop(self._waiting)
-        if self._cancel is not None:
-            self._cancel.detach(self.flag)
+        if self.cancel is not None:
+            self.cancel.detach(self.flag)
 
     def check(self) -> None:
         """Raise `CancelledError` or `DeadlineExceededError` if the call must end; cheap enough for inner loops.
 
         A set `flag` suffices: a kernel may have seen it and left its results incomplete.
         """
-        if self._cancel is not None and self._cancel.is_set:
+        if self.cancel is not None and self.cancel.is_set:
             raise CancelledError("the call was cancelled by its caller")
         if self._end is not None and (self.flag[0] or time.monotonic() >= self._end):
             raise DeadlineExceededError(
@@ -220,10 +242,14 @@ class Budget:
         if self.flag[0]:
             raise CancelledError("another part of the call failed")
 
+    def left(self) -> float | None:
+        """Return the seconds until the deadline, None without one."""
+        return None if self._end is None else self._end - time.monotonic()
+
     def take(self, n_bytes: int) -> None:
         """Announce by how many bytes an answer is about to grow, if the arguments do not bound its size."""
-        if self._cancel is not None:
-            self._cancel.take(n_bytes)
+        if self.cancel is not None:
+            self.cancel.take(n_bytes)
 
 
 UNLIMITED: Final = Budget()

@@ -20,7 +20,8 @@ from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.on_boundary.contacts import are_same
 from engine.segment_clipping.pieces import Pieces
 from engine.solids.base import Solid
-from engine.solids.geometries import lines_in
+from engine.solids.checks import as_points
+from engine.solids.geometries import lines_in, note_altitude
 from engine.solids.ragged import Ragged, as_lines
 from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
@@ -154,6 +155,10 @@ def clip_lines(
         held = lines_in(lines)
     except EngineError as error:
         raise error.at("lines") from None
+    if held and region.dimension == 2 and isinstance(held[0], (list, tuple, np.ndarray)) and len(held[0]):
+        if len(held[0][0]) == 3:  # positions of other lengths beside it are refused below
+            note_altitude("lines")
+            held = [as_points(line, 3, ("lines", k))[:, :2] for k, line in enumerate(held)]
     vertices, offsets = as_lines(lines if held is None else held, region.dimension)
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, region.dimension))

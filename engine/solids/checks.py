@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from engine.errors import EmptyGeometryError, EngineError, InvalidArrayError, NotFiniteError, WrongDimensionError
 from engine.running.budget import poll, polled
-from engine.solids.geometries import positions_in
+from engine.solids.geometries import lines_in, note_altitude, positions_in
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 Where = tuple[str | int, ...]
@@ -263,13 +263,16 @@ def as_points(
     dimension: 2 or 3, or None for either (no points: 2). must_be_finite: as in `as_floats`. Raises: InvalidArrayError,
     WrongDimensionError, NotFiniteError.
     """
+    held = None
     if not isinstance(points, np.ndarray):
         try:
             held = positions_in(points)
         except EngineError as error:
             raise error.at(*where) from None
-        points = points if held is None else held
-    array = as_floats(points, 2, where, must_be_finite)
+    array = as_floats(points if held is None else held, 2, where, must_be_finite)
+    if held and dimension == 2 and array.shape[1] == 3:
+        note_altitude(where[0])
+        array = read_only(array[:, :2])
     if array.size == 0 and array.shape[0] == 0 and array.shape[1] in (0, dimension or 0):
         return array.reshape((0, dimension or 2))
     check_dimension(array.shape[1], dimension, where)
@@ -280,8 +283,24 @@ def as_point_groups(
     groups: object, size: int | None, dimension: int | None, where: Where, must_be_finite: bool = True
 ) -> FloatArray:
     """Return segments, triangles or quads as a finite float64 array ``(n, size, dimension)``; may be empty.
-    must_be_finite: as in `as_floats`."""
-    array = as_floats(groups, 3, where, must_be_finite)
+
+    must_be_finite: as in `as_floats`.
+    """
+    held = None
+    if size == 2 and not isinstance(groups, np.ndarray):
+        try:
+            held = lines_in(groups)
+        except EngineError as error:
+            raise error.at(*where) from None
+        for number, line in enumerate(held or ()):
+            if not isinstance(line, (list, tuple, np.ndarray)) or len(line) != 2:
+                raise InvalidArrayError(
+                    f"{spell((*where, number))} is no line of 2 positions; clip_lines takes longer ones", where
+                )
+    array = as_floats(groups if held is None else held, 3, where, must_be_finite)
+    if held and dimension == 2 and array.shape[2] == 3:
+        note_altitude(where[0])
+        array = read_only(array[:, :, :2])
     if array.shape[0] == 0 and array.size == 0 and (array.shape[2] == 0 or dimension in (None, array.shape[2])):
         return np.zeros((0, size or 0, dimension or array.shape[2] or 2), np.float64)
     check_dimension(array.shape[2], dimension, where)

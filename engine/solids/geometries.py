@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.errors import EngineError, InvalidArrayError, InvalidInputError
+from engine.running.budget import note, polled
 
 _PLAIN: Final = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon")
 MEMBERS: Final = {"GeometryCollection": "geometries", "Feature": "geometry", "FeatureCollection": "features"}
@@ -52,7 +53,7 @@ def geometries_in(value: Mapping[str, Any], where: Path = (), depth: int = _DEEP
         raise InvalidInputError(
             f"{member} of a {kind} must be GeoJSON, a list, got {type(inner).__name__}", (*where, member)
         )
-    for number, each in enumerate([inner] if kind == "Feature" else inner):
+    for number, each in enumerate(polled([inner] if kind == "Feature" else inner)):
         place = (*where, member) if kind == "Feature" else (*where, member, number)
         if each is None:
             yield place, None
@@ -72,6 +73,11 @@ def as_list(value: Any, where: Path) -> Any:
     if not isinstance(value, (list, tuple)) and not (isinstance(value, np.ndarray) and value.ndim):
         raise InvalidArrayError(f"coordinates must be nested lists of positions, got {type(value).__name__}", where)
     return value
+
+
+def note_altitude(name: str | int) -> None:
+    """Say that the third numbers of an argument's positions were left out."""
+    note(f"{name}: altitudes, the third numbers of GeoJSON's positions, are left out of a question of the plane")
 
 
 def positions_in(value: Any) -> list[Any] | None:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Final, cast
 import numpy as np
 
 from engine.errors import InvalidArrayError, RingTooShortError
+from engine.running.budget import Budget, Cancel
 from engine.solids.base import Solid, T
 from engine.solids.checks import as_nested_offsets, as_points, check_finite, check_not_empty, frozen, is_ready
 from engine.types import FloatArray, IntArray
@@ -23,9 +24,11 @@ class Polygon(Solid):
 
     Parameters
     ----------
-    rings : list of array_like of shape (n, 2), or object with `__geo_interface__`
-        A repeated last vertex is dropped. Rings may cross, touch, overlap and repeat themselves. An object, of shapely
-        for example, is a Polygon or a MultiPolygon, whose parts are united.
+    rings : list of array_like of shape (n, 2), GeoJSON as a dict, or object with `__geo_interface__`
+        A repeated last vertex is dropped. Rings may cross, touch, overlap and repeat themselves. Of GeoJSON (Polygon,
+        MultiPolygon, Feature, a collection of these; an object of shapely has it) all parts are united.
+    deadline, cancel
+        As for `Polyhedron`: to unite parts takes time.
 
     Raises
     ------
@@ -56,14 +59,19 @@ class Polygon(Solid):
     ring_offsets: IntArray
     """``(n_rings + 1,)``: ring i holds the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``."""
 
-    geojson: ClassVar[tuple[Callable[[Any], Polygon], Callable[[Polygon], dict[str, Any]]]]
-    """Functions that convert a geometry to a polygon and back; set by `engine.layers`, since they need overlays."""
+    geojson: ClassVar[tuple[Callable[..., Polygon], Callable[[Polygon], dict[str, Any]]]]
+    """How a geometry is read and written: `engine.layers` says it, by overlays."""
+    _from_geojson: ClassVar[Callable[[Any, Budget], Polygon | None]]
+    """How any GeoJSON is read, None for what is none: `engine.solids.shapes` says it."""
 
-    def __init__(self, rings: object) -> None:
-        if hasattr(rings, "__geo_interface__"):
-            read = Polygon.geojson[0](rings.__geo_interface__)
-            self._set(dimension=2, vertices=read.vertices, ring_offsets=read.ring_offsets)
-            return
+    def __init__(self, rings: object, *, deadline: float | None = None, cancel: Cancel | None = None) -> None:
+        if isinstance(rings, dict) or hasattr(rings, "__geo_interface__"):
+            with Budget(deadline, cancel) as budget:
+                budget.check()
+                read = Polygon._from_geojson(rings, budget)
+            if read is not None:
+                self._set(dimension=2, vertices=read.vertices, ring_offsets=read.ring_offsets)
+                return
         if isinstance(rings, np.ndarray) and rings.ndim == 3:
             rings = list(rings)
         if not isinstance(rings, (list, tuple)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, ClassVar, Final
@@ -22,6 +23,7 @@ from engine.solids.checks import (
     check_given_dimension,
     digits,
     frozen,
+    shown,
     spell,
 )
 from engine.types import BoolArray, FloatArray, read_only
@@ -32,6 +34,8 @@ TOLERANCE: Final = Fraction(1, 10**12)
 _TOLERANCE: Final = float(TOLERANCE)
 """`TOLERANCE` as a float, for the filter and as a default, since a Fraction would be slow."""
 MOST_TOLERANCE: Final = 0.1
+ROUNDED: Final = 1e-5
+"""Tolerance of entries with six digits: each is wrong by 5e-7, an entry of R^T R by 2 sqrt(3) times that at most."""
 
 _UNSURE: Final = 2.0**-45  # more than 8 roundings of sums of three products of numbers below 1.01
 
@@ -43,10 +47,12 @@ class Pose(Immutable):
     ----------
     rotation : array_like, shape (d, d)
         Row-major, d 2 or 3, with det > 0 and ``max|R^T R - I| <= tolerance``, both decided exactly.
-    translation : array_like, shape (d,)
-        Added after the rotation.
+    translation : array_like, shape (d,), optional
+        Added after the rotation; zero by default.
     tolerance : float, default 1e-12
         From 0 to 0.1: 1e-6 accepts matrices of float32 or of few digits.
+    rounded : bool, default False
+        The same with a tolerance of 1e-5: accepts a matrix printed with six digits, or of float32.
 
     Raises
     ------
@@ -74,7 +80,11 @@ class Pose(Immutable):
     numbers: bytes
     """The bytes of rotation and translation, in this order, for joining and comparing many poses."""
 
-    def __init__(self, rotation: object, translation: object, *, tolerance: float = 1e-12) -> None:
+    def __init__(
+        self, rotation: object, translation: object = None, *, tolerance: float = 1e-12, rounded: bool = False
+    ) -> None:
+        if rounded is not False:
+            tolerance = rounded_tolerance(rounded, tolerance)
         matrix = as_floats(rotation, 2, ("rotation",))
         check_dimension(matrix.shape[0], None, ("rotation",), "rows of")
         if matrix.shape[0] != matrix.shape[1]:
@@ -89,7 +99,8 @@ class Pose(Immutable):
         check_rotations(matrix[None], ("rotation",), one=True, limit=limit)
         if limit is not TOLERANCE and limit > TOLERANCE and _exact_defect(matrix) > TOLERANCE:
             matrix = _nearest_rotation(matrix)
-        self._set(frozen(matrix), as_vector(translation, len(matrix), ("translation",)))
+        move = np.zeros(len(matrix)) if translation is None else translation
+        self._set(frozen(matrix), as_vector(move, len(matrix), ("translation",)))
 
     def _set(self, rotation: FloatArray, translation: FloatArray) -> None:
         object.__setattr__(self, "rotation", rotation)
@@ -156,14 +167,73 @@ class Pose(Immutable):
         return cls([[entry / square for entry in row] for row in rows], translation)
 
     @classmethod
-    def from_matrix(cls, matrix: object, *, tolerance: float = 1e-12) -> Pose:
+    def from_axis_angle(cls, axis: object, angle: float, translation: object = (0.0, 0.0, 0.0)) -> Pose:
+        """Return the pose of a turn about an axis through the origin, and a translation; 3D.
+
+        Parameters
+        ----------
+        axis : array_like, shape (3,)
+            Of any length but 0.
+        angle : float
+            In radians, counter-clockwise seen from where the axis points.
+        translation : array_like, shape (3,), optional
+            Added after the rotation.
+
+        Returns
+        -------
+        Pose
+            That of the unit quaternion with the sine and cosine of half the angle, rounded.
+
+        Examples
+        --------
+        >>> Pose.from_axis_angle([0, 0, 2], 0.0)
+        Pose(rotation=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation=[0.0, 0.0, 0.0])
+        """
+        given = as_vector(axis, 3, ("axis",))
+        half = as_number(angle, ("angle",)) / 2.0
+        length = math.hypot(*(given / (largest := np.abs(given).max() or 1.0)))
+        if length == 0.0:
+            raise NotRigidError("axis has length 0; any other vector is one", ("axis",))
+        return cls.from_quaternion([math.cos(half), *(math.sin(half) / length * (given / largest))], translation)
+
+    @classmethod
+    def from_rpy(cls, rpy: object, translation: object = (0.0, 0.0, 0.0)) -> Pose:
+        """Return the pose of roll, pitch and yaw, as URDF and ROS have them, and a translation; 3D.
+
+        Parameters
+        ----------
+        rpy : array_like, shape (3,)
+            Angles in radians about the fixed axes x, y and z, turned about in this order.
+        translation : array_like, shape (3,), optional
+            Added after the rotation.
+
+        Returns
+        -------
+        Pose
+            That of the product of the three quaternions, whose sines and cosines are rounded.
+
+        Examples
+        --------
+        >>> Pose.from_rpy([0, 0, 0], [1, 2, 3]).translation.tolist()
+        [1.0, 2.0, 3.0]
+        """
+        roll, pitch, yaw = (as_vector(rpy, 3, ("rpy",)) / 2.0).tolist()
+        cr, sr, cp, sp, cy, sy = (turn(angle) for angle in (roll, pitch, yaw) for turn in (math.cos, math.sin))
+        wxyz = [
+            cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
+        ]  # fmt: skip
+        return cls.from_quaternion(wxyz, translation)
+
+    @classmethod
+    def from_matrix(cls, matrix: object, *, tolerance: float = 1e-12, rounded: bool = False) -> Pose:
         """Return the pose of a matrix of homogeneous coordinates.
 
         Parameters
         ----------
         matrix : array_like, shape (d + 1, d + 1)
             Rotation, translation in the last column, last row 0 ... 0 1.
-        tolerance : float, default 1e-12
+        tolerance, rounded
             As for `Pose`.
 
         Returns
@@ -186,7 +256,7 @@ class Pose(Immutable):
                 f"matrix[{n - 1}] = {digits(rows[-1])} must be 0 ... 0 1; transpose a matrix whose last column is that",
                 ("matrix", n - 1),
             )
-        return cls(rows[:-1, :-1], rows[:-1, -1], tolerance=tolerance)
+        return cls(rows[:-1, :-1], rows[:-1, -1], tolerance=tolerance, rounded=rounded)
 
     @classmethod
     def of_checked(cls, rotation: FloatArray, translation: FloatArray) -> Pose:
@@ -216,6 +286,13 @@ class Pose(Immutable):
 
     def __repr__(self) -> str:
         return f"Pose(rotation={digits(self.rotation)}, translation={digits(self.translation)})"
+
+
+def rounded_tolerance(rounded: object, tolerance: float) -> float:
+    """Return the tolerance of a pose: `ROUNDED` where rounded is True."""
+    if not isinstance(rounded, (bool, np.bool_)):
+        raise InvalidArrayError(f"rounded must be True or False, got {shown(rounded)}", ("rounded",))
+    return max(ROUNDED, tolerance) if rounded else tolerance
 
 
 _STILL: Final = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 3)}
@@ -276,6 +353,7 @@ def check_rotations(
         defect = _exact_defect(matrix)
         if defect > limit:
             allowed = f", or allow it by tolerance={1.1 * float(defect):.1e}" if defect < Fraction(9, 100) else ""
+            allowed += ", or as one of six digits by rounded=True" if defect <= ROUNDED else ""
             raise NotRigidError(
                 f"{spell(path)} = {digits(matrix)} is no rotation: max|R^T R - I| is {_decimal(defect)}, "
                 f"the limit {float(limit)!r}; make it orthogonal (from a unit quaternion, say){allowed}",

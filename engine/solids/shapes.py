@@ -21,9 +21,10 @@ from typing import Any, Final
 import numpy as np
 
 from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError, WrongDimensionError
+from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.checks import Where, as_points, shown, spell
-from engine.solids.geometries import MEMBERS, as_list, coordinates_of, geometries_in, geometry_of
+from engine.solids.geometries import MEMBERS, as_list, coordinates_of, geometries_in, geometry_of, note_altitude
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
@@ -44,10 +45,10 @@ def as_solid(value: object, *where: str | int) -> Solid:
     if isinstance(value, Solid):
         return value
     try:
-        solid = _from_geojson(value) or _from_mesh(value) or _from_arrays(value)
+        solid = _from_geojson(value, UNLIMITED) or _from_mesh(value) or _from_arrays(value)
     except EngineError as error:
         raise error.at(*where) from None
-    except (MemoryError, KeyboardInterrupt):
+    except (MemoryError, KeyboardInterrupt, Warning):
         raise
     except Exception as error:  # whatever the attributes and items of a caller's object raise
         raise InvalidInputError(
@@ -78,12 +79,13 @@ def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
     return [as_solid(each, *where, number) for number, each in enumerate(values)]
 
 
-def _from_geojson(value: Any) -> Polygon | None:
+def _from_geojson(value: Any, budget: Budget) -> Polygon | None:
     """Return the polygons of a GeoJSON object as one, parts united; altitudes are left out (RFC 7946, 3.1.1)."""
     geometry = geometry_of(value)
     if geometry is None:
         return None
     plane: list[Any] = []
+    has_altitude = False
     for place, each in geometries_in(geometry):
         if each is None:
             continue
@@ -94,20 +96,26 @@ def _from_geojson(value: Any) -> Polygon | None:
         coordinates, path = coordinates_of(each, place), (*place, "coordinates")
         for k, part in enumerate([coordinates] if kind == "Polygon" and len(coordinates) else coordinates):
             at = path if kind == "Polygon" else (*path, k)
-            plane.append([_plane(ring, (*at, j)) for j, ring in enumerate(as_list(part, at))])
+            rings = [_positions(ring, (*at, j)) for j, ring in enumerate(as_list(part, at))]
+            has_altitude |= any(ring.shape[1] == 3 for ring in rings)
+            plane.append([ring[:, :2] for ring in rings])
+    if has_altitude:
+        note_altitude("the polygons")
     read, _ = Polygon.geojson
-    return read({"type": "MultiPolygon", "coordinates": plane})
+    return read({"type": "MultiPolygon", "coordinates": plane}, budget)
 
 
-def _plane(positions: Any, where: Where) -> FloatArray:
-    """Return positions (n, 2), of three numbers each (longitude, latitude, altitude) the first two."""
+Polygon._from_geojson = _from_geojson
+
+
+def _positions(positions: Any, where: Where) -> FloatArray:
+    """Return positions (n, 2), or (n, 3) where each has three numbers: longitude, latitude, altitude."""
     rows = as_list(positions, where)
     if isinstance(rows, np.ndarray):
         is_tall = rows.ndim == 2 and rows.shape[1] == 3
     else:
         is_tall = bool(rows) and all(isinstance(each, (list, tuple, np.ndarray)) and len(each) == 3 for each in rows)
-    points = as_points(rows, 3 if is_tall else 2, where)
-    return points[:, :2] if is_tall else points
+    return as_points(rows, 3 if is_tall else 2, where)
 
 
 def _from_mesh(value: Any) -> Polyhedron | None:

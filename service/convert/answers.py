@@ -52,6 +52,7 @@ def from_accuracy(accuracy: engine.Accuracy) -> Accuracy:
         beyond_filter=accuracy.n_beyond_filter,
         rational=accuracy.n_rational,
         method=accuracy.method,
+        notes=getattr(accuracy, "notes", None),
     )
 
 
@@ -279,8 +280,7 @@ def from_stored_scene(name: str, scene: Scene) -> StoredSceneSummary:
 
 def clipped_in_scene(scene: Scene, segments: Any, keep: Keep | None, call: Call) -> ClipSegmentsSceneResponse:
     """Return the answer of `clip/segments/scene`."""
-    if len(scene):
-        segments = questions.to_items(segments, scene.solids[0].dimension)
+    segments = questions.to_items(segments, scene.solids[0].dimension if len(scene) else 3, call)
     clipped, accuracy = call.compute(
         scene.clip_segments, segments, keep=keep or "all", rewrite_error=questions.rewrite_error_paths_for_scene
     )

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any, Final, Literal, cast
 
 import numpy as np
 from starlette import responses
 
 import engine
 from service import mesh_reader
+from service.body import FILES, MULTIPART, fields_of
 from service.convert.answers import from_accuracy
+from service.errors import ServiceError
 from service.work import Call
 
 
@@ -59,9 +61,39 @@ def from_pieces(pieces: engine.SegmentPieces, n_segments: int, dimension: int, c
 
 
 Format = Literal["stl", "obj", "ply", "off", "glb"]
+_FILE: Final = {"type": "string", "format": "binary"}
+_FORM: Final = {
+    "type": "object",
+    "description": "A form with a file, as `curl -F file=@bunny.stl` sends it.",
+    "properties": {
+        "file": {**_FILE, "description": "The mesh; its format by the ending of its name, else by its first bytes."},
+        "type": {"type": "string", "enum": ["polyhedron", "surface"], "description": "polyhedron, if left out."},
+    },
+    "required": ["file"],
+}
+FILES_IN: Final = {**{kind: {"schema": _FILE} for kind in FILES}, MULTIPART: {"schema": _FORM}}
+"""The files that the OpenAPI document shows beside JSON."""
 
 
-def to_solid(octets: bytes | bytearray, kind: Format, solid_type: str, call: Call) -> tuple[engine.Solid, int]:
+def file_in(octets: Any, content_type: str, call: Call) -> tuple[Any, Format | None, str]:
+    """Return the bytes of a file, its format, if known, and polyhedron or surface."""
+    kind = FILES.get(content_type.partition(";")[0].strip().lower())
+    if kind is not None:
+        return octets, cast(Format, kind), "polyhedron"
+    call.take(len(octets))
+    fields = fields_of(octets, content_type)
+    (_, word), (name, file) = fields.get("type", ("", b"polyhedron")), fields.get("file", ("", b""))
+    if not file or fields.keys() - {"file", "type"} or word not in (b"polyhedron", b"surface"):
+        detail = (
+            "expected a form with the field file, a mesh, and perhaps type, polyhedron or surface; got "
+            f"{', '.join(sorted(fields)) or 'no field'}"
+        )
+        raise ServiceError("invalid_request", detail[:300])
+    suffix = name.rpartition(".")[2].lower()
+    return file, cast(Format, suffix) if suffix in FILES.values() else None, word.decode()
+
+
+def to_solid(octets: Any, kind: Format | None, solid_type: str, call: Call) -> tuple[engine.Solid, int]:
     """Return the polyhedron or surface in a file, and how many triangles are left out."""
     with call.phase("decode"):
         mesh = mesh_reader.read(octets, kind, call)

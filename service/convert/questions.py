@@ -14,8 +14,10 @@ import engine
 from engine import EngineError, Scene, Solid
 from service.errors import ServiceError
 from service.schemas import solids
+from service.schemas.arrays import limit_sentence
 from service.schemas.bodies import Keep, Moved, MovedBody
 from service.schemas.clipping import ClipSegmentsRequest
+from service.schemas.geojson import FromGeoJson, GeoJsonSolid
 from service.schemas.points import BoundsRequest, ContainsRequest
 from service.schemas.solids import Body
 from service.work import Call, T, Where
@@ -54,7 +56,19 @@ class _Builder:
                 for i_operand, operand in enumerate(member.operands)
             ]
             return _checked(where, lambda: engine.Csg(member.operation, operands))
+        if isinstance(member, GeoJsonSolid):
+            return self.polygon(member.sent(), where)
         return _checked(where, lambda: _made(member))
+
+    def polygon(self, value: dict[str, Any], where: Where) -> Solid:
+        """Return the polygon of GeoJSON."""
+        call = self._call
+        made = _checked(where, lambda: engine.Polygon(value, deadline=call.remaining(), cancel=call))
+        if made.n_rings > call.settings.max_rings:
+            raise ServiceError(
+                "limit_exceeded", limit_sentence("max_rings", call.settings.max_rings, made.n_rings), where
+            )
+        return made
 
     def _count(self, n_nodes: int, depth: int, where: Where) -> None:
         """Count n_nodes more solids of the whole tree, members of stored ones included."""
@@ -112,31 +126,61 @@ def to_bodies(models: list[solids.Body], call: Call) -> tuple[list[Solid], list[
 
 def to_pose(model: solids.RigidPose, where: Where) -> engine.Pose:
     """Return the engine's pose for `model`, which stands at `where` in the request."""
-    given = {} if model.tolerance is None else {"tolerance": model.tolerance}
-    return _checked(where, lambda: engine.Pose(model.rotation, model.translation, **given))
+    return _checked(where, lambda: _pose(model))
+
+
+def _pose(model: solids.RigidPose) -> engine.Pose:
+    options = {name: getattr(model, name) for name in ("tolerance", "rounded") if getattr(model, name) is not None}
+    if model.matrix is not None:
+        return engine.Pose.from_matrix(model.matrix, **options)
+    if model.quaternion is not None:
+        moved = {} if model.translation is None else {"translation": model.translation}
+        return engine.Pose.from_quaternion(model.quaternion, **moved)
+    return engine.Pose(model.rotation, model.translation, **options)
 
 
 def to_poses(models: list[solids.RigidPose], dimension: int) -> tuple[Any, Any]:
     """Return rotations ``(n, d, d)`` and translations ``(n, d)``; the engine checks that they are rigid."""
-    for i_pose, pose in enumerate(models):
+    rotations, translations = np.empty((len(models), dimension, dimension)), np.empty((len(models), dimension))
+    for number, model in enumerate(models):
+        pose: Any = model
+        if model.rotation is None or model.translation is None or not model.tolerance is model.rounded is None:
+            pose = to_pose(model, ("poses", number))
         if pose.rotation.shape != (dimension, dimension) or pose.translation.shape != (dimension,):
             raise engine.WrongDimensionError(
-                f"pose {i_pose} has a rotation of shape {pose.rotation.shape} and a translation of "
+                f"pose {number} has a rotation of shape {pose.rotation.shape} and a translation of "
                 f"{len(pose.translation)}; the bodies are {dimension}D",
-                ("poses", i_pose),
+                ("poses", number),
             )
-    rotations = np.array(
-        [
-            pose.rotation if pose.tolerance is None else to_pose(pose, ("poses", i_pose)).rotation
-            for i_pose, pose in enumerate(models)
-        ]
-    ).reshape(-1, dimension, dimension)
-    return rotations, np.array([pose.translation for pose in models]).reshape(-1, dimension)
+        rotations[number], translations[number] = pose.rotation, pose.translation
+    return rotations, translations
 
 
-def to_items(array: Any, dimension: int) -> Any:
-    """Return `array`; an empty JSON list has no dimension of its own, so it gets the solid's."""
-    return array if array.size else np.empty((0, *array.shape[1:-1], dimension))
+def to_items(items: Any, dimension: int, call: Call) -> Any:
+    """Return an array; an empty JSON list has no dimension of its own, so it gets the solid's. Of GeoJSON the altitudes
+    are left out of a question of the plane."""
+    is_ours = not isinstance(items, FromGeoJson)
+    array = items if is_ours else items.value
+    if not len(array):
+        return array if isinstance(array, list) else np.empty((0, *array.shape[1:-1], dimension))
+    if is_ours or dimension == 3 or np.shape(array[0])[-1:] != (3,):
+        return array
+    call.note(
+        f"{items.name}: altitudes, the third numbers of GeoJSON's positions, are left out of a question of the plane"
+    )
+    if isinstance(array, list):
+        return [np.asarray(line, np.float64)[:, :2] for line in array]
+    return np.ascontiguousarray(array[..., :2])
+
+
+def to_polygons(items: Any, call: Call) -> Any:
+    """Return lists of contours as they are, and polygons of what is GeoJSON."""
+    if not isinstance(items, FromGeoJson):
+        return items
+    builder = _Builder(call)
+    return [
+        builder.polygon(each, ("polygons", *place)) if isinstance(each, dict) else each for place, each in items.value
+    ]
 
 
 def rewrite_error_paths_for_scene(error: EngineError) -> None:

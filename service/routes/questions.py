@@ -53,7 +53,7 @@ router = router_of()
 def contains(question: ContainsRequest, call: CallOf) -> ContainsResponse:
     """Tell for each point whether it lies in the solid, boundary included, and which lie exactly on the boundary."""
     solid = questions.to_solid(question.solid, call, ("solid",))
-    points = questions.to_items(question.points, solid.dimension)
+    points = questions.to_items(question.points, solid.dimension, call)
     return answers.from_locations(*call.compute(engine.locate, points, solid))
 
 
@@ -61,7 +61,7 @@ def contains(question: ContainsRequest, call: CallOf) -> ContainsResponse:
 def contains_scene(question: ContainsSceneRequest, call: CallOf) -> ContainsSceneResponse:
     """List for each point the bodies that hold it, boundary included."""
     solids, poses = questions.to_bodies(question.bodies, call)
-    points = questions.to_items(question.points, solids[0].dimension)
+    points = questions.to_items(question.points, solids[0].dimension, call)
     result = call.compute(
         engine.locate_scene, points, solids, poses, rewrite_error=questions.rewrite_error_paths_for_scene
     )
@@ -134,7 +134,7 @@ def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
 def clip_segments(question: ClipSegmentsRequest, call: CallOf) -> ClipSegmentsResponse:
     """Return the parts of each segment that lie in the region, boundary included: none, one or several."""
     region = questions.to_solid(question.region, call, ("region",))
-    segments = questions.to_items(question.segments, region.dimension)
+    segments = questions.to_items(question.segments, region.dimension, call)
     return answers.from_pieces(*call.compute(engine.clip_segments, segments, region))
 
 
@@ -142,7 +142,7 @@ def clip_segments(question: ClipSegmentsRequest, call: CallOf) -> ClipSegmentsRe
 def clip_lines(question: ClipLinesRequest, call: CallOf) -> ClipLinesResponse:
     """Return the parts of each polyline that lie in the region; what is connected there stays in one piece."""
     region = questions.to_solid(question.region, call, ("region",))
-    lines = question.lines
+    lines = questions.to_items(question.lines, region.dimension, call)
     return answers.from_line_pieces(*call.compute(engine.clip_lines, lines if len(lines) else [], region))
 
 
@@ -150,7 +150,8 @@ def clip_lines(question: ClipLinesRequest, call: CallOf) -> ClipLinesResponse:
 def clip_polygons(question: ClipPolygonsRequest, call: CallOf) -> ClipPolygonsResponse:
     """Clip polygons on a convex region, contour by contour; what is left of a polygon stays connected."""
     region = questions.to_solid(question.region, call, ("region",))
-    return areas.from_clipped(*call.compute(engine.clip_polygons, question.polygons, region))
+    polygons = questions.to_polygons(question.polygons, call)
+    return areas.from_clipped(*call.compute(engine.clip_polygons, polygons, region))
 
 
 @router.post("/v1/overlay", operation_id="overlay", tags=["clipping"])
@@ -219,7 +220,7 @@ def compare(question: CompareRequest, call: CallOf) -> CompareResponse:
     if question.operation == "collide":
         items: Any = questions.to_solid(values[0], call, names[:1])
     else:
-        items = questions.to_items(values[0], solid.dimension)
+        items = questions.to_items(values[0], solid.dimension, call)
     result, accuracy = call.compute(_compared, question.operation, items, solid, method=question.method)
     return answers.from_comparison(result, accuracy)
 

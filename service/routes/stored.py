@@ -43,13 +43,24 @@ Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/sol
     operation_id="put_solid",
     tags=["solids"],
     status_code=201,
-    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(507)},
+    responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(501, 507)},
+    openapi_extra={"requestBody": {"content": octets.FILES_IN}},
 )
 def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same
-    id everywhere; it may leave the store when others need the room."""
+    id everywhere; it may leave the store when others need the room. A mesh may come as a file too: as the body, or as
+    the field `file` of a form, of which `type` may be surface."""
     solid = questions.to_solid(question, call, ())
     return answers.from_stored(put(solid, call), solid)
+
+
+def put_mesh(question: Any, content_type: str, call: Call) -> StoredSolidSummary:
+    """Keep a mesh that came as a file, or in a form, in place of JSON."""
+    solid, n_collapsed = octets.to_solid(*octets.file_in(question, content_type, call), call)
+    return answers.from_stored(put(solid, call), solid, n_collapsed or None)
+
+
+put_solid.upload = put_mesh  # type: ignore[attr-defined]
 
 
 def put(value: Stored, call: Call) -> str:
@@ -179,7 +190,7 @@ def has_scene(scene_id: SceneId, call: CallOf) -> None:
 def contains_stored_scene(scene_id: SceneId, question: SceneContainsRequest, call: CallOf) -> ContainsSceneResponse:
     """List for each point the bodies of a stored scene that hold it, boundary included."""
     scene = questions.to_moved(call.store.get_scene(scene_id), question.moved, call)
-    points = questions.to_items(question.points, scene.solids[0].dimension)
+    points = questions.to_items(question.points, scene.solids[0].dimension, call)
     return answers.from_scene_locations(*call.compute(scene.locate, points))
 
 

@@ -165,3 +165,7 @@ class Accuracy(Schema):
     beyond_filter: Count = Field(description="Items that the floating-point filter left open.")
     rational: Count = Field(description="Items of those that needed rational arithmetic.")
     method: str = Field(description="The method chosen.")
+    notes: list[str] = optional(
+        "What of the question was left out, as altitudes of GeoJSON are.",
+        [["polygons: altitudes, the third numbers of GeoJSON's positions, are left out of a question of the plane"]],
+    )

@@ -33,6 +33,9 @@ class CollideRequest(Schema):
             "poses": [
                 {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0.5, 0.5, 0.5]},
                 {"rotation": [[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]], "translation": [1, 0, 0], "tolerance": 1e-6},
+                {"rotation": [[0.866025, -0.5, 0], [0.5, 0.866025, 0], [0, 0, 1]], "rounded": True},
+                {"quaternion": [1, 0, 0, 1], "translation": [0, 0, 5]},
+                {"matrix": [[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]},
             ],
             "detail": True,
             "boolean": False,

@@ -8,6 +8,7 @@ from pydantic import Field, WithJsonSchema
 
 from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
 from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
+from service.schemas.geojson import OrGeoJson
 from service.schemas.solids import Indices, Number, Position, Segments, Solid
 
 
@@ -19,7 +20,7 @@ class ClipSegmentsRequest(Schema):
     )
 
     region: Solid = Field(description="half_space, aabb, convex, sphere, polygon or polyhedron.")
-    segments: Segments = Field(description="Two end points each.")
+    segments: Segments = Field(description="Two end points each. Or GeoJSON: LineStrings of two positions.")
 
 
 class SegmentPiece(Schema):
@@ -52,8 +53,10 @@ class ClipLinesRequest(Schema):
     )
 
     region: Solid = Field(description="half_space, aabb, convex, sphere, polygon or polyhedron.")
-    lines: Annotated[Array, Numbers(POINTS, Axis(2, "max_points"), DIMENSION, ragged=True)] = Field(
-        description="Two positions or more each."
+    lines: Annotated[Array, Numbers(POINTS, Axis(2, "max_points"), DIMENSION, ragged=True), OrGeoJson("LineString")] = (
+        Field(
+            description="Two positions or more each. Or GeoJSON: LineString, MultiLineString, or a collection of these."
+        )
     )
 
 
@@ -92,8 +95,8 @@ class ClipPolygonsRequest(Schema):
     )
 
     region: Solid = Field(description="half_space, aabb, convex, or a polyhedron that is convex.")
-    polygons: Annotated[list[Contours], AtMost("max_polygons")] = Field(
-        description="Each a list of contours, in 2D or 3D, planar or not."
+    polygons: Annotated[list[Contours], AtMost("max_polygons"), OrGeoJson("Polygon")] = Field(
+        description="Each a list of contours, in 2D or 3D, planar or not. Or a collection of GeoJSON with areas."
     )
 
 

@@ -22,7 +22,9 @@ class ContainsRequest(Schema):
     )
 
     solid: Solid = Field(description="Any but a surface.")
-    points: Points = Field(description="Positions of the solid's dimension.")
+    points: Points = Field(
+        description="Positions of the solid's dimension. Or GeoJSON: Point, MultiPoint, or a collection of these."
+    )
 
 
 class ContainsResponse(Schema):

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import Field, RootModel, WithJsonSchema, create_model
+from pydantic import Field, RootModel, WithJsonSchema, create_model, model_validator
 
 import engine
 from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
 from service.schemas.base import AtMost, Count, Schema, optional, with_example
+from service.schemas.geojson import GeoJsonSolid, OrGeoJson
 
 Number = Annotated[float, Numbers()]
 Position = Annotated[Array, Numbers(DIMENSION)]
-Points = Annotated[Array, Numbers(POINTS, DIMENSION)]
+Points = Annotated[Array, Numbers(POINTS, DIMENSION), OrGeoJson("Point")]
 Booleans = Annotated[Array, Numbers(Axis(0, None), kind="boolean")]
 Indices = Annotated[Array, Numbers(Axis(0, None), kind="integer", minimum=0)]
 IndexLists = Annotated[list[list[int]], Numbers(Axis(0, None), Axis(0, None), kind="integer", ragged=True, minimum=0)]
-Segments = Annotated[Array, Numbers(POINTS, PAIR, DIMENSION)]
+Segments = Annotated[Array, Numbers(POINTS, PAIR, DIMENSION), OrGeoJson("LineString")]
 Vertices2 = Annotated[Array, Numbers(Axis(1, "max_points"), Axis(2, 2))]
 Vertices3 = Annotated[Array, Numbers(Axis(1, "max_points"), Axis(3, 3))]
 Faces = Annotated[Any, Numbers(Axis(1, "max_faces"), Axis(3, "max_points"), kind="integer", ragged=True, minimum=0)]
@@ -88,7 +89,7 @@ class StoredSolid(Schema):
     id: SolidId
 
 
-_MEMBERS = *(_model_of(row) for row in engine.solid_types.values() if row.fields), CsgSolid, StoredSolid
+_MEMBERS = *(_model_of(row) for row in engine.solid_types.values() if row.fields), CsgSolid, StoredSolid, GeoJsonSolid
 _Member: Any = Union[_MEMBERS]  # noqa: UP007 (there is no other way to write a union of a tuple)
 
 
@@ -105,14 +106,32 @@ class Solid(RootModel[Annotated[_Member, Field(discriminator="type")]]):
 
 
 class RigidPose(Schema):
-    """Moves a point p to R p + t; R is a rotation, row by row, of the solid's dimension."""
+    """Moves a point p to R p + t; R is a rotation, given as `rotation` or `quaternion`, or with t as one `matrix`."""
 
-    rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)] = Field(description="R, a list of rows.")
-    translation: Position = Field(description="t.")
+    rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)] = optional("R, a list of rows.")
+    quaternion: Annotated[Array, Numbers(Axis(4, 4))] = optional(
+        "R in space as w, x, y, z, in this order, of any length but 0 (x, y, z, w of other programs: w goes first)."
+    )
+    matrix: Annotated[Array, Numbers(Axis(3, 4), Axis(3, 4))] = optional(
+        "R and t in homogeneous coordinates: 4 rows of 4 in space, 3 of 3 in the plane, the last row 0 ... 0 1."
+    )
+    translation: Position = optional("t; zero if left out. Not beside `matrix`, which has it.")
     tolerance: Annotated[float, WithJsonSchema({"type": "number", "format": "double"})] = optional(
         "How far an entry of R^T R may be from that of the unit matrix: 0 to 0.1, 1e-12 if left out. A matrix farther "
         "than 1e-12 stands for the rotation nearest to it, each entry the nearest double; 1e-6 takes float32 matrices."
     )
+    rounded: bool = optional(
+        "The same with a tolerance of 1e-5: takes matrices printed with six digits, or of float32."
+    )
+
+    @model_validator(mode="after")
+    def _is_one_pose(self) -> RigidPose:
+        given = [name for name in ("rotation", "quaternion", "matrix") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"a pose has one of rotation, quaternion and matrix, got {' and '.join(given) or 'none'}")
+        if self.matrix is not None and self.translation is not None:
+            raise ValueError("a pose has its translation in the last column of matrix; leave translation out")
+        return self
 
 
 class Body(Schema):

@@ -19,6 +19,7 @@ import anyio
 import pytest
 
 import engine
+from service import body
 from service.app import create_app
 from service.openapi import ANSWERS as EXAMPLES
 from service.schemas.bodies import SCENE_ID
@@ -71,6 +72,9 @@ ANSWERS = {
     "/v1/solids/{solid_id}/clip/segments": "application/octet-stream",
 }
 
+FILES = {"/v1/solids": (*body.FILES, body.MULTIPART)}
+"""Files that are taken beside JSON, by path."""
+
 
 def document() -> dict[str, Any]:
     """Return the document with the default settings, without the version (a release must not touch the file)."""
@@ -119,7 +123,7 @@ def test_one_media_type_for_each_operation_and_direction(made: dict[str, Any]) -
             if "requestBody" in operation:
                 is_binary = "binary" in operation["tags"]
                 kind = "application/octet-stream" if is_binary else "application/json"
-                assert list(operation["requestBody"]["content"]) == [kind]
+                assert list(operation["requestBody"]["content"]) == [kind, *FILES.get(path, ())]
                 assert operation["requestBody"]["required"] is True
             for status, response in operation["responses"].items():
                 answer = ANSWERS.get(path, "application/json")
@@ -163,9 +167,15 @@ def test_the_union_of_solids_is_named_and_told_apart(made: dict[str, Any]) -> No
     assert (solid["type"], solid["discriminator"]["propertyName"]) == ("object", "type")
     refs = {member["$ref"] for member in solid["oneOf"]}
     assert refs == set(solid["discriminator"]["mapping"].values())
-    assert len(refs) == 11
+    assert len(refs) == 12
     operands = made["components"]["schemas"]["CsgSolid"]["properties"]["operands"]
     assert operands["items"] == {"$ref": "#/components/schemas/Solid"}
+
+
+def test_every_schema_has_its_name_as_title(made: dict[str, Any]) -> None:
+    """Viewers show the members of a union by their titles."""
+    for name, schema in made["components"]["schemas"].items():
+        assert schema["title"] == name
 
 
 def test_every_property_has_a_description_and_an_example(made: dict[str, Any]) -> None:
@@ -183,8 +193,8 @@ def test_every_question_and_answer_has_an_example(made: dict[str, Any]) -> None:
         for operation in item.values():
             bodies = [operation.get("requestBody", {})]
             bodies += [answer for status, answer in operation["responses"].items() if status < "300"]
-            for body in bodies:
-                for media_type, content in body.get("content", {}).items():
+            for each in bodies:
+                for media_type, content in each.get("content", {}).items():
                     assert media_type != "application/json" or content["examples"], path
             for status, answer in operation["responses"].items():
                 if status >= "400":
@@ -265,8 +275,8 @@ def test_limits_stand_in_the_document_and_follow_the_settings(made: dict[str, An
 
 def test_unknown_fields_are_refused_everywhere(made: dict[str, Any]) -> None:
     for name, schema in made["components"]["schemas"].items():
-        if "properties" in schema:
-            assert schema["additionalProperties"] is False, name
+        if "properties" in schema:  # GeoJSON has members of its own and of others (RFC 7946, 6.1)
+            assert schema["additionalProperties"] is (name == "GeoJsonSolid"), name
 
 
 if __name__ == "__main__":

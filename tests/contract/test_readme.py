@@ -76,6 +76,7 @@ def test_the_calls_for_stored_solids_do_what_they_say() -> None:
         r"^ +1$",
         r"^( +0){2}\n( +0){2}\n( +0){2}$",
         r'"type":"polyhedron","dimension":3,"vertices":4,"faces":4',
+        r'"type":"surface","dimension":3,"vertices":3,"faces":1',
         r'{"status":"ok"}{"status":"ok"}',
         r"geometry_requests_total",
     ):

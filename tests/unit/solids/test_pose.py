@@ -201,3 +201,44 @@ def test_quaternions_in_either_order_by_name() -> None:
     for wrong in ({}, {"wxyz": (1, 0, 0, 0), "xyzw": (0, 0, 0, 1)}):
         with pytest.raises(engine.InvalidArrayError, match="wxyz or as xyzw"):
             engine.Pose.from_quaternion(**wrong)
+
+
+def test_six_printed_digits_are_refused_with_the_word_that_takes_them() -> None:
+    turn = [[0.866025, -0.5, 0.0], [0.5, 0.866025, 0.0], [0.0, 0.0, 1.0]]
+    with pytest.raises(
+        engine.NotRigidError, match=r"allow it by tolerance=\d.*or as one of six digits by rounded=True"
+    ):
+        engine.Pose(turn)
+    exact = engine.Pose(turn, rounded=True)
+    assert exact == engine.Pose(turn, [0, 0, 0], tolerance=1e-5)
+    assert exact_defect(exact.rotation) < Fraction(1, 10**15)
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn
+    assert engine.Pose.from_matrix(matrix, rounded=True) == exact
+    with pytest.raises(engine.NotRigidError, match=r"tolerance=4") as error:  # three digits: the number alone
+        engine.Pose(np.round(turn, 3))
+    assert "rounded" not in str(error.value)
+    with pytest.raises(engine.InvalidArrayError, match="rounded must be True or False"):
+        engine.Pose(turn, rounded=1)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_axis_angle_and_rpy_are_those_of_the_formulas(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    axis, angle, (roll, pitch, yaw) = (
+        draw.normal(size=3) * 1e200 ** draw.integers(-1, 2),
+        *draw.uniform(-7, 7, 1),
+        draw.uniform(-7, 7, 3),
+    )
+    x, y, z = axis / np.abs(axis).max() / np.linalg.norm(axis / np.abs(axis).max())
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rodrigues = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    assert np.allclose(engine.Pose.from_axis_angle(axis, angle).rotation, rodrigues, atol=1e-14)
+
+    def about(axis: list[float], angle: float) -> np.ndarray:
+        return engine.Pose.from_axis_angle(axis, angle).rotation
+
+    expected = about([0, 0, 1], yaw) @ about([0, 1, 0], pitch) @ about([1, 0, 0], roll)
+    assert np.allclose(engine.Pose.from_rpy([roll, pitch, yaw], [1, 2, 3]).rotation, expected, atol=1e-14)
+    with pytest.raises(engine.NotRigidError, match="length 0"):
+        engine.Pose.from_axis_angle([0, 0, 0], 1.0)

@@ -37,7 +37,6 @@ def area(solid: Any) -> float:
     ({"type": "FeatureCollection", "features": [feature({"type": "Polygon", "coordinates": [ring]})
                                                 for ring in (SQUARE, BESIDE)] + [feature(None)]}, 7.0),
     ({"type": "GeometryCollection", "geometries": [POLYGON, {"type": "Polygon", "coordinates": [HOLE]}]}, 4.0),
-    ({"type": "Polygon", "coordinates": [[[*at, 99.5] for at in SQUARE]]}, 4.0),  # altitude
     (SimpleNamespace(__geo_interface__=POLYGON), 3.0),
     (np.array(SQUARE), 4.0),
     ([SQUARE, HOLE], 3.0),
@@ -45,6 +44,40 @@ def area(solid: Any) -> float:
 ])  # fmt: skip
 def test_a_polygon_from_what_people_hold(held: Any, expected: float) -> None:
     assert area(held) == expected
+
+
+def test_altitudes_are_left_out_of_plane_questions_and_told() -> None:
+    tall = {"type": "Polygon", "coordinates": [[[*at, 99.5] for at in SQUARE]]}
+    with pytest.warns(UserWarning, match="the polygons: altitudes"):
+        assert area(tall) == 4.0
+    points = {"type": "MultiPoint", "coordinates": [[1, 1, 7], [2, 1, 7]]}
+    with pytest.warns(UserWarning, match="points: altitudes"):
+        assert engine.locate(points, [SQUARE]).tolist() == [1, 0]
+    lines = {"type": "LineString", "coordinates": [[-1, 1, 7], [3, 1, 8]]}
+    with pytest.warns(UserWarning, match="lines: altitudes"):
+        assert engine.clip_lines(lines, [SQUARE]).vertices.tolist() == [[0, 1], [2, 1]]
+    with pytest.warns(UserWarning, match="segments: altitudes"):
+        assert engine.clip_segments(lines, [SQUARE]).t.tolist() == [[0.25, 0.75]]
+    cube = engine.Aabb((0, 0, 0), (9, 9, 9))
+    assert engine.locate(points, cube).tolist() == [1, 1]  # in space they are coordinates
+
+
+def test_segments_of_geojson_have_two_positions() -> None:
+    with pytest.raises(engine.InvalidArrayError, match=r"segments\[0\] is no line of 2 positions; clip_lines"):
+        engine.clip_segments({"type": "LineString", "coordinates": [[0, 0], [1, 1], [2, 0]]}, POLYGON)
+
+
+def test_a_polygon_is_made_of_any_geojson() -> None:
+    parts = {"type": "FeatureCollection", "features": [
+        feature({"type": "Polygon", "coordinates": [ring]}) for ring in (SQUARE, BESIDE)]}  # fmt: skip
+    assert area(engine.Polygon(parts)) == 7.0
+    assert engine.Polygon(SimpleNamespace(__geo_interface__=feature(POLYGON))).n_rings == 2
+    with pytest.raises(engine.UnsupportedSolidError, match="a LineString is no solid: clip_lines takes lines"):
+        engine.Polygon({"type": "LineString", "coordinates": [[0, 0], [1, 1]]})
+    with pytest.raises(engine.InvalidArrayError, match="rings must be a list of rings"):
+        engine.Polygon({"rings": [SQUARE]})
+    with pytest.raises(engine.DeadlineExceededError):
+        engine.Polygon(parts, deadline=0)
 
 
 def test_shapely_and_geopandas_are_taken() -> None:

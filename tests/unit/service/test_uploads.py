@@ -1,0 +1,82 @@
+"""Files of meshes put into the store by POST /v1/solids: as the body, and in a form."""
+
+from __future__ import annotations
+
+import gzip
+import struct
+from typing import Any
+
+import httpx
+import pytest
+
+import engine
+from tests.unit.service.asking import check_problem
+
+pytestmark = pytest.mark.anyio
+CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
+OFF = (
+    "OFF\n4 4 0\n" + "".join(f"{x} {y} {z}\n" for x, y, z in CORNERS) + "".join(f"3 {a} {b} {c}\n" for a, b, c in FACES)
+)
+OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS) + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in FACES)
+STL = b"\r\n--x".ljust(80) + struct.pack("<I", 4) + b"".join(
+    struct.pack("<12fH", 0, 0, 0, *(x for corner in face for x in CORNERS[corner]), 0x0A0D) for face in FACES
+)  # fmt: skip
+OPEN = OFF.replace("4 4 0", "4 3 0").removesuffix("3 0 3 2\n")
+
+
+@pytest.mark.parametrize(("kind", "content"), [("stl", STL), ("obj", OBJ.encode()), ("off", OFF.encode())])
+async def test_a_file_is_a_body(client: httpx.AsyncClient, kind: str, content: bytes) -> None:
+    answer = await client.post("/v1/solids", content=content, headers={"content-type": f"model/{kind}; x=y"})
+    assert (answer.status_code, answer.json()["faces"]) == (201, 4), answer.text
+    assert answer.headers["location"] == f"/v1/solids/{answer.json()['id']}"
+    again = await client.post(
+        "/v1/solids",
+        content=gzip.compress(content),
+        headers={"content-type": f"model/{kind}", "content-encoding": "gzip"},
+    )
+    assert (again.status_code, again.json()["id"]) == (200, answer.json()["id"])
+    inside = {"solid": {"type": "stored", "id": answer.json()["id"]}, "points": [[0.1, 0.1, 0.1], [1, 1, 1]]}
+    assert (await client.post("/v1/contains", json=inside)).json()["contained"] == [True, False]
+
+
+@pytest.mark.parametrize(("name", "content"), [
+    ("a.stl", STL), ("a.OBJ", OBJ.encode()), ("a.off", OFF.encode()), ("a", STL), ("mesh.bin", OFF.encode()),
+])  # fmt: skip
+async def test_a_file_is_a_field_of_a_form(client: httpx.AsyncClient, name: str, content: bytes) -> None:
+    answer = await client.post("/v1/solids", files={"file": (name, content)})
+    assert (answer.status_code, answer.json()["faces"]) == (201, 4), answer.text
+    surface = await client.post("/v1/solids", files={"file": (name, content)}, data={"type": "surface"})
+    assert surface.json()["type"] == "surface"
+
+
+FORM = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.off"\r\n\r\n' + OFF.encode() + b"\r\n--b--\r\n"
+
+
+@pytest.mark.parametrize(("kind", "content", "status", "code"), [
+    ("model/stl", b"nonsense", 422, "invalid_mesh"),
+    ("model/off", OPEN.encode(), 422, "not_closed"),
+    ("model/step", OFF.encode(), 415, "unsupported_media_type"),
+    ("multipart/form-data", FORM, 400, "bad_request"),
+    ("multipart/form-data; boundary=c", FORM, 400, "bad_request"),
+    ("multipart/form-data; boundary=b", FORM[:-12], 400, "bad_request"),
+    ("multipart/form-data; boundary=b", FORM.replace(b"\r\n\r\n", b"", 1), 400, "bad_request"),
+    ("multipart/form-data; boundary=b", FORM.replace(b'"file"', b'"mesh"'), 422, "invalid_request"),
+    ("multipart/form-data; boundary=b", b"--b--", 422, "invalid_request"),
+    ("multipart/form-data; boundary=b", FORM[:-7] * 40 + FORM, 400, "bad_request"),
+    ("multipart/form-data; boundary=b", FORM.replace(b".off", b".glb"), 422, "invalid_mesh"),
+])  # fmt: skip
+async def test_what_is_no_mesh_is_refused(
+    client: httpx.AsyncClient, kind: str, content: bytes, status: int, code: str
+) -> None:
+    answer: Any = await client.post("/v1/solids", content=content, headers={"content-type": kind})
+    check_problem(answer, status, code)
+
+
+async def test_a_form_of_a_solid_is_read_once(client: httpx.AsyncClient) -> None:
+    """`boundary` in quotes, and a mesh equal to the one in JSON."""
+    headers = {"content-type": 'multipart/form-data; boundary="b"'}
+    answer = await client.post("/v1/solids", content=FORM, headers=headers)
+    body = {"type": "polyhedron", "vertices": CORNERS, "faces": FACES}
+    assert (await client.post("/v1/solids", json=body)).json()["id"] == answer.json()["id"]
+    assert engine.read_mesh(OFF.encode()).solid() == engine.Polyhedron(CORNERS, FACES)
