@@ -51,6 +51,7 @@ from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.lines import LinePieces, clip_lines
+from engine.solids.accepted import PointsLike, PoseLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.bounds import Bounds, bounds
 from engine.solids.csg import Csg
@@ -58,6 +59,7 @@ from engine.solids.implicit import Implicit
 from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
+from engine.solids.poses import Poses
 from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 from engine.solids.ragged import polygons
 from engine.solids.registry import solid_types
@@ -71,12 +73,16 @@ __all__ = [
     "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError", "IndexOutOfRangeError", "InvalidArrayError",
     "InvalidInputError", "InvalidOperationError", "InvalidPolynomialError", "LinePieces", "Location",
     "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
-    "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece", "Polygon", "PolygonStatus", "Polyhedron", "Pose",
-    "Rcc8", "Relation", "RepeatedIndexError", "RingTooShortError", "Scene", "SceneLocations", "ScenePairs",
-    "ScenePieces", "SegmentPieces", "Solid", "Sphere", "Surface", "TooComplexError", "TooDeepError", "Triangle",
-    "UnsupportedPairError", "UnsupportedSolidError", "Witness", "WrongDimensionError", "ZeroNormalError", "__version__",
-    "bounds", "clearance", "clearance_poses", "clip_lines", "clip_polygons", "clip_segments", "collide",
-    "collide_poses", "collide_scene", "collide_triangles", "compare", "contains", "default_workers", "filled",
-    "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons", "read_mesh", "release", "solid_types",
-    "union_all", "warm",
+    "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece", "PointsLike", "Polygon", "PolygonStatus", "Polyhedron",
+    "Pose", "PoseLike", "Poses", "Rcc8", "Relation", "RepeatedIndexError", "RingTooShortError", "Scene",
+    "SceneLocations", "ScenePairs", "ScenePieces", "SegmentPieces", "Solid", "SolidLike", "Sphere", "Surface",
+    "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
+    "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
+    "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
+    "contains", "filled", "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons", "read_mesh",
+    "release", "solid_types", "union_all", "warm",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -127,7 +127,7 @@ def _clip(options: Options) -> None:
 def _clip_polygons(region: Any, options: Options) -> None:
     polygons = read_solids(options.items, _note(options))
     with _bar(len(polygons), "polygons", options) as progress:
-        clipped = clip_polygons(polygons, region, progress=progress, deadline=options.deadline)  # type: ignore[arg-type]
+        clipped = clip_polygons(polygons, region, progress=progress, deadline=options.deadline)
     if clipped.status.any():
         item = int(np.argmax(clipped.status != 0))
         raise InvalidInputError(

@@ -66,6 +66,10 @@ class Comparison:
     seconds_plain: float
     accuracy: Accuracy
 
+    def __repr__(self) -> str:
+        wrong, off = len(self.differing), len(self.inexact)
+        return f"<Comparison: {self.method}, {wrong:,} of {len(self.exact):,} wrong, {off:,} inexact>"
+
 
 def compare(
     operation: Compared,

@@ -76,3 +76,7 @@ else:
     sys.meta_path.insert(0, _Finder)
     _ours = import_module(_NAME)
     globals().update({name: getattr(_ours, name) for name in (*_ours.__all__, "__all__", "__version__")})
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

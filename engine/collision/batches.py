@@ -26,6 +26,7 @@ from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
 from engine.solids.base import Solid
 from engine.solids.pose import Pose, motions_of
+from engine.solids.poses import Poses
 from engine.solids.primitives import Aabb
 from engine.solids.registry import own_box
 from engine.solids.shapes import as_solid
@@ -199,9 +200,9 @@ class OwnBoxes(NamedTuple):
     radii: FloatArray
 
 
-def scene_bodies(solids: Sequence[Solid], poses: Sequence[Pose | None] | None) -> SceneBodies:
-    """Check the bodies of a scene and return them as arrays; poses: one or None for each solid, or None for no poses.
-    Raises an error that names the index of the wrong body."""
+def scene_bodies(solids: Any, poses: Any) -> SceneBodies:
+    """Return the bodies as arrays. Raises with the index of the wrong body."""
+    poses = list(poses) if isinstance(poses, Poses) else poses
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):
             raise InvalidArrayError(f"{name} must be a list, got {type(each).__name__}", (name,))

@@ -30,12 +30,14 @@ from engine.errors import (
 )
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
+from engine.solids.accepted import PoseLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import spell
 from engine.solids.mesh import Surface
 from engine.solids.pose import Pose
+from engine.solids.poses import as_pose
 from engine.solids.primitives import Aabb, HalfSpace, Sphere
-from engine.solids.shapes import as_pose, as_solid
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, Rcc8, Relation
 
 TAKEN = {2: "polygon, triangle, aabb, sphere, half_space", 3: "polyhedron, surface, aabb, sphere, half_space"}
@@ -127,8 +129,8 @@ def collide_pair(first: Solid, second: Solid, poses: result.Poses, work: result.
 class CollideOptions(Options, total=False):
     """Keyword arguments of `collide`, except `report`, which changes the return type."""
 
-    first_pose: Pose | None
-    second_pose: Pose | None
+    first_pose: PoseLike | None
+    second_pose: PoseLike | None
     boolean: bool
     witness: bool
     detail: bool
@@ -136,18 +138,18 @@ class CollideOptions(Options, total=False):
 
 @overload
 def collide(
-    first: Solid, second: Solid, *, report: Literal[False] = False, **options: Unpack[CollideOptions]
+    first: SolidLike, second: SolidLike, *, report: Literal[False] = False, **options: Unpack[CollideOptions]
 ) -> result.Collision: ...
 @overload
 def collide(
-    first: Solid, second: Solid, *, report: Literal[True], **options: Unpack[CollideOptions]
+    first: SolidLike, second: SolidLike, *, report: Literal[True], **options: Unpack[CollideOptions]
 ) -> tuple[result.Collision, Accuracy]: ...
 def collide(
-    first: Solid,
-    second: Solid,
+    first: SolidLike,
+    second: SolidLike,
     *,
-    first_pose: Pose | None = None,
-    second_pose: Pose | None = None,
+    first_pose: PoseLike | None = None,
+    second_pose: PoseLike | None = None,
     boolean: bool = False,
     witness: bool = True,
     detail: bool = False,

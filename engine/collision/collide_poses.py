@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite
-from typing import Any
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
@@ -19,30 +19,68 @@ from engine.collision.meshes.mesh_pair import SPACE, search_goal
 from engine.collision.meshes.parity import states_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
-from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, Work, has_faces
+from engine.collision.result import (
+    RELATIONS,
+    SWAPPED_RELATION,
+    UNCOUNTED,
+    Collision,
+    PoseRelations,
+    Work,
+    has_faces,
+)
 from engine.collision.simple.against_ball import centers_in_frame, named, relate_balls
 from engine.collision.simple.closed_forms import relation_closed_form
 from engine.compiling.jit import entry_of
-from engine.errors import InvalidArrayError, WrongDimensionError
 from engine.running.budget import Budget, Cancel
-from engine.running.parallel import Progress, check_options, run_chunks
+from engine.running.parallel import Options, Progress, check_options, run_chunks
+from engine.solids.accepted import PosesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, is_ready
-from engine.solids.pose import Pose, check_rotations, is_certified_rotation, motion_of
+from engine.solids.pose import Pose, motion_of
+from engine.solids.poses import Poses, as_pose_arrays, check_pose_arrays
 from engine.solids.primitives import Sphere
-from engine.solids.shapes import as_pose_arrays, as_solid
+from engine.solids.rotations import is_certified_rotation
+from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 
 _Answers = (
-    tuple[Int8Array, one_pair.Witnesses] | tuple[Int8Array, Int8Array] | tuple[Int8Array, one_pair.Witnesses, Int8Array]
+    tuple[PoseRelations, one_pair.Witnesses]
+    | tuple[PoseRelations, Int8Array]
+    | tuple[PoseRelations, one_pair.Witnesses, Int8Array]
 )
-PoseCollisions = Int8Array | _Answers
+PoseCollisions = PoseRelations | _Answers
 
 
+@overload
 def collide_poses(
-    first: Solid,
-    second: Solid,
-    rotations: object,
+    first: SolidLike,
+    second: SolidLike,
+    rotations: PosesLike,
+    translations: object = None,
+    *,
+    witnesses: Literal[False] = False,
+    detail: Literal[False] = False,
+    report: Literal[False] = False,
+    boolean: bool = False,
+    **options: Unpack[Options],
+) -> PoseRelations: ...
+@overload
+def collide_poses(
+    first: SolidLike,
+    second: SolidLike,
+    rotations: PosesLike,
+    translations: object = None,
+    *,
+    witnesses: bool = False,
+    detail: bool = False,
+    report: bool = False,
+    boolean: bool = False,
+    **options: Unpack[Options],
+) -> Any: ...
+def collide_poses(
+    first: SolidLike,
+    second: SolidLike,
+    rotations: PosesLike,
     translations: object = None,
     *,
     witnesses: bool = False,
@@ -61,8 +99,8 @@ def collide_poses(
     first, second : Solid
         As for `collide`.
     rotations : array_like, shape (n_poses, d, d)
-        Row-major; vertices map exactly to R p + t. Without translations: a list of `Pose` (or of matrices), or matrices
-        (n_poses, d + 1, d + 1).
+        Row-major; vertices map exactly to R p + t. Without translations: `Poses`, a list of `Pose` (or of matrices), or
+        matrices (n_poses, d + 1, d + 1).
     translations : array_like, shape (n_poses, d), optional
         Of the second body.
     witnesses : bool, default False
@@ -77,7 +115,8 @@ def collide_poses(
     Returns
     -------
     ndarray of int8, shape (n_poses,)
-        Codes of `Relation`. With `witnesses` a pair of it and a list of `Witness`, None where disjoint; with
+        Codes of `Relation`; its `first_contact` is the first pose in which the bodies meet, None if they never do. With
+        `witnesses` a pair of it and a list of `Witness`, None where disjoint; with
         ``report=True`` a pair of the answer and an `Accuracy`.
 
     Raises
@@ -120,8 +159,8 @@ def collide_poses(
     n_poses = len(poses.rotations)
     if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
         one = _collide_pose(first, second, poses, UNCOUNTED[bool(witnesses), bool(boolean)])
-        relations = _ALONE[one.relation].copy()
-        return (relations, [one.witness]) if witnesses else relations
+        alone = _ALONE[one.relation].copy()
+        return (alone, [one.witness]) if witnesses else alone
     with Budget(deadline, cancel) as budget:
         budget.check()
         has_detail = detail and one_pair.has_interior(first, budget) and one_pair.has_interior(second, budget)
@@ -141,14 +180,15 @@ def collide_poses(
             answers.settle(answers.left(start, stop), pair_of)
 
         run_chunks(task, n_poses, budget=budget, first_chunk=8, workers=workers, progress=progress)
-    parts = (relations, *([] if witness_list is None else [witness_list]), *([details] if detail else []))
-    result: Any = parts if len(parts) > 1 else relations
+    codes = relations.view(PoseRelations)
+    parts = (codes, *([] if witness_list is None else [witness_list]), *([details] if detail else []))
+    result: Any = parts if len(parts) > 1 else parts[0]
     if not report:
         return result
     return result, one_pair.accuracy_of(n_poses, 0, answers.works, "+".join(sorted({first.type, second.type})))
 
 
-_ALONE = [np.array([relation], np.int8) for relation in RELATIONS]
+_ALONE = [np.array([relation], np.int8).view(PoseRelations) for relation in RELATIONS]
 
 
 def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) -> Collision:
@@ -172,6 +212,8 @@ def as_poses(
 ) -> tuple[FloatArray, FloatArray]:
     """Return checked rotations (n, d, d) and translations (n, d), read-only."""
     if translations is None:
+        if type(rotations) is Poses and rotations.dimension == dimension:
+            return rotations.rotations, rotations.translations
         rotations, translations = as_pose_arrays(rotations, dimension)
     turn: Any = rotations
     move: Any = translations
@@ -180,20 +222,7 @@ def as_poses(
         if isfinite(sum(move[0].tolist())) and is_certified_rotation(turn):
             return turn, move
     turns, moves = as_floats(rotations, 3, ("rotations",)), as_floats(translations, 2, ("translations",))
-    if len(turns) and turns.shape[1:] != (dimension, dimension):
-        raise WrongDimensionError(
-            f"rotations must have shape (n, {dimension}, {dimension}), got {turns.shape}", ("rotations",)
-        )
-    if len(moves) and moves.shape[1] != dimension:
-        raise WrongDimensionError(
-            f"translations must have shape (n, {dimension}), got {moves.shape}", ("translations",)
-        )
-    if len(turns) != len(moves):
-        raise InvalidArrayError(
-            f"rotations and translations must be equally many, got {len(turns)} and {len(moves)}", ("translations",)
-        )
-    if len(turns):
-        check_rotations(turns, workers=workers)
+    turns, moves = check_pose_arrays(turns, moves, dimension)
     return read_only(turns), read_only(moves)
 
 

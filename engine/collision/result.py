@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.columns import ByValue
@@ -77,6 +79,11 @@ class Collision:
     witness: Witness | None = None
     detail: Rcc8 | None = None
 
+    def __repr__(self) -> str:
+        w, parts = self.witness, [self.relation.label]
+        parts += [] if w is None else [" ".join([w.kind, *(str(f) for f in (w.first_face, w.second_face) if f >= 0)])]
+        return f"<Collision: {', '.join(parts + ([] if self.detail is None else [self.detail.label]))}>"
+
     @property
     def collides(self) -> bool:
         """Whether the bodies have a common point; so is the result itself, as a condition."""
@@ -97,6 +104,16 @@ class Collision:
         if w is not None:
             w = Witness(w.kind, w.second_face, w.first_face, _SWAPPED[w.containing], w.piercing)
         return Collision(SWAPPED_RELATION.get(self.relation, self.relation), w, detail)
+
+
+class PoseRelations(np.ndarray[Any, np.dtype[np.int8]]):
+    """An array of codes of `Relation`, one a pose."""
+
+    @property
+    def first_contact(self) -> int | None:
+        """The number of the first pose in which the bodies meet, None if they never do."""
+        met = np.flatnonzero(np.asarray(self) != Relation.DISJOINT)
+        return int(met[0]) if len(met) else None
 
 
 FACES = {3: ("mesh", "box"), 2: ("outline", "box")}
@@ -186,7 +203,7 @@ class Feature(NamedTuple):
     indices: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Clearance(ByValue):
     """How far apart two bodies are.
 
@@ -203,3 +220,7 @@ class Clearance(ByValue):
     distance: float
     points: FloatArray | None = None
     features: tuple[Feature, Feature] | None = None
+
+    def __repr__(self) -> str:
+        named = [" ".join(map(str, (each.kind, *each.indices))) for each in self.features or ()]
+        return f"<Clearance: {', '.join([repr(float(self.distance)), ' to '.join(named)][: 1 + bool(named)])}>"

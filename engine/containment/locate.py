@@ -21,6 +21,7 @@ from engine.containment.policy import Choice, choose_for_mesh, choose_for_rings
 from engine.errors import NotFiniteError
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
+from engine.solids.accepted import PointsLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import DOUBLE, as_points, check_finite, plain_floats
 from engine.solids.mesh import Polyhedron
@@ -43,8 +44,11 @@ Located: TypeAlias = tuple[Int8Array, int, int, str]
 """
 
 
-def locate_small_batch(points: object, solid: Solid) -> Located | None:
-    """Locate a small batch on the fast path; None where the general path must be taken. Raises as `locate` does."""
+def locate_small_batch(points: object, solid: object) -> Located | None:
+    """Locate a small batch on the fast path; return None if the caller must use the general path.
+
+    Raises as `locate` does.
+    """
     if not isinstance(solid, Solid):
         return None
     array: Any = points
@@ -120,15 +124,15 @@ def _cached_plan(solid: Solid, key: str, locator: Locator) -> Plan | None:
 
 @overload
 def locate(
-    points: object, solid: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
+    points: PointsLike, solid: SolidLike, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> Int8Array: ...
 @overload
 def locate(
-    points: object, solid: Solid, *, report: Literal[True], **options: Unpack[Options]
+    points: PointsLike, solid: SolidLike, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[Int8Array, Accuracy]: ...
 def locate(
-    points: object,
-    solid: Solid,
+    points: PointsLike,
+    solid: SolidLike,
     *,
     workers: int | None = None,
     deadline: float | None = None,
@@ -229,15 +233,15 @@ def locate(
 
 @overload
 def contains(
-    points: object, solid: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
+    points: PointsLike, solid: SolidLike, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> BoolArray: ...
 @overload
 def contains(
-    points: object, solid: Solid, *, report: Literal[True], **options: Unpack[Options]
+    points: PointsLike, solid: SolidLike, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[BoolArray, Accuracy]: ...
 def contains(
-    points: object,
-    solid: Solid,
+    points: PointsLike,
+    solid: SolidLike,
     *,
     workers: int | None = None,
     deadline: float | None = None,

@@ -18,6 +18,7 @@ from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, run_chunks
+from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.pose import Pose
@@ -29,24 +30,24 @@ class ClearanceOptions(Options, total=False):
     """Keyword arguments of `clearance`, except `report`, which changes the return type."""
 
     at_least: float | None
-    first_pose: Pose | None
-    second_pose: Pose | None
+    first_pose: PoseLike | None
+    second_pose: PoseLike | None
 
 
 @overload
 def clearance(
-    first: Solid, second: Solid, *, report: Literal[False] = False, **options: Unpack[ClearanceOptions]
+    first: SolidLike, second: SolidLike, *, report: Literal[False] = False, **options: Unpack[ClearanceOptions]
 ) -> Clearance | bool: ...
 @overload
 def clearance(
-    first: Solid, second: Solid, *, report: Literal[True], **options: Unpack[ClearanceOptions]
+    first: SolidLike, second: SolidLike, *, report: Literal[True], **options: Unpack[ClearanceOptions]
 ) -> tuple[Clearance | bool, Accuracy]: ...
 def clearance(
-    first: Solid,
-    second: Solid,
+    first: SolidLike,
+    second: SolidLike,
     *,
-    first_pose: Pose | None = None,
-    second_pose: Pose | None = None,
+    first_pose: PoseLike | None = None,
+    second_pose: PoseLike | None = None,
     at_least: float | None = None,
     workers: int | None = None,
     deadline: float | None = None,
@@ -189,9 +190,9 @@ def has_plane(first: Solid, second: Solid) -> bool:
 
 
 def clearance_poses(
-    first: Solid,
-    second: Solid,
-    rotations: object,
+    first: SolidLike,
+    second: SolidLike,
+    rotations: PosesLike,
     translations: object = None,
     *,
     at_least: float | None = None,

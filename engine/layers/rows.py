@@ -31,6 +31,7 @@ from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, concatenate_touching, touching
 from engine.running.budget import Budget, Cancel
 from engine.scenes.locate_scene import locate_scene
+from engine.solids.accepted import PointsLike
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings, summed
@@ -351,10 +352,12 @@ def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
     )  # fmt: skip
 
 
-def locate_points_in_layer(points: object, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return (point, feature, on boundary) arrays (n,) for all pairs where the feature contains the point, sorted by
-    point, feature. A feature with overlapping parts contains what one of its parts contains; a point on the boundary of
-    some parts, in the interior of none, is on the feature's boundary unless it is inside the union of the parts."""
+def locate_points_in_layer(points: PointsLike, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
+    """Return points and the features that contain them, by point, then feature; and whether on their boundary.
+
+    A feature with overlapping parts contains what one of its parts contains; a point on the boundary of some parts, in
+    the interior of none, is on the feature's unless it is inside their union.
+    """
     there = np.flatnonzero(layer.arrays.sizes())
     solids = [*PolygonSelection(layer.arrays, there), *PolygonSelection(layer.parts, np.arange(len(layer.owners)))]
     hits = limits.record(locate_scene(points, solids, **limits.options()))

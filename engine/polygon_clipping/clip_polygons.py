@@ -21,10 +21,12 @@ from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import largest_of, scaled_back
 from engine.running.budget import UNLIMITED, Budget, Cancel
-from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
+from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
+from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready
 from engine.solids.geometries import geometry_of
+from engine.solids.pictures import Pictured
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import Ragged, summed
 from engine.solids.shapes import as_solid, as_solids
@@ -40,7 +42,7 @@ class PolygonStatus(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class ClippedPolygons(Ragged):
+class ClippedPolygons(Pictured, Ragged):
     """What is left of a batch of polygons, polygon by polygon, ring by ring.
 
     Attributes
@@ -72,6 +74,13 @@ class ClippedPolygons(Ragged):
     def __len__(self) -> int:
         return len(self.status)
 
+    @property
+    def __geo_interface__(self) -> dict[str, Any]:
+        """What is left as a GeoJSON MultiPolygon, of each polygon its rings, closed; bridges stay."""
+        left = (self.rings(k) for k in range(len(self)))
+        parts = [[[*ring.tolist(), ring[0].tolist()] for ring in rings] for rings in left if rings]
+        return {"type": "MultiPolygon", "coordinates": parts}
+
     def rings(self, polygon: int) -> list[FloatArray]:
         """Return the rings left of one polygon.
 
@@ -94,22 +103,23 @@ _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
 """Number of coordinates that are clipped faster than a batch is planned."""
 _USUAL: Final = (2.0**-100, 2.0**120)
-"""Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
-root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does."""
-Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any]
+"""Range of the sum of squares of few coordinates in which nothing is scaled: the largest coordinate lies between the
+root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does.
+"""
+Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any] | SolidsLike
 
 
 @overload
 def clip_polygons(
-    polygons: Polygons, region: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
+    polygons: Polygons, region: SolidLike, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> ClippedPolygons: ...
 @overload
 def clip_polygons(
-    polygons: Polygons, region: Solid, *, report: Literal[True], **options: Unpack[Options]
+    polygons: Polygons, region: SolidLike, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[ClippedPolygons, Accuracy]: ...
 def clip_polygons(
     polygons: Polygons,
-    region: Solid,
+    region: SolidLike,
     *,
     workers: int | None = None,
     deadline: float | None = None,

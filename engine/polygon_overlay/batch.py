@@ -36,6 +36,7 @@ from engine.polygon_overlay.rounds import ValidPairs, make_pairs_valid
 from engine.polygon_overlay.run import SELECTED_ARRAYS, Operation, as_overlay, rebuild_from_rounded_rings, run_kernel
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
+from engine.solids.accepted import SolidsLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets
 from engine.solids.polygon import Polygon
@@ -203,8 +204,8 @@ def _polygon_arrays(solids: Sequence[Solid]) -> PolygonArrays:
 
 
 def overlay_batch(
-    subjects: Sequence[Solid],
-    clips: Sequence[Solid],
+    subjects: SolidsLike,
+    clips: SolidsLike,
     operation: Operation = "intersection",
     *,
     workers: int | None = None,

@@ -42,6 +42,7 @@ from engine.polygon_overlay.run import (
 )
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Progress, check_options, is_unlimited
+from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
@@ -51,8 +52,8 @@ from engine.types import Accuracy, IntArray
 
 @overload
 def overlay(
-    subject: Solid,
-    clip: Solid,
+    subject: SolidLike,
+    clip: SolidLike,
     operation: Operation = ...,
     *,
     report: Literal[False] = False,
@@ -60,11 +61,16 @@ def overlay(
 ) -> Overlay: ...
 @overload
 def overlay(
-    subject: Solid, clip: Solid, operation: Operation = ..., *, report: Literal[True], **options: Unpack[OverlayOptions]
+    subject: SolidLike,
+    clip: SolidLike,
+    operation: Operation = ...,
+    *,
+    report: Literal[True],
+    **options: Unpack[OverlayOptions],
 ) -> tuple[Overlay, Accuracy]: ...
 def overlay(
-    subject: Solid,
-    clip: Solid,
+    subject: SolidLike,
+    clip: SolidLike,
     operation: Operation = "intersection",
     *,
     grid: float | None = None,
@@ -164,8 +170,8 @@ def check_operation(operation: str) -> None:
         )
 
 
-def polygons_in(solids: Sequence[Solid], name: str) -> Sequence[Solid]:
-    """Return polygons, other shapes read; raise for anything that is no polygon, naming its index."""
+def polygons_in(solids: SolidsLike, name: str) -> Sequence[Solid]:
+    """Return polygons as they are, other shapes read; refuse anything else, by its place."""
     read = as_solids(solids, name)
     if set(map(type, read)) - {Polygon}:
         for k, each in enumerate(read):
@@ -233,14 +239,14 @@ _RULES: Final = {"non_zero": Rule.NON_ZERO, "positive": Rule.POSITIVE, "negative
 
 @overload
 def union_all(
-    polygons: Sequence[Solid], *, report: Literal[False] = False, **options: Unpack[OverlayOptions]
+    polygons: SolidsLike, *, report: Literal[False] = False, **options: Unpack[OverlayOptions]
 ) -> Overlay: ...
 @overload
 def union_all(
-    polygons: Sequence[Solid], *, report: Literal[True], **options: Unpack[OverlayOptions]
+    polygons: SolidsLike, *, report: Literal[True], **options: Unpack[OverlayOptions]
 ) -> tuple[Overlay, Accuracy]: ...
 def union_all(
-    polygons: Sequence[Solid],
+    polygons: SolidsLike,
     *,
     grid: float | None = None,
     workers: int | None = None,
@@ -358,7 +364,7 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
 
 
 def _arrange_all(
-    polygons: Sequence[Solid], rule: Rule, budget: Budget, grid: float | None = None
+    polygons: SolidsLike, rule: Rule, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
     """Return the overlay of the rings of all polygons by a fill rule, each polygon a source."""
     rings, sources, starts = _rings_of_all(polygons)
@@ -368,9 +374,11 @@ def _arrange_all(
     return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
 
 
-def _rings_of_all(polygons: Sequence[Solid]) -> tuple[RingArrays, IntArray, IntArray]:
-    """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of each polygon but the
-    first. Polygons without rings have no number, so that the number of a ring is at least that of its polygon."""
+def _rings_of_all(polygons: SolidsLike) -> tuple[RingArrays, IntArray, IntArray]:
+    """Return the rings of all polygons, by ring the number of its polygon, and the first vertices of all but the first.
+
+    Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
+    """
     each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
     if not each:
         return NO_RINGS, np.zeros(0, np.int64), np.zeros(0, np.int64)

@@ -19,6 +19,7 @@ from engine.running.budget import Budget
 from engine.running.parallel import Options
 from engine.solids.checks import as_nested_offsets
 from engine.solids.columns import ByValue
+from engine.solids.pictures import Pictured
 from engine.solids.ragged import as_geojson
 from engine.types import FloatArray, IntArray
 
@@ -48,6 +49,9 @@ class OverlayPiece(NamedTuple):
 
     shell: FloatArray
     holes: tuple[FloatArray, ...]
+
+    def __repr__(self) -> str:
+        return f"<OverlayPiece: {len(self.shell):,} vertices, {len(self.holes):,} hole{'s' * (len(self.holes) != 1)}>"
 
     @property
     def __geo_interface__(self) -> dict[str, Any]:
@@ -139,7 +143,7 @@ def nearest(value: Fraction) -> float:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Overlay(ByValue):
+class Overlay(Pictured, ByValue):
     """The result of a Boolean operation on polygons.
 
     Attributes

@@ -6,7 +6,7 @@ others as by `clearance_poses`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
@@ -31,9 +31,8 @@ from engine.distance.spreads import SpreadPair, in_space
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
-from engine.solids.base import Solid
+from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.columns import Columns
-from engine.solids.pose import Pose
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
 
 _FEW_PAIRS: Final = 8
@@ -75,8 +74,8 @@ class ScenePairs(Columns):
 
 
 def collide_scene(
-    solids: Sequence[Solid],
-    poses: Sequence[Pose | None] | None = None,
+    solids: SolidsLike,
+    poses: PosesLike | None = None,
     *,
     skip: object = None,
     only: object = None,

@@ -2,40 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal, Unpack, overload
 
 from engine.running.budget import Cancel
 from engine.running.parallel import Options, Progress
 from engine.scenes.locate import SceneLocations
 from engine.scenes.scene import Scene
-from engine.solids.base import Solid
-from engine.solids.pose import Pose
+from engine.solids.accepted import PointsLike, PosesLike, SolidsLike
 from engine.types import Accuracy
 
 
 @overload
 def locate_scene(
-    points: object,
-    solids: Sequence[Solid],
-    poses: Sequence[Pose | None] | None = None,
+    points: PointsLike,
+    solids: SolidsLike,
+    poses: PosesLike | None = None,
     *,
     report: Literal[False] = False,
     **options: Unpack[Options],
 ) -> SceneLocations: ...
 @overload
 def locate_scene(
-    points: object,
-    solids: Sequence[Solid],
-    poses: Sequence[Pose | None] | None = None,
+    points: PointsLike,
+    solids: SolidsLike,
+    poses: PosesLike | None = None,
     *,
     report: Literal[True],
     **options: Unpack[Options],
 ) -> tuple[SceneLocations, Accuracy]: ...
 def locate_scene(
-    points: object,
-    solids: Sequence[Solid],
-    poses: Sequence[Pose | None] | None = None,
+    points: PointsLike,
+    solids: SolidsLike,
+    poses: PosesLike | None = None,
     *,
     workers: int | None = None,
     deadline: float | None = None,

@@ -27,9 +27,11 @@ from engine.scenes.ends import ScenePieces, merge_parts, sort_pieces
 from engine.scenes.locate import SceneLocations, locate_all
 from engine.scenes.placements import Placements
 from engine.segment_clipping.exact_pieces import ONE, ZERO
+from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.base import Immutable, Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, as_points, shown
 from engine.solids.pose import Pose
+from engine.solids.poses import Poses
 from engine.solids.shapes import as_solid
 from engine.types import Accuracy, BoolArray, FloatArray
 
@@ -74,7 +76,7 @@ class Scene(Immutable):
     type: ClassVar[str] = "scene"
     _placements: Placements
 
-    def __init__(self, solids: Sequence[Solid], poses: Sequence[Pose | None] | None = None) -> None:
+    def __init__(self, solids: SolidsLike, poses: PosesLike | None = None) -> None:
         bodies = Bodies(*checked_bodies(solids, poses))
         object.__setattr__(self, "_placements", Placements(bodies, {}))
 
@@ -392,6 +394,7 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
     solids = tuple(solids)
     if poses is None:
         return solids, (None,) * len(solids)
+    poses = list(poses) if isinstance(poses, Poses) else poses
     if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):
         given = f"{len(poses)}" if isinstance(poses, (list, tuple)) else type(poses).__name__
         raise InvalidArrayError(f"poses must be a list of {len(solids)}, one for each solid, got {given}", ("poses",))

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Unpack, overload
 
 import numpy as np
-import numpy.typing as npt
 
 from engine.predicates.rational import balanced_rows
 from engine.running.budget import UNLIMITED, Budget, Cancel
@@ -17,9 +16,11 @@ from engine.segment_clipping.cohen_sutherland import decide_on_boxes
 from engine.segment_clipping.cyrus_beck import as_columns, decide_on_rows
 from engine.segment_clipping.decide_then_cut import Method, Plan, Scaled, clip_on_convex, scaled
 from engine.segment_clipping.planes_cut import fill_on_boxes, fill_on_rows
+from engine.solids.accepted import LinesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, is_ready
 from engine.solids.columns import Columns
+from engine.solids.pictures import Pictured
 from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, rows_between, rows_of
 from engine.solids.registry import refused, row_of
 from engine.solids.shapes import as_solid
@@ -27,7 +28,7 @@ from engine.types import Accuracy, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SegmentPieces(Columns):
+class SegmentPieces(Pictured, Columns):
     """The pieces of a batch of segments within a region, by source and then by t.
 
     Attributes
@@ -61,19 +62,19 @@ class SegmentPieces(Columns):
 
 @overload
 def clip_segments(
-    segments: npt.ArrayLike, region: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
+    segments: LinesLike, region: SolidLike, *, report: Literal[False] = False, **options: Unpack[Options]
 ) -> SegmentPieces: ...
 
 
 @overload
 def clip_segments(
-    segments: npt.ArrayLike, region: Solid, *, report: Literal[True], **options: Unpack[Options]
+    segments: LinesLike, region: SolidLike, *, report: Literal[True], **options: Unpack[Options]
 ) -> tuple[SegmentPieces, Accuracy]: ...
 
 
 def clip_segments(
-    segments: npt.ArrayLike,
-    region: Solid,
+    segments: LinesLike,
+    region: SolidLike,
     *,
     workers: int | None = None,
     deadline: float | None = None,
@@ -143,7 +144,8 @@ def clip_segments(
         check_options(workers, progress, report=report)
     plan: Plan | None = region.cached("segment_plan") if isinstance(region, Solid) else None
     array: Any = segments
-    if plan is None or not is_ready(array, 2, region.dimension):
+    solid: Any = region  # with a plan, one of ours
+    if plan is None or not is_ready(array, 2, solid.dimension):
         region = as_solid(region, "region")
         plan = plan_for(region)
         array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks at it

@@ -13,15 +13,17 @@ from typing import Any, ClassVar, Final, Literal, Unpack, overload
 import numpy as np
 
 from engine.compiling.jit import entry_of, inline, kernel
-from engine.errors import EngineError
+from engine.errors import EngineError, InvalidInputError
 from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.on_boundary.contacts import are_same
+from engine.segment_clipping.outside import Columns, parts_outside
 from engine.segment_clipping.pieces import Pieces
-from engine.solids.base import Solid
-from engine.solids.checks import as_points
+from engine.solids.accepted import LinesLike, SolidLike
+from engine.solids.checks import as_points, shown
 from engine.solids.geometries import lines_in, note_altitude
+from engine.solids.pictures import Pictured
 from engine.solids.ragged import Ragged, as_lines
 from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
@@ -34,7 +36,7 @@ _PER_BLOCK: Final = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LinePieces(Ragged):
+class LinePieces(Pictured, Ragged):
     """The pieces of a batch of polylines within a region, by source and then along the line.
 
     Attributes
@@ -76,22 +78,29 @@ class LinePieces(Ragged):
         return self.vertices[self.offsets[piece] : self.offsets[piece + 1]]
 
 
+class LineOptions(Options, total=False):
+    """Keyword arguments of `clip_lines`, except `report`, which changes the return type."""
+
+    keep: Literal["inside", "outside"]
+
+
 @overload
 def clip_lines(
-    lines: object, region: Solid, *, report: Literal[False] = False, **options: Unpack[Options]
+    lines: LinesLike, region: SolidLike, *, report: Literal[False] = False, **options: Unpack[LineOptions]
 ) -> LinePieces: ...
 
 
 @overload
 def clip_lines(
-    lines: object, region: Solid, *, report: Literal[True], **options: Unpack[Options]
+    lines: LinesLike, region: SolidLike, *, report: Literal[True], **options: Unpack[LineOptions]
 ) -> tuple[LinePieces, Accuracy]: ...
 
 
 def clip_lines(
-    lines: object,
-    region: Solid,
+    lines: LinesLike,
+    region: SolidLike,
     *,
+    keep: Literal["inside", "outside"] = "inside",
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -108,6 +117,8 @@ def clip_lines(
         no pieces.
     region : Solid
         As for `clip_segments`.
+    keep : {"inside", "outside"}, default "inside"
+        Which parts of the lines: those in the region, or those between, before and after these, ends included.
     workers, deadline, cancel, progress, report
         As for `locate`; progress counts segments.
 
@@ -148,6 +159,8 @@ def clip_lines(
     ([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]], [[0, 1]], [[0.5, 0.5]], [[0, 3]])
     """
     check_options(workers, progress, report=report)
+    if keep not in ("inside", "outside"):
+        raise InvalidInputError(f"keep must be inside or outside, got {shown(keep)}", ("keep",))
     is_free = is_unlimited(workers, deadline, cancel, progress)
     region = as_solid(region, "region")
     plan = plan_for(region)
@@ -166,6 +179,9 @@ def clip_lines(
     with UNLIMITED if is_free and len(firsts) <= plan.few else Budget(deadline, cancel) as budget:
         pieces, n_beyond, n_rational = plan.cut(read_only(segments), region, plan, budget, workers, progress)
         made = _joined(pieces, firsts, vertices, offsets, budget)
+        if keep == "outside":
+            columns = Columns(made.source, made.vertices, made.offsets, made.segments, made.t, made.faces)
+            made = LinePieces(*parts_outside(columns, vertices, offsets))
     return (made, Accuracy("exact", 0.5, len(firsts), n_beyond, n_rational, plan.name)) if report else made
 
 

@@ -15,7 +15,9 @@ from engine.errors import EmptyGeometryError, NotRepresentableError, Unsupported
 from engine.predicates.rational import nearest_float
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
+from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
+from engine.solids.columns import brief
 from engine.solids.mesh import Mesh
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb, Convex, Sphere, Triangle
@@ -41,16 +43,19 @@ class Bounds:
     aabb: Aabb  # the smallest box, each coordinate the nearest double
     sphere: Sphere  # the smallest sphere: centre the nearest double, radius the smallest double that holds the solid
 
+    def __repr__(self) -> str:
+        return brief(f"Bounds({self.aabb!r}, {self.sphere!r})")
+
 
 Reported: TypeAlias = tuple[Bounds, Accuracy]
 
 
 @overload
-def bounds(solid: Solid, *, report: Literal[False] = False, **options: Unpack[Options]) -> Bounds: ...
+def bounds(solid: SolidLike, *, report: Literal[False] = False, **options: Unpack[Options]) -> Bounds: ...
 @overload
-def bounds(solid: Solid, *, report: Literal[True], **options: Unpack[Options]) -> tuple[Bounds, Accuracy]: ...
+def bounds(solid: SolidLike, *, report: Literal[True], **options: Unpack[Options]) -> tuple[Bounds, Accuracy]: ...
 def bounds(
-    solid: Solid,
+    solid: SolidLike,
     *,
     workers: int | None = None,
     deadline: float | None = None,

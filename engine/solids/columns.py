@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, ClassVar, cast
+from html import escape
+from typing import Any, ClassVar, Final, cast
 
 import numpy as np
+
+_LONGEST: Final = 120
+_SHOWN: Final = 10
+"""Rows that a notebook shows."""
 
 
 class ByValue:
@@ -64,6 +69,18 @@ class Columns(ByValue):
         """
         import pandas
 
+        return pandas.DataFrame(self._by_row())
+
+    def _repr_html_(self) -> str:
+        """Return the table that notebooks show: the first rows."""
+        columns = {name: list(column[:_SHOWN]) for name, column in self._by_row().items()}
+        rows = [[*columns], *zip(*columns.values())] if columns else []
+        cells = ("".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows)
+        more = f"<p>{escape(repr(self)[1:-1])}</p>"
+        return f"<table>{''.join(f'<tr>{each}</tr>' for each in cells)}</table>{more}"
+
+    def _by_row(self) -> dict[str, Any]:
+        """Return the columns that have a number, or several, a row."""
         columns: dict[str, Any] = {}
         for name, value in self._columns().items():
             if name in self._not_rows or name in getattr(self, "_levels", ()):
@@ -72,7 +89,12 @@ class Columns(ByValue):
                 columns |= {f"{name}_{k}": value[:, k] for k in range(value.shape[1])}
             elif value is not None and len(value) == len(self):
                 columns[name] = value
-        return pandas.DataFrame(columns)
+        return columns
+
+
+def brief(text: str) -> str:
+    """Return a repr in at most 120 characters."""
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]}...)"
 
 
 def are_equal(first: Any, second: Any) -> bool:

@@ -28,6 +28,7 @@ from engine.solids.base import Solid
 from engine.solids.checks import as_nested_offsets, as_points, check_not_empty, digits, frozen, shown
 from engine.solids.ear_cutting import cut_faces
 from engine.solids.mesh_checks import check_topology
+from engine.solids.pictures import svg_of_mesh
 from engine.types import FloatArray, IntArray, read_only
 
 _BLOCK: Final = 1 << 15
@@ -126,6 +127,9 @@ class Mesh(Solid):
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self.vertices)} vertices, {self.n_faces} faces)"
+
+    def _repr_svg_(self) -> str:
+        return svg_of_mesh(self.vertices, self.triangles)
 
 
 def as_faces(faces: object, n_vertices: int) -> tuple[IntArray | None, IntArray]:

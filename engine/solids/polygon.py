@@ -12,6 +12,7 @@ from engine.errors import InvalidArrayError, RingTooShortError
 from engine.running.budget import Budget, Cancel
 from engine.solids.base import Solid, T
 from engine.solids.checks import as_nested_offsets, as_points, check_finite, check_not_empty, frozen, is_ready
+from engine.solids.pictures import Pictured, svg_of
 from engine.types import FloatArray, IntArray
 
 _NO_VERTICES = np.zeros((0, 2))
@@ -19,7 +20,7 @@ _LEAST: Final = 3
 """Least number of vertices of a ring in `Polygon.vertices`, for kernels."""
 
 
-class Polygon(Solid):
+class Polygon(Pictured, Solid):
     """All points from which a ray crosses the rings an odd number of times, and the rings themselves; 2D.
 
     Parameters
@@ -122,6 +123,11 @@ class Polygon(Solid):
     def __geo_interface__(self) -> dict[str, Any]:
         """The polygon as GeoJSON: valid shells with their holes; crossing rings are resolved."""
         return Polygon.geojson[1](self)
+
+    def _repr_svg_(self) -> str:
+        """Return the picture that notebooks show: the rings as given, even-odd."""
+        rings = np.split(self.vertices, self.ring_offsets[1:-1]) if self.n_rings else []
+        return svg_of({"type": "Polygon", "coordinates": rings})
 
     def __repr__(self) -> str:
         return f"Polygon({self.n_rings} rings, {len(self.vertices)} vertices)"

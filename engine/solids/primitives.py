@@ -9,6 +9,7 @@ import numpy as np
 from engine.errors import InvalidArrayError, MinAboveMaxError, NegativeRadiusError, ZeroNormalError
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, as_number, as_vector, check_dimension, check_not_empty, digits, frozen
+from engine.solids.columns import brief
 from engine.types import FloatArray, IntArray, read_only
 
 
@@ -56,7 +57,7 @@ class HalfSpace(Solid):
         self._set(dimension=len(vector), normal=vector, offset=number, row=row)
 
     def __repr__(self) -> str:
-        return f"HalfSpace(normal={digits(self.normal)}, offset={self.offset!r})"
+        return brief(f"HalfSpace(normal={digits(self.normal)}, offset={self.offset!r})")
 
 
 class Sphere(Solid):
@@ -99,7 +100,7 @@ class Sphere(Solid):
         self._set(dimension=len(vector), center=vector, radius=number)
 
     def __repr__(self) -> str:
-        return f"Sphere(center={digits(self.center)}, radius={self.radius!r})"
+        return brief(f"Sphere(center={digits(self.center)}, radius={self.radius!r})")
 
 
 class Aabb(Solid):
@@ -150,7 +151,7 @@ class Aabb(Solid):
         return rows_between(self.min, self.max)
 
     def __repr__(self) -> str:
-        return f"Aabb(min={digits(self.min)}, max={digits(self.max)})"
+        return brief(f"Aabb(min={digits(self.min)}, max={digits(self.max)})")
 
 
 def rows_between(low: FloatArray, high: FloatArray) -> FloatArray:
@@ -254,4 +255,4 @@ class Triangle(Solid):
         self._set(dimension=points.shape[1], vertices=frozen(points))
 
     def __repr__(self) -> str:
-        return f"Triangle({digits(self.vertices)})"
+        return brief(f"Triangle({digits(self.vertices)})")

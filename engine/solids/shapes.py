@@ -1,4 +1,4 @@
-"""Solids, positions and poses from what people hold: GeoJSON, geometries and meshes of other packages, plain arrays.
+"""Solids and positions from what people hold: GeoJSON, geometries and meshes of other packages, plain arrays.
 
 Other packages are recognised by the attributes that their objects have; none is imported. Nothing is repaired: what a
 constructor of `engine.solids` refuses is refused here with the same error.
@@ -10,24 +10,23 @@ constructor of `engine.solids` refuses is refused here with the same error.
 | a pair (vertices (n, 3), faces (m, k)) | Polyhedron |
 | positions (n, 2), or a list of rings | Polygon |
 | GeoJSON Point, MultiPoint, LineString, MultiLineString and collections of one of these kinds | positions, lines |
-| a matrix (d + 1, d + 1), a pair (rotation, translation), an object with `as_matrix` (scipy's Rotation) | Pose |
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError, WrongDimensionError
+from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.checks import Where, as_points, shown, spell
 from engine.solids.geometries import MEMBERS, as_list, coordinates_of, geometries_in, geometry_of, note_altitude
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
-from engine.solids.pose import Pose
+from engine.solids.poses import axes_of
 from engine.types import FloatArray
 
 _TAKEN: Final = (
@@ -170,83 +169,12 @@ def _from_arrays(value: Any) -> Solid | None:
     if (
         isinstance(value, tuple)
         and len(value) == 2
-        and _axes(value[0]) == 2
+        and axes_of(value[0]) == 2
         and len(value[0])
         and len(value[0][0]) == 3
     ):
         return Polyhedron(value[0], value[1])
-    axes = _axes(value)
+    axes = axes_of(value)
     if axes == 2:
         return Polygon([value])
     return Polygon(value if isinstance(value, (list, tuple)) else list(value)) if axes == 3 else None
-
-
-def _axes(value: Any) -> int:
-    """Return how many axes an array has, or lists within lists as their first items have; 0 for anything else."""
-    if isinstance(value, np.ndarray):
-        return value.ndim
-    axes = 0
-    while isinstance(value, (list, tuple, np.ndarray)) and axes < 4:
-        if isinstance(value, np.ndarray):
-            return axes + value.ndim
-        axes += 1
-        if not value:
-            break
-        value = value[0]
-    return axes
-
-
-def as_pose(value: object, dimension: int, *where: str | int) -> Pose:
-    """Return a pose as it is, and a matrix, a pair (rotation, translation) or a rotation of scipy as one.
-
-    where: the path of the argument, for errors. Raises: InvalidArrayError for anything else, and as `Pose`.
-    """
-    if isinstance(value, Pose):
-        return value
-    given: Any = value
-    try:
-        if hasattr(given, "as_matrix"):
-            matrix = np.asarray(given.as_matrix())
-            return Pose.from_matrix(matrix) if matrix.shape == (4, 4) else Pose(matrix, np.zeros(len(matrix)))
-        if isinstance(given, (list, tuple)) and len(given) == 2 and _axes(given[0]) == 2:
-            return Pose(*given)
-        if _axes(given) == 2 and len(given) == dimension + 1:
-            return Pose.from_matrix(given)
-    except EngineError as error:
-        raise error.at(*where) from None
-    except Exception as error:  # a caller's as_matrix
-        raise InvalidArrayError(
-            f"{spell(where)} gives no matrix: {type(error).__name__}: {error!s:.100}", where
-        ) from error
-    raise InvalidArrayError(
-        f"{spell(where)} must be a Pose, a matrix ({dimension + 1}, {dimension + 1}) or (rotation, translation), "
-        f"got {shown(value)}",
-        where,
-    )
-
-
-def as_pose_arrays(poses: Any, dimension: int) -> tuple[FloatArray, FloatArray]:
-    """Return rotations (n, d, d) and translations (n, d) of poses: a list of them, or matrices (n, d + 1, d + 1)."""
-    if isinstance(poses, np.ndarray) and poses.ndim == 3 and poses.shape[1:] == (dimension + 1, dimension + 1):
-        last = np.append(np.zeros(dimension), 1.0)
-        if len(odd := np.flatnonzero((poses[:, -1] != last).any(axis=1))):
-            as_pose(poses[odd[0]], dimension, "poses", int(odd[0]))  # says what is wrong
-        return poses[:, :-1, :-1], poses[:, :-1, -1]
-    if not isinstance(poses, Iterable) or isinstance(poses, (str, bytes)):
-        raise InvalidArrayError(
-            f"poses must be a list of poses or an array of matrices, got {shown(poses)}", ("poses",)
-        )
-    try:
-        items = list(poses)
-    except Exception as error:  # a single rotation of scipy, a caller's generator
-        raise InvalidArrayError(
-            f"poses cannot be listed: {type(error).__name__}: {error!s:.100}", ("poses",)
-        ) from error
-    made = [as_pose(each, dimension, "poses", number) for number, each in enumerate(items)]
-    for number, each in enumerate(made):
-        if each.dimension != dimension:
-            raise WrongDimensionError(
-                f"poses[{number}] has dimension {each.dimension}, the solid it moves has {dimension}", ("poses", number)
-            )
-    turns = np.array([each.rotation for each in made]).reshape(-1, dimension, dimension)
-    return turns, np.array([each.translation for each in made]).reshape(-1, dimension)

@@ -143,7 +143,8 @@ def clip_lines(question: ClipLinesRequest, call: CallOf) -> ClipLinesResponse:
     """Return the parts of each polyline that lie in the region; what is connected there stays in one piece."""
     region = questions.to_solid(question.region, call, ("region",))
     lines = questions.to_items(question.lines, region.dimension, call)
-    return answers.from_line_pieces(*call.compute(engine.clip_lines, lines if len(lines) else [], region))
+    lines = lines if len(lines) else []
+    return answers.from_line_pieces(*call.compute(engine.clip_lines, lines, region, keep=question.keep or "inside"))
 
 
 @router.post("/v1/clip/polygons", operation_id="clip_polygons", tags=["clipping"])

@@ -49,7 +49,8 @@ class ClipLinesRequest(Schema):
         {
             "region": {"type": "aabb", "min": [0, 0], "max": [2, 2]},
             "lines": [[[-1, 1], [1, 1], [1, 3]], [[5, 5], [6, 6]]],
-        }
+        },
+        {"region": {"type": "aabb", "min": [0, 0], "max": [2, 2]}, "lines": [[[-1, 1], [3, 1]]], "keep": "outside"},
     )
 
     region: Solid = Field(description="half_space, aabb, convex, sphere, polygon or polyhedron.")
@@ -57,6 +58,9 @@ class ClipLinesRequest(Schema):
         Field(
             description="Two positions or more each. Or GeoJSON: LineString, MultiLineString, or a collection of these."
         )
+    )
+    keep: Literal["inside", "outside"] = optional(
+        "Which parts: those in the region, if left out, or those between, before and after these, ends included."
     )
 
 

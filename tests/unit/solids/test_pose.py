@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.solids.pose import check_rotations
+from engine.solids.rotations import check_rotations
 
 
 def random_rotations(n: int, dimension: int = 3) -> np.ndarray:
