@@ -35,6 +35,7 @@ from engine.errors import (
     WrongDimensionError,
     ZeroNormalError,
 )
+from engine.files.layers import read_layer
 from engine.files.meshes import read_mesh
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
@@ -79,8 +80,8 @@ __all__ = [
     "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
     "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
     "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
-    "contains", "filled", "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons", "read_mesh",
-    "release", "solid_types", "union_all", "warm",
+    "contains", "filled", "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons", "read_layer",
+    "read_mesh", "release", "solid_types", "union_all", "warm",
 ]  # fmt: skip
 
 

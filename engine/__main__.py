@@ -32,6 +32,7 @@ from engine.compiling.kernel_cache import cache_folder, check_owner, seal
 from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
 from engine.errors import EngineError, InvalidInputError
+from engine.files.octets import in_words
 from engine.files.solids import read_features, read_rows, read_solid, read_solids, write_geojson, write_table
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
@@ -61,7 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has seen enough
         sys.stderr.close()
         return 0
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        return _refused(f"{error.filename}: {in_words(error)}" if error.filename else str(error))
+    except ValueError as error:
         return _refused(str(error))
     return 0
 
@@ -240,7 +243,7 @@ FORMATS: Final = "mesh file (.stl, .obj, .ply, .off, .glb), .npz, .json, .geojso
 SOLID: Final = {"solid": FORMATS}
 POSES: Final = "file with rows [R | t], the poses of the second: 12 numbers in 3D, 6 in 2D; the identity by default"
 PAIR: Final = {"first": FORMATS, "second": FORMATS, "--poses": POSES}
-LAYER: Final = ".geojson file of polygons"
+LAYER: Final = "layer of polygons: .geojson, or what geopandas reads (extra geo)"
 ATTRIBUTES: Final = "; properties and ids are copied"
 ROWS: Final = ".npy, .csv or .geojson file with rows of "
 COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str | None]]]] = {

@@ -38,8 +38,8 @@ def context() -> Any:
 
 def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -> Any:
     """Return the result of `engine.read_mesh`; `invalid_mesh` if the file cannot be read, in time or at all."""
-    if kind in ("glb", "ply") and find_spec("trimesh") is None:
-        raise ServiceError("not_installed", f"this service reads no {kind} files; send .stl, .obj or .off")
+    if kind == "glb" and find_spec("trimesh") is None:
+        raise ServiceError("not_installed", f"this service reads no {kind} files; send .stl, .obj, .off or .ply")
     around = context()
     mine, theirs = around.Pipe(duplex=False)
     room = _ROOM + _FOOTPRINT * len(octets)

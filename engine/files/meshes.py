@@ -1,19 +1,19 @@
-"""Meshes from files: STL, OBJ and OFF by the readers here, PLY and GLB through trimesh (extra ``formats``)."""
+"""Meshes from files: STL, OBJ, OFF and PLY by readers of our own, GLB through trimesh (extra ``formats``)."""
 
 from __future__ import annotations
 
 import io
 import logging
-import os
 import re
 from collections.abc import Callable
 from importlib import import_module
-from pathlib import Path
 from typing import IO, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
 from engine.errors import EmptyGeometryError, FaceNotSimpleError, IndexOutOfRangeError, InvalidInputError
+from engine.files.octets import File, read_octets
+from engine.files.ply import read_ply
 from engine.running.budget import UNLIMITED
 from engine.solids.checks import as_points, frozen, shown
 from engine.solids.ear_cutting import cut_faces
@@ -23,7 +23,7 @@ from engine.types import FloatArray, IntArray
 FORMATS: Final = ("stl", "obj", "ply", "off", "glb")
 _SOUPS: Final = ("stl",)
 """Formats of triangles without numbers of vertices."""
-_BY_TRIMESH: Final = ("ply", "glb")
+_BY_TRIMESH: Final = ("glb",)
 _STL_HEAD: Final = 84
 _STL_TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 _STL_NAME: Final = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.MULTILINE | re.IGNORECASE)
@@ -78,7 +78,7 @@ class MeshOfFile(_Arrays):
         return f"face {number // 3}, corner {number % 3}" if self._is_soup else f"vertices[{number}]"
 
 
-def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str | None = None) -> MeshOfFile:
+def read_mesh(file: File, file_format: str | None = None) -> MeshOfFile:
     r"""Return the vertices and the triangles of a mesh file, for `Polyhedron` or `Surface`, which check them.
 
     Parameters
@@ -86,7 +86,7 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
     file : path, file object or bytes
         A path as a string or `pathlib.Path`; or open for reading bytes, or the bytes.
     file_format : {"stl", "obj", "ply", "off", "glb"}, optional
-        By default that of the path's ending, else told by the first bytes. ply and glb need trimesh (extra `formats`).
+        By default that of the path's ending, else told by the first bytes. glb needs trimesh (extra `formats`).
 
     Returns
     -------
@@ -121,7 +121,7 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
 
     References
     ----------
-    trimesh reads PLY and GLB; the STL format is that of 3D Systems, 1989.
+    trimesh reads GLB; the STL format is that of 3D Systems, 1989, PLY that of G. Turk, 1994.
 
     Examples
     --------
@@ -131,30 +131,9 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
     >>> vertices.shape, faces.shape
     ((4, 3), (4, 3))
     """
-    if isinstance(file, (str, os.PathLike)):
-        path = Path(file)
-        try:
-            octets = path.read_bytes()
-        except OSError as error:
-            raise InvalidInputError(f"{path}: {error.strerror or error}", ("file",)) from None
-        except ValueError as error:  # NUL, a lone surrogate
-            raise InvalidInputError(f"{shown(str(file))} is no path: {error}", ("file",)) from None
-        suffix = path.suffix.lower().removeprefix(".")
-        return read_mesh(octets, suffix if file_format is None and suffix in FORMATS else file_format)
-    if isinstance(file, (bytes, bytearray, memoryview)):
-        file = io.BytesIO(file)
-    if not callable(getattr(file, "read", None)):
-        raise InvalidInputError(f"file must be a path, open for reading bytes, or bytes, got {shown(file)}", ("file",))
+    octets, suffix = read_octets(file)
     if file_format is None:
-        try:
-            octets = file.read()
-        except Exception as error:  # whatever a caller's object raises
-            raise InvalidInputError(
-                f"the file cannot be read: {type(error).__name__}: {error!s:.200}", ("file",)
-            ) from error
-        if not isinstance(octets, bytes):
-            raise InvalidInputError(f"file must be open for reading bytes, it gives {type(octets).__name__}", ("file",))
-        return read_mesh(octets, _format_of(octets))
+        file_format = suffix if suffix in FORMATS else _format_of(octets)
     if not isinstance(file_format, str) or file_format not in FORMATS:
         raise InvalidInputError(f"format must be one of {', '.join(FORMATS)}, got {shown(file_format)}", ("format",))
     try:
@@ -166,11 +145,11 @@ def read_mesh(file: str | os.PathLike[str] | IO[bytes] | bytes, file_format: str
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # its warnings about repairs that we do not ask for
     try:
         if file_format in _READERS:
-            vertices, faces = _READERS[file_format](file)
+            vertices, faces = _READERS[file_format](io.BytesIO(octets))
         elif trimesh is not None:
             with np.errstate(all="ignore"):
                 scene = trimesh.load_scene(
-                    file, file_type=file_format, process=False, maintain_order=True, skip_materials=True
+                    io.BytesIO(octets), file_type=file_format, process=False, maintain_order=True, skip_materials=True
                 )
                 mesh = scene.to_mesh()
                 vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
@@ -256,27 +235,11 @@ def _read_off(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
     return vertices, [row[1 : row[0] + 1] for row in faces]
 
 
-def _read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
-    """Return vertices and faces of a PLY file; trimesh itself would cut them as fans."""
-    from trimesh.exchange.ply import load_ply
-
-    elements = load_ply(file, skip_materials=True)["metadata"]["_ply_raw"]
-    vertices = np.column_stack([elements["vertex"]["data"][axis] for axis in "xyz"]).astype(np.float64)
-    if "face" not in elements or not elements["face"]["length"]:
-        return vertices, []
-    faces = elements["face"]["data"]
-    names = faces if isinstance(faces, dict) else getattr(faces, "dtype", np.dtype(int)).names or ()
-    if len(names):
-        name = next((name for name in ("vertex_index", "vertex_indices") if name in names), next(iter(names)))
-        faces = faces[name] if isinstance(faces, dict) else faces[name]["f1"]
-    return vertices, faces
-
-
 _READERS: Final[dict[str, Callable[[IO[bytes]], tuple[FloatArray, Any]]]] = {
     "obj": _read_obj,
     "off": _read_off,
     "stl": _read_stl,
-    "ply": _read_ply,
+    "ply": read_ply,
 }
 """Formats that are not left to trimesh, which cuts polygons as fans, also those that are not convex."""
 

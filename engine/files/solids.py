@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from engine.errors import InvalidArrayError, InvalidInputError
+from engine.files.layers import collection_in, read_layer
 from engine.files.meshes import FORMATS, read_mesh
+from engine.files.octets import read_text
 from engine.layers.geojson import polygon_of
 from engine.solids.base import Solid
 from engine.solids.mesh import Polyhedron
@@ -43,7 +45,7 @@ def read_rows(source: str, shape: tuple[int, ...]) -> FloatArray:
     elif suffix == ".csv":
         array = _read_csv(path)
     elif suffix in (".json", ".geojson"):
-        array = np.array(_positions(json.loads(path.read_text("utf-8"))))
+        array = np.array(_positions(_parsed(read_text(path), source)))
     else:
         raise InvalidInputError(f"{source}: numbers are read from .npy, .csv or .geojson", ("file",))
     if not array.size:
@@ -58,16 +60,16 @@ def read_rows(source: str, shape: tuple[int, ...]) -> FloatArray:
 
 
 def _read_csv(path: Path) -> FloatArray:
-    with path.open(encoding="utf-8") as file:
-        try:
-            [float(cell) for cell in file.readline().split(",")]
-            header = 0
-        except ValueError:
-            header = 1
-            if not file.readline():
-                return np.zeros((0, 0))
+    lines = read_text(path).splitlines()
     try:
-        return np.loadtxt(path, delimiter=",", skiprows=header, ndmin=2, encoding="utf-8")
+        [float(cell) for cell in lines[0].split(",")] if lines else []
+        header = 0
+    except ValueError:
+        header = 1
+    if len(lines) <= header:
+        return np.zeros((0, 0))
+    try:
+        return np.loadtxt(lines, delimiter=",", skiprows=header, ndmin=2)
     except ValueError as error:
         raise InvalidArrayError(f"{path}: {error}", ("file",)) from None
 
@@ -149,8 +151,7 @@ def read_solids(source: str, note: Note | None = None) -> list[Solid]:
     path = Path(source)
     suffix = path.suffix.lower().removeprefix(".")
     if suffix in FORMATS:
-        with path.open("rb") as file:
-            mesh = read_mesh(file, suffix)
+        mesh = read_mesh(path, suffix)
         if mesh.n_collapsed and note is not None:
             note(f"{source}: {mesh.n_collapsed} triangles have two equal corners and are left out")
         return [mesh.solid()]
@@ -161,7 +162,7 @@ def read_solids(source: str, note: Note | None = None) -> list[Solid]:
                 raise InvalidInputError(f"{source} has no array named {sorted(missing)[0]!r}", ("file",))
             return [Polyhedron(arrays["vertices"], arrays["faces"])]
     if suffix in ("json", "geojson"):
-        return from_json(_parsed(path.read_text("utf-8"), source))
+        return from_json(_parsed(read_text(path), source))
     raise InvalidInputError(
         f"{source}: a solid is read from {', '.join('.' + name for name in FORMATS)}, .npz, .json or .geojson",
         ("file",),
@@ -169,12 +170,10 @@ def read_solids(source: str, note: Note | None = None) -> list[Solid]:
 
 
 def read_features(source: str) -> Any:
-    """Return the FeatureCollection of a GeoJSON file; a single feature or geometry becomes a collection of one."""
-    value = _parsed(source if source.lstrip().startswith("{") else Path(source).read_text("utf-8"), source)
-    if not isinstance(value, dict) or value.get("type") == "FeatureCollection":
-        return value
-    feature = value if value.get("type") == "Feature" else {"type": "Feature", "properties": None, "geometry": value}
-    return {"type": "FeatureCollection", "features": [feature]}
+    """Return the FeatureCollection of a file (`read_layer`), or of GeoJSON itself."""
+    if source.lstrip().startswith("{"):
+        return collection_in(source, "the argument")
+    return read_layer(source)
 
 
 def from_json(value: Any) -> list[Solid]:

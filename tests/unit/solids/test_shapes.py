@@ -10,6 +10,7 @@ import pytest
 
 import engine
 from engine.solids import shapes
+from engine.solids.poses import as_pose
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
 HOLE = [[0.5, 0.5], [0.5, 1.5], [1.5, 1.5], [1.5, 0.5], [0.5, 0.5]]
@@ -203,7 +204,7 @@ MATRIX = np.array([[1.0, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     "held", [STEP, MATRIX, MATRIX.tolist(), (np.eye(3), (1.0, 0, 0)), [np.eye(3).tolist(), [1, 0, 0]]]
 )
 def test_a_pose_from_what_people_hold(held: Any) -> None:
-    assert shapes.as_pose(held, 3, "pose") == STEP
+    assert as_pose(held, 3, "pose") == STEP
     cube = engine.Aabb((0, 0, 0), (1, 1, 1))
     assert engine.collide(cube, cube, second_pose=held).relation == engine.Relation.TOUCHING
     assert engine.clearance(cube, cube, second_pose=held).distance == 0.0
@@ -211,7 +212,7 @@ def test_a_pose_from_what_people_hold(held: Any) -> None:
 
 def test_a_rotation_of_scipy_is_taken() -> None:
     turn = SimpleNamespace(as_matrix=lambda: np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
-    assert shapes.as_pose(turn, 3, "pose").rotation.tolist() == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    assert as_pose(turn, 3, "pose").rotation.tolist() == [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
 
 @pytest.mark.parametrize("many", [[STEP, MATRIX], np.array([MATRIX, MATRIX]), (STEP, STEP)])
