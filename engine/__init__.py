@@ -37,6 +37,7 @@ from engine.errors import (
 )
 from engine.files.layers import read_layer
 from engine.files.meshes import read_mesh
+from engine.inspection.inspect import Inspection, inspect
 from engine.polygon_clipping.clip_polygons import ClippedPolygons, PolygonStatus, clip_polygons
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.compiled.workspace import release
@@ -71,17 +72,17 @@ from engine.warmup import warm
 __all__ = [
     "Aabb", "Accuracy", "Bounds", "Cancel", "CancelledError", "Clearance", "ClippedPolygons", "Collapse", "Collision",
     "Comparison", "Convex", "Csg", "DeadlineExceededError", "EmptyGeometryError", "EngineError", "FaceNotSimpleError",
-    "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError", "IndexOutOfRangeError", "InvalidArrayError",
-    "InvalidInputError", "InvalidOperationError", "InvalidPolynomialError", "LinePieces", "Location",
-    "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
+    "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError", "IndexOutOfRangeError", "Inspection",
+    "InvalidArrayError", "InvalidInputError", "InvalidOperationError", "InvalidPolynomialError", "LinePieces",
+    "Location", "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
     "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece", "PointsLike", "Polygon", "PolygonStatus", "Polyhedron",
     "Pose", "PoseLike", "Poses", "Rcc8", "Relation", "RepeatedIndexError", "RingTooShortError", "Scene",
     "SceneLocations", "ScenePairs", "ScenePieces", "SegmentPieces", "Solid", "SolidLike", "Sphere", "Surface",
     "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
     "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
     "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
-    "contains", "filled", "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons", "read_layer",
-    "read_mesh", "release", "solid_types", "union_all", "warm",
+    "contains", "filled", "inspect", "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons",
+    "read_layer", "read_mesh", "release", "solid_types", "union_all", "warm",
 ]  # fmt: skip
 
 

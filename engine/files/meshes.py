@@ -7,7 +7,7 @@ import logging
 import re
 from collections.abc import Callable
 from importlib import import_module
-from typing import IO, Any, Final, NamedTuple, TypeVar
+from typing import IO, Any, Final, NamedTuple, TypeVar, overload
 
 import numpy as np
 
@@ -54,7 +54,11 @@ class MeshOfFile(_Arrays):
     vertices_in_file: IntArray
     _is_soup: bool
 
-    def solid(self, kind: type[M] = Polyhedron) -> M:  # type: ignore[assignment]
+    @overload
+    def solid(self) -> Polyhedron: ...
+    @overload
+    def solid(self, kind: type[M]) -> M: ...
+    def solid(self, kind: Any = Polyhedron) -> Any:
         """Return the polyhedron or `Surface`; raises as these, naming triangles and vertices as in the file."""
         try:
             return kind(*self)

@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any, Final, Literal, overload
 
 import numpy as np
 
@@ -117,6 +117,26 @@ class FeatureRows:
 Answer = FeatureRows | tuple[FeatureRows, Accuracy]
 
 
+@overload
+def overlay_features(
+    left: Any,
+    right: Any,
+    how: str = "intersection",
+    *,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    report: Literal[False] = False,
+) -> FeatureRows: ...
+@overload
+def overlay_features(
+    left: Any,
+    right: Any,
+    how: str = "intersection",
+    *,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    report: Literal[True],
+) -> tuple[FeatureRows, Accuracy]: ...
 def overlay_features(
     left: Any,
     right: Any,
@@ -181,6 +201,24 @@ def overlay_features(
     return (made, limits.accuracy) if report else made
 
 
+@overload
+def dissolve_features(
+    layer: Any,
+    by: list[str] | None = None,
+    *,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    report: Literal[False] = False,
+) -> FeatureRows: ...
+@overload
+def dissolve_features(
+    layer: Any,
+    by: list[str] | None = None,
+    *,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    report: Literal[True],
+) -> tuple[FeatureRows, Accuracy]: ...
 def dissolve_features(
     layer: Any,
     by: list[str] | None = None,
@@ -262,6 +300,26 @@ def _checked_names(by: Any) -> list[str]:
     return list(dict.fromkeys(names))
 
 
+@overload
+def locate_features(
+    points: Any,
+    polygons: Any,
+    *,
+    outside: bool = False,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    report: Literal[False] = False,
+) -> FeatureRows: ...
+@overload
+def locate_features(
+    points: Any,
+    polygons: Any,
+    *,
+    outside: bool = False,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    report: Literal[True],
+) -> tuple[FeatureRows, Accuracy]: ...
 def locate_features(
     points: Any,
     polygons: Any,

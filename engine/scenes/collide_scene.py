@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final, Literal, NamedTuple, Unpack, overload
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from engine.distance.forms import are_small, distances_under_poses, gap_of_plane
 from engine.distance.spreads import SpreadPair, in_space
 from engine.errors import IndexOutOfRangeError, InvalidArrayError
 from engine.running.budget import Budget, Cancel
-from engine.running.parallel import Progress, check_options, run_chunks
+from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.columns import Columns
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, Relation, read_only
@@ -73,6 +73,29 @@ class ScenePairs(Columns):
         return zip(self.first.tolist(), self.second.tolist(), map(Relation, self.relation.tolist()))
 
 
+class PairOptions(Options, total=False):
+    """Keyword arguments of `collide_scene`, except `report`, which changes the return type."""
+
+    skip: object
+    only: object
+    gap: float | None
+    witnesses: bool
+    boolean: bool
+    detail: bool
+
+
+@overload
+def collide_scene(
+    solids: SolidsLike,
+    poses: PosesLike | None = None,
+    *,
+    report: Literal[False] = False,
+    **options: Unpack[PairOptions],
+) -> ScenePairs: ...
+@overload
+def collide_scene(
+    solids: SolidsLike, poses: PosesLike | None = None, *, report: Literal[True], **options: Unpack[PairOptions]
+) -> tuple[ScenePairs, Accuracy]: ...
 def collide_scene(
     solids: SolidsLike,
     poses: PosesLike | None = None,

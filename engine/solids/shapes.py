@@ -118,23 +118,29 @@ def _positions(positions: Any, where: Where) -> FloatArray:
 
 
 def _from_mesh(value: Any) -> Polyhedron | None:
-    """Return the mesh of another package: by what its objects have, in the order of the docstring above."""
-    if hasattr(value, "vertices") and hasattr(value, "faces"):  # trimesh
-        return _polyhedron(value.vertices, value.faces)
-    if hasattr(value, "vertices") and hasattr(value, "triangles"):  # open3d, legacy
-        return _polyhedron(value.vertices, value.triangles)
-    if hasattr(value, "vertex") and hasattr(value, "triangle"):  # open3d, tensors
-        return _polyhedron(value.vertex["positions"].numpy(), value.triangle["indices"].numpy())
-    if hasattr(value, "points") and hasattr(value, "faces"):  # pyvista: [n, i, j, ..., n, i, j, ...]
-        return _polyhedron(value.points, _unpadded(np.asarray(value.faces)))
-    if hasattr(value, "points") and hasattr(value, "cells"):  # meshio: blocks of one type each
-        return _polyhedron(value.points, [face for block in value.cells for face in _faces_in(block)])
-    return None
-
-
-def _polyhedron(vertices: Any, faces: Any) -> Polyhedron:
+    """Return the mesh of another package as a polyhedron."""
+    arrays = mesh_arrays_of(value)
+    if arrays is None:
+        return None
+    vertices, faces = arrays
     corners = vertices if isinstance(vertices, np.ndarray) else np.asarray(vertices)
     return Polyhedron(corners, faces if isinstance(faces, (list, np.ndarray)) else np.asarray(faces))
+
+
+def mesh_arrays_of(value: Any) -> tuple[Any, Any] | None:
+    """Return vertices and faces of a mesh of another package, by what its objects have, in the order of the docstring
+    above; None for anything else."""
+    if hasattr(value, "vertices") and hasattr(value, "faces"):  # trimesh
+        return value.vertices, value.faces
+    if hasattr(value, "vertices") and hasattr(value, "triangles"):  # open3d, legacy
+        return value.vertices, value.triangles
+    if hasattr(value, "vertex") and hasattr(value, "triangle"):  # open3d, tensors
+        return value.vertex["positions"].numpy(), value.triangle["indices"].numpy()
+    if hasattr(value, "points") and hasattr(value, "faces"):  # pyvista: [n, i, j, ..., n, i, j, ...]
+        return value.points, _unpadded(np.asarray(value.faces))
+    if hasattr(value, "points") and hasattr(value, "cells"):  # meshio: blocks of one type each
+        return value.points, [face for block in value.cells for face in _faces_in(block)]
+    return None
 
 
 def _unpadded(flat: Any) -> list[list[int]]:

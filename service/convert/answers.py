@@ -34,7 +34,7 @@ from service.schemas.points import (
     ContainsSceneResponse,
     SphereBounds,
 )
-from service.schemas.solids import StoredSolidSummary
+from service.schemas.solids import InspectResponse, MeshAdvice, StoredSolidSummary
 from service.wire import Series, series_of
 from service.work import Call
 
@@ -71,6 +71,22 @@ def from_stored(name: str, solid: Solid, collapsed: int | None = None) -> Stored
         faces=next(iter(counts.values()), None),
         memory=solid.memory,
         collapsed=collapsed,
+    )
+
+
+def from_inspection(found: engine.Inspection, accuracy: engine.Accuracy, with_mesh: bool) -> InspectResponse:
+    """Return the answer of `solids/inspect`; with_mesh: also the mesh, after mends."""
+    names = ("open_edges", "turned_edges", "t_junctions", "duplicate_faces", "flat_faces", "self_crossings")
+    return InspectResponse.made(
+        closed=found.is_closed,
+        shells=found.n_shells,
+        **{name: getattr(found, name) for name in names},
+        inverted_shells=[shell.tolist() for shell in found.inverted_shells],
+        advice=[MeshAdvice.made(kind=kind, mend=words) for kind, words in found.advice.items()],
+        mended=list(found.mended),
+        vertices=found.vertices if with_mesh else None,
+        faces=found.faces if with_mesh else None,
+        accuracy=from_accuracy(accuracy),
     )
 
 

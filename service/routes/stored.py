@@ -10,6 +10,7 @@ from pydantic import WithJsonSchema
 from starlette.responses import Response
 
 import engine
+from service import mesh_reader
 from service.body import OCTETS
 from service.convert import answers, octets, questions
 from service.openapi import responses, router_of
@@ -25,7 +26,7 @@ from service.schemas.bodies import (
     StoredSceneSummary,
 )
 from service.schemas.points import ContainsSceneResponse
-from service.schemas.solids import Solid, StoredSolidSummary
+from service.schemas.solids import InspectRequest, InspectResponse, Solid, StoredSolidSummary
 from service.store import Stored
 from service.work import Call, CallOf
 
@@ -69,6 +70,38 @@ def put(value: Stored, call: Call) -> str:
     call.status = 201 if is_new else 200
     call.headers.update({"Location": f"{call.path.removesuffix('/import')}/{name}", "ETag": f'"{name}"'})
     return name
+
+
+@router.post(
+    "/v1/solids/inspect",
+    operation_id="inspect_solid",
+    tags=["solids"],
+    responses=responses(501),
+    openapi_extra={"requestBody": {"content": octets.FILES_IN}},
+)
+def inspect_solid(question: InspectRequest, call: CallOf) -> InspectResponse:
+    """Tell what keeps a mesh from being a closed solid: open edges, T-junctions, crossings and more, each with its
+    places and what would mend it. A file is inspected as it is."""
+    names = ("weld", "orient", "fill_t_junctions")
+    options = {name: getattr(question, name) for name in names if getattr(question, name)}
+    found = call.compute(_inspected, (question.vertices, question.faces), **options)
+    return answers.from_inspection(*found, bool(options))
+
+
+def inspect_file(question: Any, content_type: str, call: Call) -> InspectResponse:
+    """Inspect a mesh that came as a file, or in a form, in place of JSON."""
+    file, kind, _ = octets.file_in(question, content_type, call)
+    with call.phase("decode"):
+        mesh = mesh_reader.read(file, kind, call)
+    return answers.from_inspection(*call.compute(_inspected, mesh), True)
+
+
+inspect_solid.upload = inspect_file  # type: ignore[attr-defined]
+
+
+def _inspected(mesh: Any, report: bool, **options: Any) -> tuple[engine.Inspection, engine.Accuracy]:
+    found = engine.inspect(mesh, **options)
+    return found, engine.Accuracy("exact", None, len(found.faces), 0, 0, "inspection")
 
 
 @lookup.get("/v1/solids/{solid_id}", tags=["solids"], operation_id="get_solid", responses=KNOWN)

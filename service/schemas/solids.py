@@ -8,7 +8,7 @@ from pydantic import Field, RootModel, WithJsonSchema, create_model, model_valid
 
 import engine
 from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
-from service.schemas.base import AtMost, Count, Schema, optional, with_example
+from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
 from service.schemas.geojson import GeoJsonSolid, OrGeoJson
 
 Number = Annotated[float, Numbers()]
@@ -153,6 +153,59 @@ class StoredSolidSummary(Schema):
     collapsed: Count = optional(
         "Triangles of a file that are left out: two of their corners have equal coordinates.", [248]
     )
+
+
+class InspectRequest(Schema):
+    """What keeps this mesh from being a closed solid? Nothing is repaired unless an option asks for it."""
+
+    model_config = with_example(
+        {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3]]},
+        {
+            "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1e-9, 0]],
+            "faces": [[0, 2, 1], [0, 4, 3], [1, 3, 2], [0, 3, 2]],
+            "weld": 1e-6,
+            "orient": True,
+            "fill_t_junctions": True,
+        },
+    )
+
+    vertices: Vertices3 = Field(description="Positions; those at equal coordinates are one.")
+    faces: Faces = Field(description="Indices of vertices, three or more a face; more than three are cut.")
+    weld: Number = optional("First make one of vertices that are at most so far apart.")
+    orient: bool = optional("Turn faces so that neighbours run alike, closed shells outward and cavities inward.")
+    fill_t_junctions: bool = optional("Split open edges at the vertices that lie exactly on them.")
+
+
+class MeshAdvice(Schema):
+    """A kind of thing that was found, and what would mend it."""
+
+    kind: str = Field(description="The name of a field of the answer.")
+    mend: str = Field(description="What would mend it.")
+
+
+Edges = Annotated[Array, Numbers(Axis(0, None), PAIR, kind="integer", minimum=0)]
+Triples = Annotated[Array, Numbers(Axis(0, None), Axis(3, 3), kind="integer", minimum=0)]
+
+
+class InspectResponse(Schema):
+    """What was found, each thing with its places, by the numbers of vertices and of faces as triangles, cut."""
+
+    closed: bool = Field(description="Whether a polyhedron of this mesh is taken: no open and no turned edges.")
+    shells: Count = Field(description="Parts of faces that hang together by edges.")
+    open_edges: Edges = Field(description="Edges that an odd number of faces use, by their vertices.")
+    turned_edges: Edges = Field(description="Other edges that are not used equally often in both directions.")
+    t_junctions: Triples = Field(description="An open edge, and a vertex of another exactly on it.")
+    duplicate_faces: Edges = Field(description="A face, and the first with the same vertices.")
+    flat_faces: Indices = Field(description="Faces without area.")
+    inverted_shells: IndexLists = Field(description="The faces of each closed shell that is inside out.")
+    self_crossings: Edges = Field(
+        description="Pairs of faces with a common point besides common vertices and edges, and none of the above."
+    )
+    advice: list[MeshAdvice] = Field(description="What would mend each kind of thing that was found.")
+    mended: list[str] = Field(description="What the options did.")
+    vertices: Vertices3 = optional("With an option: those of the mesh after it.")
+    faces: Triples = optional("With an option: the triangles after it; the numbers above are of these.")
+    accuracy: Accuracy
 
 
 CsgSolid.model_rebuild()

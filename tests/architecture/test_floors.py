@@ -33,8 +33,9 @@ FLOORS = {
     "engine.distributed": 11,
     "engine.files": 11,
     "engine.warmup": 11,
-    "engine": 12,
-    "engine.__main__": 13,
+    "engine.inspection": 12,
+    "engine": 13,
+    "engine.__main__": 14,
 }
 SPEAKS_LLVM = {"engine.predicates.error_free"}
 """Beside `engine.lanes` and `engine.compiling`: the only module that may."""

@@ -44,7 +44,8 @@ LAYERS = {
     "towns": layer(*(feature("Point", at) for at in ([1, 1], [5, 5], [4, 5], [13, 1], [11, 1]))),
     "county": layer(feature("Polygon", [square(0, 0, 4)], name="Kent")),
     "roads": layer(feature("LineString", [[-1, 2], [2, 2], [2, 5]]), feature("LineString", [[6, 6], [7, 7]])),
-    "parcels": layer(feature("Polygon", [square(0, 0, 2)], owner="Ada"), feature("Polygon", [square(2, 2, 2)], owner="Bo")),
+    "parcels": layer(
+        feature("Polygon", [square(0, 0, 2)], owner="Ada"), feature("Polygon", [square(2, 2, 2)], owner="Bo")),
     "floods": layer(feature("Polygon", [square(1, 1, 2)], year=1962)),
 }  # fmt: skip
 QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
@@ -177,10 +178,10 @@ def rewrite() -> None:
             PAGE.write_text(re.sub(r'"id": "\w+"', f'"id": "{stored}"', text), "utf-8")
             head, *parts = PAGE.read_text("utf-8").split("\n## ")
             for number, job in enumerate(jobs()):
-                said = desk.python(job["python"][0])
                 answer = json.dumps(without_accuracy(last_json(desk.curl(job["sh"][0]))))
-                part = re.sub(r"```text\n.*?```", lambda _: f"```text\n{said}```", parts[number], flags=re.DOTALL)
-                parts[number] = re.sub(r"```json\n.*?```", lambda _: f"```json\n{answer}\n```", part, flags=re.DOTALL)
+                for kind, shown in (("text", desk.python(job["python"][0])), ("json", answer + "\n")):
+                    before, _, rest = parts[number].partition(f"```{kind}\n")
+                    parts[number] = f"{before}```{kind}\n{shown}```{rest.partition('```')[2]}"
             PAGE.write_text("\n## ".join([head, *parts]), "utf-8")
         finally:
             desk.service.close()

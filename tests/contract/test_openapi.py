@@ -54,6 +54,7 @@ OPERATIONS = {
     ("post", "/v1/scenes/{scene_id}/binary/clip/segments"): "clip_segments_stored_scene_binary",
     ("post", "/v1/solids"): "put_solid",
     ("post", "/v1/solids/import"): "import_solid",
+    ("post", "/v1/solids/inspect"): "inspect_solid",
     ("post", "/v1/solids/{solid_id}/contains"): "contains_stored",
     ("post", "/v1/solids/{solid_id}/clip/segments"): "clip_segments_stored",
     ("get", "/v1/solids/{solid_id}"): "get_solid",
@@ -72,7 +73,7 @@ ANSWERS = {
     "/v1/solids/{solid_id}/clip/segments": "application/octet-stream",
 }
 
-FILES = {"/v1/solids": (*body.FILES, body.MULTIPART)}
+FILES = dict.fromkeys(("/v1/solids", "/v1/solids/inspect"), (*body.FILES, body.MULTIPART))
 """Files that are taken beside JSON, by path."""
 
 

@@ -80,3 +80,34 @@ async def test_a_form_of_a_solid_is_read_once(client: httpx.AsyncClient) -> None
     body = {"type": "polyhedron", "vertices": CORNERS, "faces": FACES}
     assert (await client.post("/v1/solids", json=body)).json()["id"] == answer.json()["id"]
     assert engine.read_mesh(OFF.encode()).solid() == engine.Polyhedron(CORNERS, FACES)
+
+
+MESH = {"vertices": CORNERS, "faces": FACES}
+
+
+async def test_a_mesh_is_inspected_before_it_is_stored(client: httpx.AsyncClient) -> None:
+    sound = (await client.post("/v1/solids/inspect", json=MESH)).json()
+    assert (sound["closed"], sound["shells"], sound["advice"]) == (True, 1, [])
+    assert "vertices" not in sound
+    answer = await client.post("/v1/solids/inspect", json={**MESH, "faces": FACES[:-1]})
+    assert answer.json()["open_edges"] == [[0, 2], [0, 3], [2, 3]]
+    assert [each["kind"] for each in answer.json()["advice"]] == ["open_edges"]
+    turned = {**MESH, "faces": [FACES[0][::-1], *FACES[1:]], "orient": True}
+    mended = (await client.post("/v1/solids/inspect", json=turned)).json()
+    assert (mended["closed"], mended["mended"]) == (True, ["orient: 1 faces are turned"])
+    stored = {"type": "polyhedron", "vertices": mended["vertices"], "faces": mended["faces"]}
+    assert (await client.post("/v1/solids", json=stored)).status_code == 201
+    for question in ({"content": OPEN, "headers": {"content-type": "model/off"}}, {"files": {"file": ("a.off", OPEN)}}):
+        found = (await client.post("/v1/solids/inspect", **question)).json()  # type: ignore[arg-type]
+        assert len(found["open_edges"]) == 3
+        assert len(found["faces"]) == 3
+
+
+async def test_what_cannot_be_inspected_is_refused(client: httpx.AsyncClient) -> None:
+    problem = check_problem(
+        await client.post("/v1/solids/inspect", json={**MESH, "faces": [[0, 1, 9]]}), 422, "index_out_of_range"
+    )
+    assert problem["errors"][0]["pointer"] == "/faces/0/2"
+    check_problem(await client.post("/v1/solids/inspect", json={**MESH, "weld": -1}), 422, "invalid_input")
+    headers = {"content-type": "model/stl"}
+    check_problem(await client.post("/v1/solids/inspect", content=b"x", headers=headers), 422, "invalid_mesh")

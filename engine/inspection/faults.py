@@ -1,0 +1,237 @@
+"""What keeps a mesh from being a closed solid, each thing decided exactly.
+
+Orientations of points (`orientations`) and pairs of triangles (`collide_triangles`) decide. Two triangles with a common
+corner s, t = (s, a, b) and u = (s, c, d), have another common point if and only if the edge a b meets u or c d meets t:
+from s on through that point one leaves one of them first, by its edge opposite to s.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
+from engine.collision.codes import DISJOINT, TOUCHING
+from engine.collision.triangles import collide_triangles
+from engine.containment.locate import locate
+from engine.errors import EngineError
+from engine.polygon_clipping.planes import orientations
+from engine.predicates.rational import cross, scaled_integers
+from engine.running.budget import Budget
+from engine.solids.mesh import Polyhedron
+from engine.types import FloatArray, IntArray
+
+
+class Edges(NamedTuple):
+    """The different edges of triangles.
+
+    ends (k, 2), ascending; of: (m, 3) the edge of each side; uses (k,); net (k,) uses upward less those downward.
+    """
+
+    ends: IntArray
+    of: IntArray
+    uses: IntArray
+    net: IntArray
+
+
+def edges_of(faces: IntArray) -> Edges:
+    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends, of, uses = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    of = of.reshape(-1)
+    net = np.bincount(of, np.sign(sides[:, 1] - sides[:, 0]), len(ends)).astype(np.int64)
+    uses = np.where(ends[:, 0] == ends[:, 1], 0, uses)  # of a face that names a vertex twice
+    return Edges(ends, of.reshape(-1, 3), uses, net)
+
+
+def are_flat(points: FloatArray, faces: IntArray, budget: Budget) -> Any:
+    """Return for each triangle whether its corners are on one line, exactly: a bound of the floats decides most."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    with np.errstate(all="ignore"):
+        u, v = b - a, c - a
+        size = np.abs(u).max(axis=1) * np.abs(v).max(axis=1)
+        is_open = ~(np.abs(np.cross(u, v)).max(axis=1) > 1e-15 * 8 * size + 1e-300) | ~np.isfinite(size)
+    for item in np.flatnonzero(is_open).tolist():
+        budget.check()
+        numbers = scaled_integers(np.concatenate([a[item], b[item], c[item]]).tolist())
+        p, q, r = numbers[:3], numbers[3:6], numbers[6:]
+        sides = [x - y for x, y in zip(q, p)], [x - y for x, y in zip(r, p)]
+        is_open[item] = not any(cross(*sides))
+    return is_open
+
+
+def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
+    """Return the open edges (k, 2), each with a vertex of another that is exactly on it, along the edge in order."""
+    vertices = np.unique(ends)
+    corners = np.concatenate([points[ends], points[vertices][:, None].repeat(2, axis=1)])
+    n = len(ends)
+    found: list[IntArray] = []
+    pairs = all_pairs_of_boxes(corners.min(axis=1), corners.max(axis=1), budget) if len(ends) else np.zeros((0, 2), int)
+    pairs = pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)]
+    edge, vertex = ends[pairs[:, 0]], vertices[pairs[:, 1] - n]
+    free = (edge != vertex[:, None]).all(axis=1)
+    edge, vertex = edge[free], vertex[free]
+    segments, spots = points[np.column_stack([edge, edge[:, 1]])], points[np.column_stack([vertex] * 3)]
+    met = np.asarray(collide_triangles(segments, spots, deadline=budget.left(), cancel=budget.cancel)) != DISJOINT
+    for (low, high), at in zip(edge[met], vertex[met]):
+        found.append(np.array([low, high, at]))
+    rows = np.array(found, np.int64).reshape(-1, 3)
+    across = np.abs(points[rows[:, 2]] - points[rows[:, 0]]).max(axis=1)  # on one line this grows along it
+    return rows[np.lexsort((across, rows[:, 1], rows[:, 0]))]
+
+
+def shells_of(edges: Edges) -> list[IntArray]:
+    """Return the faces of each part that hangs together by edges, by smallest labels that spread."""
+    labels = np.arange(len(edges.of))
+    while True:  # bound: labels only fall; pointers are halved each turn
+        least = np.full(len(edges.ends), len(labels))
+        np.minimum.at(least, edges.of.reshape(-1), labels.repeat(3))
+        spread = np.minimum(labels, least[edges.of].min(axis=1))
+        np.minimum.at(spread, labels, spread.copy())
+        spread = spread[spread]
+        if (spread == labels).all():
+            break
+        labels = spread
+    order = np.argsort(labels, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1) if len(order) else []
+
+
+def nesting(
+    points: FloatArray, faces: IntArray, shells: list[IntArray], budget: Budget
+) -> Iterator[tuple[IntArray, bool]]:
+    """Yield the closed shells, each with whether it is turned: its volume should be above 0 within an even number of
+    others, and below 0 within an odd one."""
+    closed = []
+    for shell in shells:
+        budget.check()
+        try:
+            closed.append((shell, Polyhedron(points, faces[shell])))
+        except EngineError:
+            budget.check()
+    used = [np.unique(faces[shell]) for shell, _ in closed]
+    low, high = (np.array([pick(points[k], axis=0) for k in used]).reshape(-1, 3) for pick in (np.min, np.max))
+    inside: dict[int, list[int]] = defaultdict(list)
+    for i, j in all_pairs_of_boxes(low, high, budget).tolist() if closed else ():
+        for one, other in ((i, j), (j, i)):
+            if (low[other] <= low[one]).all() and (high[one] <= high[other]).all():
+                inside[one].append(other)
+    for number, (shell, _) in enumerate(closed):
+        depth = 0
+        for other in inside[number]:
+            budget.check()
+            places = locate(points[used[number]], closed[other][1], deadline=budget.left(), cancel=budget.cancel)
+            strict = places[places != 0]
+            depth += bool(len(strict) and strict[0] > 0)
+        volume = _sign_of_volume(points, faces[shell])
+        yield shell, volume != 0 and (volume > 0) is (depth % 2 == 1)
+
+
+def _sign_of_volume(points: FloatArray, faces: IntArray) -> int:
+    """Return the sign of the volume that triangles run around, exactly."""
+    corners = points[faces] - points[faces[0, 0]]
+    with np.errstate(all="ignore"):
+        parts = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+        bound = 1e-14 * len(faces) * np.abs(corners).max() ** 3 + 1e-290
+        total = float(parts.sum())
+    if np.isfinite(bound) and abs(total) > bound * 8:
+        return 1 if total > 0 else -1
+    used, rows = np.unique(faces, return_inverse=True)
+    numbers = scaled_integers(points[used].ravel().tolist())
+    places = [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
+    exact = 0
+    for i, j, k in rows.reshape(-1, 3).tolist():
+        exact += sum(x * y for x, y in zip(places[i], cross(places[j], places[k])))
+    return (exact > 0) - (exact < 0)
+
+
+def crossings(points: FloatArray, faces: IntArray, kept: IntArray, at_edges: IntArray, budget: Budget) -> IntArray:
+    """Return the pairs of faces, of those that have area, with a common point besides their common corners and
+    edges."""
+    corners = points[faces[kept]]
+    at_junctions = _pairs_at(faces, at_edges)
+    found = [np.zeros((0, 2), np.int64)]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    for block in pairs_of_boxes(low, high, budget.flag, 1 << 16) if len(kept) else ():
+        budget.check()
+        pairs = kept[block]
+        first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
+        same = first[:, :, None] == second[:, None, :]
+        n_common = same.sum(axis=(1, 2))
+        meets = np.zeros(len(pairs), np.bool_)
+        for n, test in enumerate((_apart_meet, _at_corner_meet, _at_edge_meet)):
+            some = np.flatnonzero(n_common == n)
+            if len(some):
+                order = [
+                    _common_first(each[some], same[some].any(axis=axis)) for each, axis in ((first, 2), (second, 1))
+                ]
+                meets[some] = test(points[order[0]], points[order[1]], budget)
+        hits = pairs[meets]
+        found.append(hits[[tuple(pair) not in at_junctions for pair in hits.tolist()]] if len(at_junctions) else hits)
+    pairs = np.concatenate(found)
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def _common_first(rows: IntArray, is_common: Any) -> IntArray:
+    """Return faces with the corners that they share first, the smallest of these first."""
+    order = np.lexsort((rows, ~is_common), axis=1)
+    return np.take_along_axis(rows, order, axis=1)
+
+
+def _pairs_at(faces: IntArray, at_edges: IntArray) -> set[tuple[int, int]]:
+    """Return the pairs of a face at the edge of a T-junction and one at its vertex."""
+    at: dict[int, list[int]] = defaultdict(list)
+    for number, face in enumerate(faces.tolist() if len(at_edges) else ()):
+        for vertex in face:
+            at[vertex].append(number)
+    pairs = set()
+    for low, high, vertex in at_edges.tolist():
+        for one in set(at[low]) & set(at[high]):
+            pairs |= {(min(one, other), max(one, other)) for other in at[vertex]}
+    return pairs
+
+
+def _apart_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
+    return np.asarray(collide_triangles(t, u, deadline=budget.left(), cancel=budget.cancel)) != DISJOINT
+
+
+def _at_corner_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
+    """Return whether triangles whose first corners are one have another common point; see the head of this file."""
+    (s, a, b), (_, c, d) = np.moveaxis(t, 1, 0), np.moveaxis(u, 1, 0)
+    sides_of_u = [orientations(s, a, b, x) for x in (c, d)]
+    sides_of_t = [orientations(s, c, d, x) for x in (a, b)]
+    is_flat = (sides_of_u[0] == 0) & (sides_of_u[1] == 0)
+    meets = np.zeros(len(t), np.bool_)
+    for (p, q), sides, (v, w) in (((a, b), sides_of_t, (c, d)), ((c, d), sides_of_u, (a, b))):
+        some = np.flatnonzero(~is_flat & (sides[0] * sides[1] <= 0))
+        around = [orientations(p[some], q[some], *(x[some] for x in pair)) for pair in ((s, v), (v, w), (w, s))]
+        meets[some] |= (np.min(around, axis=0) >= 0) | (np.max(around, axis=0) <= 0)
+    some = np.flatnonzero(is_flat)
+    for p, q, other in ((a, b, u), (c, d, t)):
+        edge = np.stack([p[some], q[some], q[some]], axis=1)
+        meets[some] |= _in_plane(edge, other[some], other[some], budget) != DISJOINT
+    return meets
+
+
+def _at_edge_meet(t: FloatArray, u: FloatArray, budget: Budget) -> Any:
+    """Return whether triangles whose first two corners are common are flat on each other."""
+    meets = np.zeros(len(t), np.bool_)
+    some = np.flatnonzero(orientations(t[:, 0], t[:, 1], t[:, 2], u[:, 2]) == 0)
+    relations = _in_plane(t[some], u[some], u[some], budget)
+    meets[some] = (relations != DISJOINT) & (relations != TOUCHING)
+    return meets
+
+
+def _in_plane(first: FloatArray, second: FloatArray, normal_of: FloatArray, budget: Budget) -> Any:
+    """Return the relations of pairs in a plane each, seen along the axis to which it is steepest."""
+    relations = np.full(len(first), DISJOINT)
+    with np.errstate(all="ignore"):
+        normals = np.abs(np.cross(normal_of[:, 1] - normal_of[:, 0], normal_of[:, 2] - normal_of[:, 0]))
+    steepest = np.argmax(normals, axis=1) if len(first) else np.zeros(0, np.int64)
+    for axis in range(3):
+        some = np.flatnonzero(steepest == axis)
+        if len(some):
+            flat = [np.delete(each[some], axis, axis=2) for each in (first, second)]
+            relations[some] = np.asarray(collide_triangles(*flat, deadline=budget.left(), cancel=budget.cancel))
+    return relations

@@ -1,0 +1,100 @@
+"""Mends of meshes, each only where it is asked for, and each with a sentence that says what it did."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import pairwise
+
+import numpy as np
+
+from engine.bounding.box_grid import all_pairs_of_boxes
+from engine.inspection.faults import edges_of, junctions, nesting, shells_of
+from engine.running.budget import Budget
+from engine.types import FloatArray, IntArray
+
+
+def welded(
+    points: FloatArray, faces: IntArray, distance: float, budget: Budget, mended: list[str]
+) -> tuple[FloatArray, IntArray]:
+    """Return the mesh with vertices that are at most so far apart made one, each group the first of its members."""
+    used = np.unique(faces)
+    spots = points[used]
+    root = np.arange(len(points))
+    half = distance / 2
+    for i, j in all_pairs_of_boxes(spots - half, spots + half, budget).tolist():
+        one, other = used[i], used[j]
+        if float(np.linalg.norm(points[one] - points[other])) <= distance:
+            while root[one] != one:
+                one = root[one]
+            while root[other] != other:
+                other = root[other]
+            root[max(one, other)] = min(one, other)
+    while (root[root] != root).any():
+        root = root[root]
+    moved = root != np.arange(len(points))
+    made = root[faces]
+    remaining = (made != np.roll(made, 1, axis=1)).all(axis=1)
+    largest = np.abs(points[moved] - points[root[moved]]).max() if moved.any() else 0.0
+    mended.append(
+        f"weld: {int(moved.sum())} vertices are made one with another, moved by {float(largest)!r} at most on an axis; "
+        f"{int((~remaining).sum())} faces collapsed and are left out"
+    )
+    return points, made[remaining]
+
+
+def filled(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str]) -> IntArray:
+    """Return the triangles with open edges split at the vertices on them."""
+    edges = edges_of(faces)
+    is_open = edges.uses % 2 == 1
+    on: dict[tuple[int, int], list[int]] = defaultdict(list)
+    for low, high, vertex in junctions(points, edges.ends[is_open], budget).tolist():
+        on[low, high].append(vertex)
+    made: list[list[int]] = []
+    n_split = 0
+    for face in faces.tolist():
+        waiting = [face]
+        for k in range(3):
+            a, b = face[k], face[(k + 1) % 3]
+            between = on.get((min(a, b), max(a, b)), [])
+            if between:
+                n_split += 1
+                path = [a, *(between if a < b else between[::-1]), b]
+                whole = next(each for each in waiting if a in each and b in each)
+                waiting.remove(whole)
+                (apex,) = set(whole) - {a, b}
+                waiting += [[start, end, apex] for start, end in pairwise(path)]
+        made += waiting
+    mended.append(f"fill_t_junctions: {n_split} sides of faces are split at the vertices on them")
+    return np.array(made, np.int64).reshape(-1, 3)
+
+
+def oriented(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str]) -> IntArray:
+    """Return the triangles turned so that neighbours run alike, and closed shells as nesting has them."""
+    edges = edges_of(faces)
+    users: dict[int, list[int]] = defaultdict(list)
+    for face, own in enumerate(edges.of.tolist()):
+        for edge in own:
+            users[edge].append(face)
+    ups = np.roll(faces, -1, axis=1) > faces
+    turned = np.full(len(faces), -1)
+    for seed in range(len(faces)):
+        waiting = [seed] if turned[seed] < 0 else []
+        turned[seed] = max(turned[seed], 0)
+        while waiting:  # bound: each face enters once
+            face = waiting.pop()
+            budget.check()
+            for side, edge in enumerate(edges.of[face].tolist()):
+                for other in users[edge] if len(users[edge]) == 2 else ():
+                    if other != face and turned[other] < 0:
+                        there = edges.of[other].tolist().index(edge)
+                        turned[other] = turned[face] ^ (ups[face, side] == ups[other, there])
+                        waiting.append(other)
+    made = np.where(turned[:, None] == 1, faces[:, ::-1], faces)
+    n_wrong = int((edges_of(made).net != 0).sum())
+    for shell, is_turned in [*nesting(points, made, shells_of(edges), budget)]:
+        if is_turned:
+            made[shell] = made[shell][:, ::-1]
+    n_turned = int((made != faces).any(axis=1).sum())
+    rest = f"; {n_wrong} edges cannot be: the mesh is open or one-sided there" if n_wrong else ""
+    mended.append(f"orient: {n_turned} faces are turned{rest}")
+    return made
