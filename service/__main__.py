@@ -96,7 +96,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     known = {f"GEOMETRY_{name.upper()}" for name in Settings.model_fields}
     if unknown := [name for name in os.environ if name.startswith("GEOMETRY_") and name.upper() not in known]:
-        log.warning("no setting is called %s; the README has a table of them", ", ".join(sorted(unknown)))
+        log.warning("no setting is called %s; docs/running.md and --help list them", ", ".join(sorted(unknown)))
     if not settings.api_keys and not _is_loopback(settings.host):
         log.warning("anyone who reaches %s may use this service: GEOMETRY_API_KEYS is not set", settings.host)
     with ExitStack() as stack:

@@ -14,7 +14,14 @@ import numpy as np
 
 from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
-from engine.collision.collide import TAKEN, details_of_boxes, details_where_proven, pair_function, posed
+from engine.collision.collide import (
+    TAKEN,
+    details_of_boxes,
+    details_where_proven,
+    instead_of,
+    pair_function,
+    posed,
+)
 from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
 from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
@@ -24,7 +31,7 @@ from engine.compiling.jit import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
-from engine.solids.base import Solid
+from engine.solids.base import Solid, named
 from engine.solids.pose import Pose, motions_of
 from engine.solids.poses import Poses
 from engine.solids.primitives import Aabb
@@ -259,7 +266,8 @@ def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
         except UnsupportedPairError:
             index = _first(body, bodies)
             raise UnsupportedPairError(
-                f"solids[{index}] is a {body.type}; a scene in {body.dimension}D takes {TAKEN[body.dimension]}",
+                f"solids[{index}] is {named(body.type)}; a scene in {body.dimension}D takes {TAKEN[body.dimension]}"
+                f"{instead_of(body)}",
                 ("solids", index),
             ) from None
         except (UnsupportedSolidError, WrongDimensionError) as error:

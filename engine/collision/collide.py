@@ -31,7 +31,7 @@ from engine.errors import (
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options
 from engine.solids.accepted import PoseLike, SolidLike
-from engine.solids.base import Solid
+from engine.solids.base import Solid, named
 from engine.solids.checks import spell
 from engine.solids.mesh import Surface
 from engine.solids.pose import Pose
@@ -68,10 +68,19 @@ _BY_TYPE: dict[tuple[int, str, int, str], tuple[result.PairFunction, result.Part
 """Rows of `PAIRS` cached by types, with whether to swap the bodies."""
 
 
-def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, result.PartsFunction, bool]:
-    """Look up a pair of solids in the table `PAIRS`. Returns the function that decides their relation, the one that
-    decides which has a part outside the other, and whether to call both with the two bodies swapped. Raises
-    UnsupportedSolidError, WrongDimensionError or UnsupportedPairError if the pair is not in the table."""
+INSTEAD = {
+    "convex": "its corners need not be doubles; give the polyhedron or polygon of its corners, or an aabb",
+    "triangle": "in space it is the prism over it; give Surface(triangle.vertices, [[0, 1, 2]])",
+    "csg": "ask about its operands, or of polygons about their overlay or union_all",
+    "implicit": "give a mesh of it",
+}
+"""What to give in place of a solid that is no body, by its type."""
+
+
+def pair_function(
+    first: Solid, second: Solid, what: str = "collision"
+) -> tuple[result.PairFunction, result.PartsFunction, bool]:
+    """Return the functions of a pair and whether to call them with the two bodies swapped; what: is asked of them."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:
@@ -84,20 +93,27 @@ def pair_function(first: Solid, second: Solid) -> tuple[result.PairFunction, res
     for name, solid in (("first", first), ("second", second)):
         if not isinstance(solid, Solid):
             raise UnsupportedSolidError(
-                f"{name} must be a solid, got {type(solid).__name__}; collide takes {TAKEN[3]} in 3D, {TAKEN[2]} in 2D",
+                f"{name} must be a solid, got {type(solid).__name__}; {what} takes {TAKEN[3]} in 3D, {TAKEN[2]} in 2D",
                 (name,),
             )
     if first.dimension != second.dimension:
         raise WrongDimensionError(
-            f"first is a {first.dimension}D {first.type}, second a {second.dimension}D {second.type}; "
+            f"first is {named(first.type)} in {first.dimension}D, second {named(second.type)} in {second.dimension}D; "
             "both must have one dimension",
             ("second",),
         )
+    odd = next((each for each in (first, second) if not result.meets_as(each)), second)
+    between = f"{named(first.type)} {'and' if what == 'distance' else 'with'} {named(second.type)}"
     raise UnsupportedPairError(
-        f"collision of a {first.type} with a {second.type} in {first.dimension}D is not defined; "
-        f"collide takes {TAKEN[first.dimension]} in {first.dimension}D",
-        ("second",),
+        f"{what} of {between} in {first.dimension}D is not defined; it takes {TAKEN[first.dimension]} in "
+        f"{first.dimension}D{instead_of(odd)}",
+        ("first" if odd is first and odd is not second else "second",),
     )
+
+
+def instead_of(solid: Solid) -> str:
+    """Return a clause that says what to give in place of a solid that is no body."""
+    return f"; {named(solid.type)}: {INSTEAD[solid.type]}" if solid.type in INSTEAD else ""
 
 
 def posed(given: object, solid: Solid, *where: str | int) -> Pose | None:

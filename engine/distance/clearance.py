@@ -123,7 +123,7 @@ def clearance(
     """
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
         first, second = as_solid(first, "first"), as_solid(second, "second")
-    pair_function(first, second)
+    pair_function(first, second, "distance")
     if first_pose is not None or second_pose is not None:
         first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")
     if workers is not None or progress is not None or type(report) is not bool:
@@ -249,7 +249,7 @@ def clearance_poses(
     check_options(workers, progress, report=report)
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
         first, second = as_solid(first, "first"), as_solid(second, "second")
-    pair_function(first, second)
+    pair_function(first, second, "distance")
     least = None if at_least is None else checked_distance(at_least)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
     n_poses = len(poses.rotations)

@@ -22,6 +22,11 @@ _WAIT: Final = 0.005
 _RUNTIME = ("__weakref__", "_lock", "_prepared")  # slots that are no part of a solid's value
 
 
+def named(kind: str) -> str:
+    """Return the name of a type with its article: a sphere, an aabb."""
+    return f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"
+
+
 class Immutable:
     """Base of classes whose fields are set once, by the constructor; `type` is the class's name in messages."""
 
@@ -30,10 +35,10 @@ class Immutable:
     type: ClassVar[str]
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"a {self.type} is immutable: make a new one instead of setting {name!r}")
+        raise AttributeError(f"{named(self.type)} is immutable: make a new one instead of setting {name!r}")
 
     def __delattr__(self, name: str) -> None:
-        raise AttributeError(f"a {self.type} is immutable: {name!r} cannot be deleted")
+        raise AttributeError(f"{named(self.type)} is immutable: {name!r} cannot be deleted")
 
 
 class Preparing:
@@ -100,7 +105,7 @@ class Solid(Preparing, Immutable):
     def _set(self, **values: object) -> None:
         """Set the fields by name, once; called at the end of a constructor, after all checks."""
         if hasattr(self, "_prepared"):
-            raise AttributeError(f"a {self.type} is immutable: make a new one instead of calling __init__ again")
+            raise AttributeError(f"{named(self.type)} is immutable: make a new one instead of calling __init__ again")
         for name, value in values.items():
             object.__setattr__(self, name, value)
         object.__setattr__(self, "_lock", threading.RLock())
@@ -136,8 +141,11 @@ class Solid(Preparing, Immutable):
         return all(are_equal(getattr(self, name), getattr(other, name)) for name in self._pickled)
 
     def __hash__(self) -> int:
-        values = (getattr(self, name) for name in self._pickled or ("_lock",))
-        return Preparing.prepared(self, "hash", lambda: hash((self.type, *map(key_of, values))))
+        known = self._prepared.get("hash")
+        if known is None:  # without the lock: whoever builds a structure may hold it for long, and all hash alike
+            values = (getattr(self, name) for name in self._pickled or ("_lock",))
+            known = self._prepared["hash"] = hash((self.type, *map(key_of, values)))
+        return int(known)
 
     def __copy__(self) -> Solid:
         return self

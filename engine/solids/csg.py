@@ -96,6 +96,26 @@ class Csg(Solid):
             n_leaves=n_leaves,
         )
 
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Csg):
+            return NotImplemented
+        waiting: list[tuple[Solid, Solid]] = [(self, other)]
+        seen: set[tuple[int, int]] = set()  # operands may be shared: each pair is compared once
+        while waiting:
+            one, another = waiting.pop()
+            if one is another or (id(one), id(another)) in seen:
+                continue
+            seen.add((id(one), id(another)))
+            if isinstance(one, Csg) and isinstance(another, Csg):
+                if one.operation != another.operation or len(one.operands) != len(another.operands):
+                    return False
+                waiting += zip(one.operands, another.operands)
+            elif one != another:
+                return False
+        return True
+
+    __hash__ = Solid.__hash__
+
     def __repr__(self) -> str:
         return f"Csg({self.operation!r}, {len(self.operands)} operands, {self.dimension}D)"
 

@@ -37,9 +37,11 @@ def geometry_of(value: Any) -> Mapping[str, Any] | None:
 Path = tuple[str | int, ...]
 
 
-def geometries_in(value: Mapping[str, Any], where: Path = (), depth: int = _DEEPEST) -> Iterator[tuple[Path, Any]]:
+def geometries_in(
+    value: Mapping[str, Any], where: Path = (), depth: int = _DEEPEST, seen: set[int] | None = None
+) -> Iterator[tuple[Path, Any]]:
     """Yield the plain geometries of a GeoJSON object with their paths, those within collections and features too, and
-    None for each that is null."""
+    None for each that is null. seen: collections that were walked, each by its id, not to be walked again."""
     kind = value.get("type")
     if isinstance(kind, str) and kind in _PLAIN:
         yield where, value
@@ -47,6 +49,10 @@ def geometries_in(value: Mapping[str, Any], where: Path = (), depth: int = _DEEP
     if depth == 0 or not isinstance(kind, str) or kind not in MEMBERS:
         what = repr(kind[:60]) if isinstance(kind, str) else f"a {type(kind).__name__}"
         raise InvalidInputError(f"type is {what}: no geometry of GeoJSON that is taken here", (*where, "type"))
+    if seen is not None:
+        if id(value) in seen:
+            return
+        seen.add(id(value))
     member = MEMBERS[kind]
     inner: Any = value.get(member)
     if kind != "Feature" and not isinstance(inner, (list, tuple)):
@@ -58,7 +64,7 @@ def geometries_in(value: Mapping[str, Any], where: Path = (), depth: int = _DEEP
         if each is None:
             yield place, None
         elif isinstance(each, Mapping):
-            yield from geometries_in(each, place, depth - 1)
+            yield from geometries_in(each, place, depth - 1, seen)
         else:
             raise InvalidInputError(f"{member} of a {kind} must be GeoJSON, got {type(each).__name__}", place)
 

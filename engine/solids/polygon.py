@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 
-from engine.errors import InvalidArrayError, RingTooShortError
+from engine.errors import EngineError, InvalidArrayError, RingTooShortError
 from engine.running.budget import Budget, Cancel
 from engine.solids.base import Solid, T
 from engine.solids.checks import as_nested_offsets, as_points, check_finite, check_not_empty, frozen, is_ready
+from engine.solids.geometries import lines_in
 from engine.solids.pictures import Pictured, svg_of
 from engine.types import FloatArray, IntArray
 
@@ -108,6 +109,45 @@ class Polygon(Pictured, Solid):
     def n_rings(self) -> int:
         """Number of rings."""
         return len(self.ring_offsets) - 1
+
+    @classmethod
+    def from_lines(cls, lines: object) -> Polygon:
+        """Return the polygon that is lines themselves, without area: a body whose distance to others can be asked.
+
+        Parameters
+        ----------
+        lines : list of array_like of shape (n, 2), GeoJSON of lines, or object with `__geo_interface__`
+            Two positions or more each; a ring repeats its first position at its end.
+
+        Returns
+        -------
+        Polygon
+            A ring of two positions for each segment.
+
+        Examples
+        --------
+        >>> from engine import Sphere, clearance
+        >>> clearance(Polygon.from_lines([[(0, 0), (4, 0), (4, 4)]]), Sphere((1, 3), 1)).distance
+        2.0
+        """
+        try:
+            held = lines_in(lines)
+        except EngineError as error:
+            raise error.at("lines") from None
+        given: Any = lines if held is None else held
+        if not isinstance(given, (list, tuple, np.ndarray)):
+            raise InvalidArrayError(f"lines must be a list of lines, got {type(lines).__name__}", ("lines",))
+        chains = [as_points(line, 2, ("lines", k)) for k, line in enumerate(given)]
+        for k, chain in enumerate(chains):
+            if len(chain) == 1:
+                raise RingTooShortError(f"lines[{k}] has 1 position; a line needs at least 2", ("lines", k))
+        return cls([np.stack(pair) for chain in chains for pair in pairwise(chain)])
+
+    @property
+    def boundary(self) -> Polygon:
+        """The rings themselves, without what they enclose: the distance from inside to it is above 0."""
+        rings = np.split(self.vertices, self.ring_offsets[1:-1]) if self.n_rings else []
+        return Polygon.from_lines([np.concatenate([ring, ring[:1]]) for ring in rings])
 
     def prepared(self, key: str, build: Callable[[], T], check: Callable[[], object] | None = None) -> T:
         """Return the structure cached under `key`, as `Preparing.prepared`; raise for an empty polygon, which only

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.errors import UnsupportedSolidError
-from engine.solids.base import Solid
+from engine.solids.base import Solid, named
 from engine.solids.mesh import Mesh
 from engine.types import FloatArray
 
@@ -134,11 +134,8 @@ def kind_of(solid: object) -> str:
 def refused(
     solid: object, what: str, takes: Callable[[Row], object], more: str = "", where: Where = ()
 ) -> UnsupportedSolidError:
-    """Return the error for a solid that an operation does not take; what: the beginning of the sentence, before the
-    solid."""
-    kind = kind_of(solid)
-    article = "an" if kind[0] in "aeiou" else "a"
-    return UnsupportedSolidError(f"{what} {article} {kind}; give a {names(takes)}{more}", where)
+    """Return the error for a solid that an operation refuses; what: the sentence up to the solid."""
+    return UnsupportedSolidError(f"{what} {named(kind_of(solid))}; give {named(names(takes))}{more}", where)
 
 
 def own_box(solid: Solid, check: Callable[[], object] | None = None) -> Box:

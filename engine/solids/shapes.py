@@ -85,7 +85,7 @@ def _from_geojson(value: Any, budget: Budget) -> Polygon | None:
         return None
     plane: list[Any] = []
     has_altitude = False
-    for place, each in geometries_in(geometry):
+    for place, each in geometries_in(geometry, seen=set()):  # a part that is there twice adds nothing
         if each is None:
             continue
         kind = each["type"]

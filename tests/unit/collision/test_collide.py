@@ -355,3 +355,33 @@ def test_no_witness_where_none_is_asked_for(other: engine.Solid, option: dict[st
             found = collide(first, second, first_pose=pose, **option)
             assert found.relation != Relation.DISJOINT
             assert found.witness is None
+
+
+BOX = engine.Aabb((0, 0, 0), (1, 1, 1))
+NO_BODIES = {
+    "convex": engine.Convex([[1, 0, 0, 0], [-1, 0, 0, 1]]),
+    "triangle": engine.Triangle([(0, 0, 0), (1, 0, 0), (0, 1, 0)]),
+    "csg": engine.Csg("union", [BOX, BOX]),
+    "implicit": engine.Implicit([{"powers": (0, 0, 0), "coefficient": 1}]),
+}
+
+
+@pytest.mark.parametrize("kind", NO_BODIES)
+def test_what_is_no_body_is_refused_with_what_to_use(kind: str) -> None:
+    solid, a = NO_BODIES[kind], "an" if kind[0] in "aeiou" else "a"
+    with pytest.raises(
+        engine.UnsupportedPairError, match=f"collision of an aabb with {a} {kind} in 3D.*; {a} {kind}: "
+    ):
+        engine.collide(BOX, solid)
+    with pytest.raises(
+        engine.UnsupportedPairError, match=f"distance of {a} {kind} and an aabb in 3D.*; {a} {kind}: "
+    ) as e:
+        engine.clearance(solid, BOX)
+    assert e.value.where == ("first",)
+    with pytest.raises(engine.UnsupportedPairError, match=rf"solids\[1\] is {a} {kind}; .*; {a} {kind}: "):
+        engine.collide_scene([BOX, solid])
+
+
+def test_the_surface_of_a_triangle_is_a_body() -> None:
+    triangle = NO_BODIES["triangle"]
+    assert engine.collide(BOX, engine.Surface(triangle.vertices, [[0, 1, 2]]))  # type: ignore[attr-defined]

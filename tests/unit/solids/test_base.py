@@ -155,3 +155,29 @@ def test_memory_counts_every_array_once() -> None:
 def test_base_is_not_a_solid_by_itself() -> None:
     with pytest.raises(AttributeError):
         engine.Solid().anything = 1
+
+
+def test_a_hash_waits_for_nobody() -> None:
+    """Another thread may hold the lock for as long as it builds a structure."""
+    ball = engine.Sphere((0, 0), 1.0)
+    held, done = threading.Event(), threading.Event()
+
+    def build() -> int:
+        held.set()
+        return int(done.wait(60))
+
+    thread = threading.Thread(target=lambda: ball.prepared("slow", build))
+    thread.start()
+    try:
+        assert held.wait(60)
+        assert hash(ball) == hash(engine.Sphere((0, 0), 1.0))
+    finally:
+        done.set()
+        thread.join()
+
+
+def test_messages_have_the_right_article() -> None:
+    with pytest.raises(AttributeError, match="an aabb is immutable"):
+        engine.Aabb((0, 0), (1, 1)).min = 3  # type: ignore[assignment]
+    with pytest.raises(AttributeError, match="a sphere is immutable"):
+        del engine.Sphere((0, 0), 1.0).radius

@@ -62,3 +62,16 @@ def test_shared_operands_cannot_double_without_end() -> None:
     assert tree.n_leaves == 2**19
     with pytest.raises(engine.TooComplexError, match="1048576 leaves, the limit is 1000000"):
         engine.Csg("union", [tree, tree])
+
+
+def test_trees_that_share_operands_are_compared_in_linear_time() -> None:
+    def doubled(radius: float) -> engine.Solid:
+        tree: engine.Solid = engine.Sphere((0, 0), radius)
+        for _ in range(16):
+            tree = engine.Csg("union", [tree, tree])
+        return tree
+
+    assert doubled(1.0) == doubled(1.0)
+    assert doubled(1.0) != doubled(2.0)
+    assert doubled(1.0) != engine.Sphere((0, 0), 1.0)
+    assert hash(doubled(1.0)) == hash(doubled(1.0))

@@ -268,3 +268,31 @@ def test_a_path_leads_to_the_position_at_fault() -> None:
     with pytest.raises(engine.NotFiniteError) as error:
         shapes.as_solid({"type": "FeatureCollection", "features": [feature(POLYGON), feature(bad)]}, "solid")
     assert error.value.where == ("solid", "features", 1, "geometry", "coordinates", 1, 2, 0)
+
+
+def test_lines_and_boundaries_are_bodies() -> None:
+    square = engine.Polygon([SQUARE])
+    inside = engine.Sphere((0.5, 1.0), 0.25)
+    assert engine.clearance(square, inside).distance == 0.0
+    assert engine.clearance(square.boundary, inside).distance == 0.25
+    assert engine.collide(square.boundary, inside).relation == engine.Relation.DISJOINT
+    assert engine.collide(square.boundary, engine.Sphere((0.5, 1.0), 0.5)).relation == engine.Relation.TOUCHING
+    assert engine.locate([(1, 1), (2, 1), (3, 1)], square.boundary).tolist() == [-1, 0, -1]
+    lines = engine.Polygon.from_lines(LINES)
+    assert lines == engine.Polygon.from_lines(LINES["coordinates"])
+    assert engine.clearance(lines, engine.Sphere((0, 3), 0)).distance == 2.0
+    assert engine.Polygon([]).boundary == engine.Polygon([])
+    for bad, kind in (
+        (7, engine.InvalidArrayError),
+        ([[(0, 0)]], engine.RingTooShortError),
+        (POLYGON, engine.EngineError),
+    ):
+        with pytest.raises(kind):
+            engine.Polygon.from_lines(bad)
+
+
+def test_collections_that_share_their_members_are_walked_once() -> None:
+    shared: Any = POLYGON
+    for _ in range(25):
+        shared = {"type": "GeometryCollection", "geometries": [shared, shared]}
+    assert area(shared) == 3.0
