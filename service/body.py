@@ -63,8 +63,8 @@ def fields_of(form: Body, content_type: str) -> dict[str, tuple[str, bytes]]:
 
     Raises: `bad_request` for what is no form.
     """
-    found = _BOUNDARY.search(content_type)
-    mark = b"" if found is None else b"--" + (found[1] or found[2]).encode("latin-1")
+    boundary = _BOUNDARY.search(content_type)
+    mark = b"" if boundary is None else b"--" + (boundary[1] or boundary[2]).encode("latin-1")
     at = form.find(mark) if mark else -1
     fields: dict[str, tuple[str, bytes]] = {}
     while at >= 0 and len(fields) < _MOST_PARTS:  # bound: each turn goes on to the next mark

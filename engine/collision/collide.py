@@ -80,7 +80,7 @@ INSTEAD = {
 def pair_function(
     first: Solid, second: Solid, what: str = "collision"
 ) -> tuple[result.PairFunction, result.PartsFunction, bool]:
-    """Return the functions of a pair and whether to call them with the two bodies swapped; what: is asked of them."""
+    """Return the functions of a pair and whether to call them with the two bodies swapped; what: for errors."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:

@@ -26,7 +26,7 @@ def read_layer(file: File) -> dict[str, Any]:
     -------
     dict
         A FeatureCollection; a single feature or geometry becomes a collection of one. What it has besides `features`
-        (`crs`, `bbox`, `name`) is kept.
+        (`crs`, `bbox`, `name`) stays.
 
     Raises
     ------

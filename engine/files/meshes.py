@@ -90,7 +90,7 @@ def read_mesh(file: File, file_format: str | None = None) -> MeshOfFile:
     file : path, file object or bytes
         A path as a string or `pathlib.Path`; or open for reading bytes, or the bytes.
     file_format : {"stl", "obj", "ply", "off", "glb"}, optional
-        By default that of the path's ending, else told by the first bytes. glb needs trimesh (extra `formats`).
+        By default that of the path's ending, else that of the first bytes. glb needs trimesh (extra `formats`).
 
     Returns
     -------

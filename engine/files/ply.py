@@ -44,16 +44,16 @@ def read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
             elements[-1][2].append(_Property(line[2], _TYPES[line[1]], ""))
     body, at = octets[head.end() :], 0
     lines = body.split(b"\n") if order == "" else []
-    found: dict[str, dict[str, Any]] = {}
+    elements_by_name: dict[str, dict[str, Any]] = {}
     for name, n, properties in elements:
         if n < 0 or n > len(body) or order is None:
             raise ValueError(f"{n} items of {name} are more than the file has, or its format is unknown")
         if order == "":
-            found[name] = _from_text(lines[at : at + n], n, properties)
+            elements_by_name[name] = _from_text(lines[at : at + n], n, properties)
             at += n
         else:
-            found[name], at = _from_octets(body, at, n, properties, order)
-    vertices, faces = found["vertex"], found.get("face", {})
+            elements_by_name[name], at = _from_octets(body, at, n, properties, order)
+    vertices, faces = elements_by_name["vertex"], elements_by_name.get("face", {})
     corners = next((faces[name] for name in _LISTS if name in faces), None)
     if corners is None:
         corners = next((rows for rows in faces.values() if getattr(rows, "ndim", 2) == 2 or isinstance(rows, list)), [])

@@ -1,1 +1,1 @@
-"""Meshes that are nearly closed: what is wrong with them, and mends that are asked for."""
+"""Meshes that are nearly closed: what is wrong with them, and mends by option."""

@@ -67,7 +67,7 @@ def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
     vertices = np.unique(ends)
     corners = np.concatenate([points[ends], points[vertices][:, None].repeat(2, axis=1)])
     n = len(ends)
-    found: list[IntArray] = []
+    on_edges: list[IntArray] = []
     pairs = all_pairs_of_boxes(corners.min(axis=1), corners.max(axis=1), budget) if len(ends) else np.zeros((0, 2), int)
     pairs = pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)]
     edge, vertex = ends[pairs[:, 0]], vertices[pairs[:, 1] - n]
@@ -76,8 +76,8 @@ def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
     segments, spots = points[np.column_stack([edge, edge[:, 1]])], points[np.column_stack([vertex] * 3)]
     met = np.asarray(collide_triangles(segments, spots, deadline=budget.left(), cancel=budget.cancel)) != DISJOINT
     for (low, high), at in zip(edge[met], vertex[met]):
-        found.append(np.array([low, high, at]))
-    rows = np.array(found, np.int64).reshape(-1, 3)
+        on_edges.append(np.array([low, high, at]))
+    rows = np.array(on_edges, np.int64).reshape(-1, 3)
     across = np.abs(points[rows[:, 2]] - points[rows[:, 0]]).max(axis=1)  # on one line this grows along it
     return rows[np.lexsort((across, rows[:, 1], rows[:, 0]))]
 
@@ -146,16 +146,18 @@ def _sign_of_volume(points: FloatArray, faces: IntArray) -> int:
     return (exact > 0) - (exact < 0)
 
 
-def crossings(points: FloatArray, faces: IntArray, kept: IntArray, at_edges: IntArray, budget: Budget) -> IntArray:
+def crossings(
+    points: FloatArray, faces: IntArray, solid_faces: IntArray, at_edges: IntArray, budget: Budget
+) -> IntArray:
     """Return the pairs of faces, of those that have area, with a common point besides their common corners and
     edges."""
-    corners = points[faces[kept]]
+    corners = points[faces[solid_faces]]
     at_junctions = _pairs_at(faces, at_edges)
-    found = [np.zeros((0, 2), np.int64)]
+    blocks = [np.zeros((0, 2), np.int64)]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    for block in pairs_of_boxes(low, high, budget.flag, 1 << 16) if len(kept) else ():
+    for block in pairs_of_boxes(low, high, budget.flag, 1 << 16) if len(solid_faces) else ():
         budget.check()
-        pairs = kept[block]
+        pairs = solid_faces[block]
         first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
         same = first[:, :, None] == second[:, None, :]
         n_common = same.sum(axis=(1, 2))
@@ -168,8 +170,8 @@ def crossings(points: FloatArray, faces: IntArray, kept: IntArray, at_edges: Int
                 ]
                 meets[some] = test(points[order[0]], points[order[1]], budget)
         hits = pairs[meets]
-        found.append(hits[[tuple(pair) not in at_junctions for pair in hits.tolist()]] if len(at_junctions) else hits)
-    pairs = np.concatenate(found)
+        blocks.append(hits[[tuple(pair) not in at_junctions for pair in hits.tolist()]] if len(at_junctions) else hits)
+    pairs = np.concatenate(blocks)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 

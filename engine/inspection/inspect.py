@@ -1,4 +1,4 @@
-"""Public: what keeps a mesh from being a closed solid, each thing with its places, and the mends that are asked for."""
+"""Public: what keeps a mesh from being a closed solid, each thing with its places, and the mends by option."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MENDS: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Inspection(ByValue):
-    """What was found in a mesh, and the mesh after the mends that were asked for.
+    """The faults of a mesh, and the mesh after the mends of the options.
 
     Attributes
     ----------
@@ -76,11 +76,11 @@ class Inspection(ByValue):
     mended: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        found = [
+        counted = [
             f"{len(getattr(self, name)):,} {name.replace('_', ' ')}" for name in _MENDS if len(getattr(self, name))
         ]
-        text = f"<Inspection: {len(self.faces):,} faces, {', '.join(found) or 'nothing is wrong'}>"
-        return text if len(text) <= 120 else f"<Inspection: {len(self.faces):,} faces, {len(found)} kinds of faults>"
+        text = f"<Inspection: {len(self.faces):,} faces, {', '.join(counted) or 'nothing is wrong'}>"
+        return text if len(text) <= 120 else f"<Inspection: {len(self.faces):,} faces, {len(counted)} kinds of faults>"
 
     @property
     def is_closed(self) -> bool:
@@ -89,7 +89,7 @@ class Inspection(ByValue):
 
     @property
     def advice(self) -> dict[str, str]:
-        """What would mend each kind of thing that was found, by the name of the field."""
+        """What would mend each kind of fault, by the name of the field."""
         return {name: words for name, words in _MENDS.items() if len(getattr(self, name))}
 
     def solid(self) -> Polyhedron:
@@ -130,7 +130,7 @@ def inspect(
     Returns
     -------
     Inspection
-        Of the mesh after the mends that were asked for, which `mended` tells.
+        Of the mesh after the mends of the options, which `mended` names.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def inspect(
 
     Notes
     -----
-    Vertices at equal coordinates count as one. Nothing is changed without an option. What is found is decided exactly;
+    Vertices at equal coordinates count as one. Nothing is changed without an option. Faults are decided exactly;
     `weld` compares distances in floating point, and moves a vertex to the first of those that it is welded to.
 
     Degenerate input: faces without area, and faces that name a vertex twice, are flat and cross nothing.
@@ -156,8 +156,8 @@ def inspect(
     --------
     >>> from engine import inspect
     >>> corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
-    >>> found = inspect((corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
-    >>> found, found.open_edges.tolist()
+    >>> report = inspect((corners, [(0, 2, 1), (0, 1, 3), (1, 2, 3)]))
+    >>> report, report.open_edges.tolist()
     (<Inspection: 3 faces, 3 open edges>, [[0, 2], [0, 3], [2, 3]])
     """
     for name, option in (("orient", orient), ("fill_t_junctions", fill_t_junctions)):
@@ -206,9 +206,9 @@ def _inspected(points: FloatArray, faces: IntArray, budget: Budget, mended: tupl
     at_edges = junctions(points, edges.ends[is_open], budget)
     shells = shells_of(edges)
     inverted = [shell for shell, is_turned in nesting(points, faces, shells, budget) if is_turned]
-    kept = np.setdiff1d(np.flatnonzero(~is_flat), copies)
+    solid_faces = np.setdiff1d(np.flatnonzero(~is_flat), copies)
     return Inspection(
         points, faces, edges.ends[is_open], edges.ends[~is_open & (edges.net != 0)], at_edges,
         np.stack([copies, first[copies]], axis=1), np.flatnonzero(is_flat), tuple(inverted),
-        crossings(points, faces, kept, at_edges, budget), len(shells), mended,
+        crossings(points, faces, solid_faces, at_edges, budget), len(shells), mended,
     )  # fmt: skip

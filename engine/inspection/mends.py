@@ -1,4 +1,4 @@
-"""Mends of meshes, each only where it is asked for, and each with a sentence that says what it did."""
+"""Mends of meshes, each by an option, and each with a sentence that says what it did."""
 
 from __future__ import annotations
 

@@ -165,14 +165,14 @@ def clip_lines(
     region = as_solid(region, "region")
     plan = plan_for(region)
     try:
-        held = lines_in(lines)
+        listed = lines_in(lines)
     except EngineError as error:
         raise error.at("lines") from None
-    if held and region.dimension == 2 and isinstance(held[0], (list, tuple, np.ndarray)) and len(held[0]):
-        if len(held[0][0]) == 3:  # positions of other lengths beside it are refused below
+    if listed and region.dimension == 2 and isinstance(listed[0], (list, tuple, np.ndarray)) and len(listed[0]):
+        if len(listed[0][0]) == 3:  # positions of other lengths beside it are refused below
             note_altitude("lines")
-            held = [as_points(line, 3, ("lines", k))[:, :2] for k, line in enumerate(held)]
-    vertices, offsets = as_lines(lines if held is None else held, region.dimension)
+            listed = [as_points(line, 3, ("lines", k))[:, :2] for k, line in enumerate(listed)]
+    vertices, offsets = as_lines(lines if listed is None else listed, region.dimension)
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, region.dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]

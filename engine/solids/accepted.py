@@ -28,46 +28,36 @@ class HasArray(Protocol):
 class HasFaces(Protocol):
     """A mesh of trimesh."""
 
-    @property
-    def vertices(self) -> Any: ...
-    @property
-    def faces(self) -> Any: ...
+    vertices: Any
+    faces: Any
 
 
 class HasTriangles(Protocol):
     """A mesh of open3d."""
 
-    @property
-    def vertices(self) -> Any: ...
-    @property
-    def triangles(self) -> Any: ...
+    vertices: Any
+    triangles: Any
 
 
 class HasTensors(Protocol):
     """A tensor mesh of open3d."""
 
-    @property
-    def vertex(self) -> Any: ...
-    @property
-    def triangle(self) -> Any: ...
+    vertex: Any
+    triangle: Any
 
 
 class HasPointsAndFaces(Protocol):
     """A PolyData of pyvista."""
 
-    @property
-    def points(self) -> Any: ...
-    @property
-    def faces(self) -> Any: ...
+    points: Any
+    faces: Any
 
 
 class HasPointsAndCells(Protocol):
     """A mesh of meshio."""
 
-    @property
-    def points(self) -> Any: ...
-    @property
-    def cells(self) -> Any: ...
+    points: Any
+    cells: Any
 
 
 class HasMatrix(Protocol):

@@ -263,14 +263,14 @@ def as_points(
     dimension: 2 or 3, or None for either (no points: 2). must_be_finite: as in `as_floats`. Raises: InvalidArrayError,
     WrongDimensionError, NotFiniteError.
     """
-    held = None
+    listed = None
     if not isinstance(points, np.ndarray):
         try:
-            held = positions_in(points)
+            listed = positions_in(points)
         except EngineError as error:
             raise error.at(*where) from None
-    array = as_floats(points if held is None else held, 2, where, must_be_finite)
-    if held and dimension == 2 and array.shape[1] == 3:
+    array = as_floats(points if listed is None else listed, 2, where, must_be_finite)
+    if listed and dimension == 2 and array.shape[1] == 3:
         note_altitude(where[0])
         array = read_only(array[:, :2])
     if array.size == 0 and array.shape[0] == 0 and array.shape[1] in (0, dimension or 0):
@@ -286,19 +286,19 @@ def as_point_groups(
 
     must_be_finite: as in `as_floats`.
     """
-    held = None
+    listed = None
     if size == 2 and not isinstance(groups, np.ndarray):
         try:
-            held = lines_in(groups)
+            listed = lines_in(groups)
         except EngineError as error:
             raise error.at(*where) from None
-        for number, line in enumerate(held or ()):
+        for number, line in enumerate(listed or ()):
             if not isinstance(line, (list, tuple, np.ndarray)) or len(line) != 2:
                 raise InvalidArrayError(
                     f"{spell((*where, number))} is no line of 2 positions; clip_lines takes longer ones", where
                 )
-    array = as_floats(groups if held is None else held, 3, where, must_be_finite)
-    if held and dimension == 2 and array.shape[2] == 3:
+    array = as_floats(groups if listed is None else listed, 3, where, must_be_finite)
+    if listed and dimension == 2 and array.shape[2] == 3:
         note_altitude(where[0])
         array = read_only(array[:, :, :2])
     if array.shape[0] == 0 and array.size == 0 and (array.shape[2] == 0 or dimension in (None, array.shape[2])):

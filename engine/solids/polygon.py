@@ -112,7 +112,7 @@ class Polygon(Pictured, Solid):
 
     @classmethod
     def from_lines(cls, lines: object) -> Polygon:
-        """Return the polygon that is lines themselves, without area: a body whose distance to others can be asked.
+        """Return the polygon that is lines themselves, without area: a body, for its distance to others.
 
         Parameters
         ----------
@@ -131,10 +131,10 @@ class Polygon(Pictured, Solid):
         2.0
         """
         try:
-            held = lines_in(lines)
+            listed = lines_in(lines)
         except EngineError as error:
             raise error.at("lines") from None
-        given: Any = lines if held is None else held
+        given: Any = lines if listed is None else listed
         if not isinstance(given, (list, tuple, np.ndarray)):
             raise InvalidArrayError(f"lines must be a list of lines, got {type(lines).__name__}", ("lines",))
         chains = [as_points(line, 2, ("lines", k)) for k, line in enumerate(given)]

@@ -74,18 +74,18 @@ def from_stored(name: str, solid: Solid, collapsed: int | None = None) -> Stored
     )
 
 
-def from_inspection(found: engine.Inspection, accuracy: engine.Accuracy, with_mesh: bool) -> InspectResponse:
+def from_inspection(report: engine.Inspection, accuracy: engine.Accuracy, with_mesh: bool) -> InspectResponse:
     """Return the answer of `solids/inspect`; with_mesh: also the mesh, after mends."""
     names = ("open_edges", "turned_edges", "t_junctions", "duplicate_faces", "flat_faces", "self_crossings")
     return InspectResponse.made(
-        closed=found.is_closed,
-        shells=found.n_shells,
-        **{name: getattr(found, name) for name in names},
-        inverted_shells=[shell.tolist() for shell in found.inverted_shells],
-        advice=[MeshAdvice.made(kind=kind, mend=words) for kind, words in found.advice.items()],
-        mended=list(found.mended),
-        vertices=found.vertices if with_mesh else None,
-        faces=found.faces if with_mesh else None,
+        closed=report.is_closed,
+        shells=report.n_shells,
+        **{name: getattr(report, name) for name in names},
+        inverted_shells=[shell.tolist() for shell in report.inverted_shells],
+        advice=[MeshAdvice.made(kind=kind, mend=words) for kind, words in report.advice.items()],
+        mended=list(report.mended),
+        vertices=report.vertices if with_mesh else None,
+        faces=report.faces if with_mesh else None,
         accuracy=from_accuracy(accuracy),
     )
 

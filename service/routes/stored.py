@@ -84,8 +84,8 @@ def inspect_solid(question: InspectRequest, call: CallOf) -> InspectResponse:
     places and what would mend it. A file is inspected as it is."""
     names = ("weld", "orient", "fill_t_junctions")
     options = {name: getattr(question, name) for name in names if getattr(question, name)}
-    found = call.compute(_inspected, (question.vertices, question.faces), **options)
-    return answers.from_inspection(*found, bool(options))
+    report = call.compute(_inspected, (question.vertices, question.faces), **options)
+    return answers.from_inspection(*report, bool(options))
 
 
 def inspect_file(question: Any, content_type: str, call: Call) -> InspectResponse:
@@ -100,8 +100,8 @@ inspect_solid.upload = inspect_file  # type: ignore[attr-defined]
 
 
 def _inspected(mesh: Any, report: bool, **options: Any) -> tuple[engine.Inspection, engine.Accuracy]:
-    found = engine.inspect(mesh, **options)
-    return found, engine.Accuracy("exact", None, len(found.faces), 0, 0, "inspection")
+    inspection = engine.inspect(mesh, **options)
+    return inspection, engine.Accuracy("exact", None, len(inspection.faces), 0, 0, "inspection")
 
 
 @lookup.get("/v1/solids/{solid_id}", tags=["solids"], operation_id="get_solid", responses=KNOWN)
