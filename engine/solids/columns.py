@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from html import escape
 from typing import Any, ClassVar, Final, cast
 
 import numpy as np
@@ -73,6 +72,8 @@ class Columns(ByValue):
 
     def _repr_html_(self) -> str:
         """Return the table that notebooks show: the first rows."""
+        from html import escape
+
         columns = {name: list(column[:_SHOWN]) for name, column in self._by_row().items()}
         rows = [[*columns], *zip(*columns.values())] if columns else []
         cells = ("".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in rows)
