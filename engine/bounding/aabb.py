@@ -4,7 +4,8 @@ hold the exact images of boxes and balls under poses; infinite on overflow.
 With u = 2^-53, centre c and half widths h of a box, and m its largest coordinate, the image is R c + t, plus or minus
 |R| h, and no farther out than the body's points are from c: d + 2 roundings of terms below 2 m + |t|. The margin
 2^-49 (3 m + |t|) + 2^-1060 covers them, the rounding of c and h, and its own. Distances grow by 2^-38: a rotation may
-stretch lengths by up to 1.5e-12 (`rotations.TOLERANCE`), and a ball under the pose of another body counts as unposed.
+stretch lengths by up to 1.5e-12 (`rotations.TOLERANCE`), and a ball under the pose of another body counts as
+unposed.
 
 The flat cylinders around the faces below each child of a tree's inner nodes: the input of `lanes/boxes.py`.
 

@@ -5,11 +5,8 @@ Everything is float64 with a proven margin; pairs that no margin proves, contact
 exact path. e = e_a + e_b is the sum of the errors of both bodies (`PlacedBody`), a bound on the error of a coordinate
 of a - b.
 
-**Inside.** The first lies in the open interior of the second if every vertex is strictly below each face of the second.
-With n the unit normal of a face as computed, and p one of its corners, n . (a - p) differs from the value for the exact
-image of the face by the error of the posed coordinates and by the error of the normal times |a - p|: its `slack`, and
-3e-12 because a pose turns normals by the inverse transposed, of which a rotation of floats is off by
-`engine.solids.rotations.TOLERANCE`; 1e-11 covers both and the rounding.
+**Inside.** The first lies in the open interior of the second if every vertex is strictly below each face of the second
+(`_classify_in_hull`).
 
 **Meeting or apart** is proposed in float64 and accepted only if proven. The bodies have a common point exactly if the
 set of differences M = {a - b} contains the origin, and common interior points exactly if the origin is in the open

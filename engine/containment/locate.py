@@ -45,10 +45,7 @@ Located: TypeAlias = tuple[Int8Array, int, int, str]
 
 
 def locate_small_batch(points: object, solid: object) -> Located | None:
-    """Locate a small batch on the fast path; return None if the caller must use the general path.
-
-    Raises as `locate` does.
-    """
+    """Locate a small batch on the fast path; None where the general path must be taken. Raises as `locate` does."""
     if not isinstance(solid, Solid):
         return None
     array: Any = points

@@ -62,9 +62,9 @@ class Polygon(Pictured, Solid):
     """``(n_rings + 1,)``: ring i holds the vertices ``ring_offsets[i]`` up to ``ring_offsets[i + 1]``."""
 
     geojson: ClassVar[tuple[Callable[..., Polygon], Callable[[Polygon], dict[str, Any]]]]
-    """How a geometry is read and written: `engine.layers` says it, by overlays."""
+    """Functions that convert a geometry to a polygon and back; set by `engine.layers`, since they need overlays."""
     _from_geojson: ClassVar[Callable[[Any, Budget], Polygon | None]]
-    """How any GeoJSON is read, None for what is none: `engine.solids.shapes` says it."""
+    """The function from any GeoJSON to a polygon, None for what is none; set by `engine.solids.shapes`."""
 
     def __init__(self, rings: object, *, deadline: float | None = None, cancel: Cancel | None = None) -> None:
         if isinstance(rings, dict) or hasattr(rings, "__geo_interface__"):

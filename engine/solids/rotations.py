@@ -17,7 +17,7 @@ TOLERANCE: Final = Fraction(1, 10**12)
 """Largest |entry| of ``R^T R - I`` of a rotation; part of the contract, compared exactly."""
 
 USUAL: Final = float(TOLERANCE)
-"""The same as a float, for the filter and as a default: a Fraction would be slow."""
+"""`TOLERANCE` as a float, for the filter and as a default, since a Fraction would be slow."""
 MOST_TOLERANCE: Final = 0.1
 ROUNDED: Final = 1e-5
 """Tolerance of entries with six digits: each is wrong by 5e-7, an entry of R^T R by 2 sqrt(3) times that at most."""
@@ -36,9 +36,8 @@ def check_rotations(
 
     Decided exactly: entries of ``R^T R - I`` are computed in float64 for all matrices, and in rationals for those
     within rounding of the limit. A matrix within the usual limit has |det| within 1e-11 of 1, so that its float64 sign
-    is right; within the widest, |det| > 0.5.
-
-    one: `rotations` has a single matrix and `where` is its own path. limit: at most 0.1.
+    is right; within the widest, |det| > 0.5. one: `rotations` has a single matrix and `where` is its own path. limit:
+    at most 0.1.
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
@@ -66,8 +65,8 @@ def check_rotations(
 
 
 def is_certified_rotation(matrix: FloatArray) -> bool:
-    """Return whether the filter proves a read-only ``(1, d, d)`` float64 to be a rotation; `check_rotations` decides
-    others."""
+    """Return whether floats prove that a read-only ``(1, d, d)`` float64 is a rotation; if not, `check_rotations`
+    decides."""
     return not entry_of(find_suspects)(matrix, USUAL - _UNSURE, _UNREAD)
 
 
@@ -76,12 +75,9 @@ _UNREAD: Final = np.empty(1, np.bool_)
 
 @kernel
 def find_suspects(matrices: FloatArray, limit: float, is_suspect: BoolArray) -> int:
-    """Fill is_suspect (n,) for matrices (n, d, d): max|R^T R - I| > limit as computed, or det <= 0; return their
-    number.
-
-    An entry of the product is a sum of d products, det a sum of d! of d; numbers that overflow, far from orthogonal,
-    are suspect.
-    """
+    """Fill is_suspect (n,) for matrices (n, d, d): computed max|R^T R - I| > limit, or det <= 0; return the number of
+    True. An entry of the product is a sum of d products, det a sum of d! of d; matrices whose numbers overflow are
+    suspect."""
     dimension, n_suspects = matrices.shape[1], 0
     for item in range(matrices.shape[0]):
         suspect = False
@@ -114,7 +110,7 @@ def exact_defect(matrix: FloatArray) -> Fraction:
 
 
 def nearest_rotation(matrix: FloatArray) -> FloatArray:
-    """Return the orthogonal factor of the polar form of a matrix with det > 0, each entry the nearest double.
+    """Return the orthogonal factor of the polar decomposition of a matrix with det > 0, entries rounded to nearest.
 
     It is computed to some units of 2^-300. If that leaves a double open, above all a zero, it is computed to some of
     2^-1200; no entry of a rotation lies in the middle of two doubles, for a power of 4 is the sum of three squares only
@@ -129,10 +125,8 @@ def nearest_rotation(matrix: FloatArray) -> FloatArray:
 
 
 def _orthogonal_factor(matrix: FloatArray, bits: int) -> list[list[int]]:
-    """Return the factor in units of 2^-bits by Newton's iteration X <- (X + X^-T) / 2: each turn squares the error.
-
-    Source: N. Higham, Computing the polar decomposition, with applications, 1986.
-    """
+    """Return the orthogonal factor in units of 2^-bits by Newton's iteration X <- (X + X^-T) / 2, which squares the
+    error. Source: N. Higham, Computing the polar decomposition, with applications, 1986."""
     rows = [[int(Fraction(value) * (1 << bits)) for value in row] for row in matrix.tolist()]
     while True:  # bound: the error is below 1 and squared
         if len(rows) == 2:
@@ -149,5 +143,5 @@ def _orthogonal_factor(matrix: FloatArray, bits: int) -> list[list[int]]:
 
 
 def _decimal(value: Fraction) -> str:
-    """Return a few digits of a fraction that may be beyond float64."""
+    """Return some digits of a fraction, which may exceed float64."""
     return repr(float(value)) if value < 10**300 else "above 1e300"

@@ -114,8 +114,8 @@ def _read_polygons(
     """Return the members of a collection, or of a list of which some are GeoJSON, with their paths."""
     items: Any
     path: Path
-    if isinstance(value, dict):
-        member = _MEMBERS.get(str(value.get("type")), "")
+    if isinstance(value, dict) and "type" in value:
+        member = _MEMBERS.get(str(value["type"]), "")
         items, path = value.get(member), (member,)
     elif isinstance(value, list) and dict in map(type, value):
         items, path = value, ()

@@ -104,7 +104,7 @@ SCALED = {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0
     ("change", "code", "pointer"),
     [
         ({"second": SQUARE}, "wrong_dimension", "/second"),
-        ({"first": {"type": "convex", "planes": [[1, 0, 0, 0]]}}, "unsupported_pair", "/second"),
+        ({"first": {"type": "convex", "planes": [[1, 0, 0, 0]]}}, "unsupported_pair", "/first"),
         ({"second": {"type": "surface", "vertices": [[0, 0, 0]], "faces": [[0, 0, 0]]}}, "repeated_index",
          "/second/faces/0"),
         ({"poses": [moved(0, 0, 0), SCALED]}, "not_rigid", "/poses/1/rotation"),

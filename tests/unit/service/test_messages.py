@@ -30,7 +30,7 @@ STILL = {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]
         (b'{"points": [' + b"[1, 2, 3]," * 999 + b'[1, 2, 3]], "points": []}', "not_json", 'key "points"'),
         (b'{"solid": {"type": "sphere", "center": [0, 1e400], "radius": 1}}', "not_finite", "1.8e308"),
         (b'{"solid": {"type": "stored", "id": "abc"}}', "invalid_request", "64 hexadecimal digits"),
-        (b'{"solid": {"type": "Polygon", "coordinates": []}}', "unknown_type", "`rings`"),
+        (b'{"solid": {"type": "LineString", "coordinates": []}}', "unknown_type", "/v1/clip/lines"),
         (b'{"solid": {"type": "csg", "operation": "xor", "operands": []}}', "invalid_request", "'xor'"),
     ],
 )
