@@ -288,7 +288,8 @@ def _input(path: str, operation: dict[str, Any], document: dict[str, Any]) -> di
 def _in_a_sentence(union: dict[str, Any], schemas: dict[str, Any]) -> dict[str, Any]:
     """Return the union of solids as an object whose description names types and fields: put_solid has all of it."""
     kinds = []
-    for kind, reference in union["discriminator"]["mapping"].items():
+    named = {reference: kind for kind, reference in union["discriminator"]["mapping"].items()}  # GeoJSON's once
+    for reference, kind in named.items():
         fields = [name for name in schemas[reference.removeprefix(_SCHEMAS)]["properties"] if name != "type"]
         kinds.append(f"{kind} ({', '.join(fields)})")
     return {"type": "object", "description": f"By `type`, with its fields: {'; '.join(kinds)}; see put_solid."}

@@ -7,6 +7,7 @@ the one that begins at the start of the next. Both are exact (face -1), so no ro
 from __future__ import annotations
 
 from collections import namedtuple
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Literal, Unpack, overload
 
@@ -69,6 +70,10 @@ class LinePieces(Pictured, Ragged):
     def __geo_interface__(self) -> dict[str, Any]:
         """The pieces as a GeoJSON MultiLineString."""
         return {"type": "MultiLineString", "coordinates": [self[piece].tolist() for piece in range(len(self))]}
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """Yield the positions of each piece."""
+        return (self[piece] for piece in range(len(self)))
 
     def __getitem__(self, piece: int) -> FloatArray:
         """Return the positions of one piece, (k, dim) with k of at least 2, a view of `vertices`."""

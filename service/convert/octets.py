@@ -45,7 +45,7 @@ def check_is_convex(region: engine.Solid) -> engine.Solid:
     taken = [row.name for row in rows if row.is_convex]
     if region.type not in taken:
         raise engine.UnsupportedSolidError(
-            f"{region.type} regions may leave several pieces of a segment; here are taken: {', '.join(taken)}; "
+            f"a {region.type} may leave several pieces of a segment; here are taken: {', '.join(taken)}; "
             "POST /v1/clip/segments takes the others"
         )
     return region

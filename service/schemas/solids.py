@@ -106,23 +106,19 @@ class Solid(RootModel[Annotated[_Member, Field(discriminator="type")]]):
 
 
 class RigidPose(Schema):
-    """Moves a point p to R p + t; R is a rotation, given as `rotation` or `quaternion`, or with t as one `matrix`."""
+    """Moves a point p to R p + t; one of `rotation`, `quaternion` and `matrix`."""
 
     rotation: Annotated[Array, Numbers(DIMENSION, DIMENSION)] = optional("R, a list of rows.")
-    quaternion: Annotated[Array, Numbers(Axis(4, 4))] = optional(
-        "R in space as w, x, y, z, in this order, of any length but 0 (x, y, z, w of other programs: w goes first)."
-    )
+    quaternion: Annotated[Array, Numbers(Axis(4, 4))] = optional("R as w, x, y, z. In space; of any length but 0.")
     matrix: Annotated[Array, Numbers(Axis(3, 4), Axis(3, 4))] = optional(
-        "R and t in homogeneous coordinates: 4 rows of 4 in space, 3 of 3 in the plane, the last row 0 ... 0 1."
+        "R and t in homogeneous coordinates. 4 rows of 4 in space, 3 of 3 in the plane, the last row 0 ... 0 1."
     )
-    translation: Position = optional("t; zero if left out. Not beside `matrix`, which has it.")
+    translation: Position = optional("t, zero if left out. Not beside `matrix`, which has it.")
     tolerance: Annotated[float, WithJsonSchema({"type": "number", "format": "double"})] = optional(
         "How far an entry of R^T R may be from that of the unit matrix: 0 to 0.1, 1e-12 if left out. A matrix farther "
         "than 1e-12 stands for the rotation nearest to it, each entry the nearest double; 1e-6 takes float32 matrices."
     )
-    rounded: bool = optional(
-        "The same with a tolerance of 1e-5: takes matrices printed with six digits, or of float32."
-    )
+    rounded: bool = optional("Take R with six digits. A tolerance of 1e-5, which takes float32 too.")
 
     @model_validator(mode="after")
     def _is_one_pose(self) -> RigidPose:
