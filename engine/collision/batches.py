@@ -208,7 +208,8 @@ class OwnBoxes(NamedTuple):
 
 
 def scene_bodies(solids: Any, poses: Any) -> SceneBodies:
-    """Return the bodies as arrays. Raises with the index of the wrong body."""
+    """Check the bodies of a scene and return them as arrays; poses: one or None for each solid, or None for no poses.
+    Raises an error that names the index of the wrong body."""
     poses = list(poses) if isinstance(poses, Poses) else poses
     for name, each in (("solids", solids), ("poses", () if poses is None else poses)):
         if not isinstance(each, (list, tuple)):

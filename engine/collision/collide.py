@@ -80,7 +80,10 @@ INSTEAD = {
 def pair_function(
     first: Solid, second: Solid, what: str = "collision"
 ) -> tuple[result.PairFunction, result.PartsFunction, bool]:
-    """Return the functions of a pair and whether to call them with the two bodies swapped; what: for errors."""
+    """Look up a pair of solids in the table `PAIRS`. Returns the function that decides their relation, the one that
+    decides which has a part outside the other, and whether to call both with the two bodies swapped. Raises
+    UnsupportedSolidError, WrongDimensionError or UnsupportedPairError if the pair is not in the table; what: the
+    question, for these."""
     if isinstance(first, Solid) and isinstance(second, Solid):
         types = first.dimension, first.type, second.dimension, second.type
         if (known := _BY_TYPE.get(types)) is not None:

@@ -353,11 +353,9 @@ def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
 
 
 def locate_points_in_layer(points: PointsLike, layer: Layer, limits: Limits) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return points and the features that contain them, by point, then feature; and whether on their boundary.
-
-    A feature with overlapping parts contains what one of its parts contains; a point on the boundary of some parts, in
-    the interior of none, is on the feature's unless it is inside their union.
-    """
+    """Return (point, feature, on boundary) arrays (n,) for all pairs where the feature contains the point, sorted by
+    point, feature. A feature with overlapping parts contains what one of its parts contains; a point on the boundary of
+    some parts, in the interior of none, is on the feature's boundary unless it is inside the union of the parts."""
     there = np.flatnonzero(layer.arrays.sizes())
     solids = [*PolygonSelection(layer.arrays, there), *PolygonSelection(layer.parts, np.arange(len(layer.owners)))]
     hits = limits.record(locate_scene(points, solids, **limits.options()))

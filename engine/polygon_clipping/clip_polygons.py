@@ -103,9 +103,8 @@ _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
 """Number of coordinates that are clipped faster than a batch is planned."""
 _USUAL: Final = (2.0**-100, 2.0**120)
-"""Range of the sum of squares of few coordinates in which nothing is scaled: the largest coordinate lies between the
-root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does.
-"""
+"""Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
+root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any] | SolidsLike
 
 

@@ -171,7 +171,7 @@ def check_operation(operation: str) -> None:
 
 
 def polygons_in(solids: SolidsLike, name: str) -> Sequence[Solid]:
-    """Return polygons as they are, other shapes read; refuse anything else, by its place."""
+    """Return polygons, other shapes read; raise for anything that is no polygon, naming its index."""
     read = as_solids(solids, name)
     if set(map(type, read)) - {Polygon}:
         for k, each in enumerate(read):
@@ -375,10 +375,8 @@ def _arrange_all(
 
 
 def _rings_of_all(polygons: SolidsLike) -> tuple[RingArrays, IntArray, IntArray]:
-    """Return the rings of all polygons, by ring the number of its polygon, and the first vertices of all but the first.
-
-    Polygons without rings have no number, so that the number of a ring is at least that of its polygon.
-    """
+    """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of each polygon but the
+    first. Polygons without rings have no number, so that the number of a ring is at least that of its polygon."""
     each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
     if not each:
         return NO_RINGS, np.zeros(0, np.int64), np.zeros(0, np.int64)

@@ -134,7 +134,8 @@ def kind_of(solid: object) -> str:
 def refused(
     solid: object, what: str, takes: Callable[[Row], object], more: str = "", where: Where = ()
 ) -> UnsupportedSolidError:
-    """Return the error for a solid that an operation refuses; what: the sentence up to the solid."""
+    """Return the error for a solid that an operation does not take; what: the beginning of the sentence, before the
+    solid."""
     return UnsupportedSolidError(f"{what} {named(kind_of(solid))}; give {named(names(takes))}{more}", where)
 
 
