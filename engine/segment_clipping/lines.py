@@ -164,7 +164,7 @@ def clip_lines(
     ([[0.0, 1.0], [1.0, 1.0], [1.0, 2.0]], [[0, 1]], [[0.5, 0.5]], [[0, 3]])
     """
     check_options(workers, progress, report=report)
-    if keep not in ("inside", "outside"):
+    if not isinstance(keep, str) or keep not in ("inside", "outside"):
         raise InvalidInputError(f"keep must be inside or outside, got {shown(keep)}", ("keep",))
     is_free = is_unlimited(workers, deadline, cancel, progress)
     region = as_solid(region, "region")

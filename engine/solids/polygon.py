@@ -135,7 +135,7 @@ class Polygon(Pictured, Solid):
         except EngineError as error:
             raise error.at("lines") from None
         given: Any = lines if listed is None else listed
-        if not isinstance(given, (list, tuple, np.ndarray)):
+        if not isinstance(given, (list, tuple)) and not (isinstance(given, np.ndarray) and given.ndim):
             raise InvalidArrayError(f"lines must be a list of lines, got {type(lines).__name__}", ("lines",))
         chains = [as_points(line, 2, ("lines", k)) for k, line in enumerate(given)]
         for k, chain in enumerate(chains):

@@ -85,11 +85,7 @@ class Pose(Immutable):
             raise WrongDimensionError(f"rotation must be square, got shape {matrix.shape}", ("rotation",))
         limit = TOLERANCE
         if type(tolerance) is not float or tolerance != USUAL:
-            if not 0.0 <= as_number(tolerance, ("tolerance",)) <= MOST_TOLERANCE:
-                raise InvalidArrayError(
-                    f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",)
-                )
-            limit = Fraction(float(tolerance))
+            limit = Fraction(checked_tolerance(tolerance))
         check_rotations(matrix[None], ("rotation",), one=True, limit=limit)
         if limit is not TOLERANCE and limit > TOLERANCE and exact_defect(matrix) > TOLERANCE:
             matrix = nearest_rotation(matrix)
@@ -288,7 +284,15 @@ def rounded_tolerance(rounded: object, tolerance: float) -> float:
     """Return the tolerance of a pose: `ROUNDED` where rounded is True."""
     if not isinstance(rounded, (bool, np.bool_)):
         raise InvalidArrayError(f"rounded must be True or False, got {shown(rounded)}", ("rounded",))
-    return max(ROUNDED, tolerance) if rounded else tolerance
+    return max(ROUNDED, checked_tolerance(tolerance)) if rounded else tolerance
+
+
+def checked_tolerance(tolerance: object) -> float:
+    """Return a tolerance of rotations as a float. Raises: InvalidArrayError unless it is from 0 to `MOST_TOLERANCE`."""
+    number = as_number(tolerance, ("tolerance",))
+    if not 0.0 <= number <= MOST_TOLERANCE:
+        raise InvalidArrayError(f"tolerance is {tolerance!r}; it must be from 0.0 to {MOST_TOLERANCE}", ("tolerance",))
+    return number
 
 
 _STILL: Final = {d: (read_only(np.eye(d)), read_only(np.zeros(d))) for d in (2, 3)}

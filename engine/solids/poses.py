@@ -10,7 +10,7 @@ import numpy as np
 from engine.errors import EngineError, InvalidArrayError, WrongDimensionError
 from engine.solids.base import Immutable
 from engine.solids.checks import as_floats, check_dimension, frozen, shown, spell
-from engine.solids.pose import Pose, rounded_tolerance
+from engine.solids.pose import Pose, checked_tolerance, rounded_tolerance
 from engine.solids.rotations import check_rotations
 from engine.types import FloatArray
 
@@ -63,7 +63,7 @@ class Poses(Immutable):
                 turns, moves = as_pose_arrays(rotations, None)
         else:
             turns, moves = as_floats(rotations, 3, ("rotations",)), as_floats(translations, 2, ("translations",))
-        tolerance = rounded_tolerance(rounded, tolerance)
+        tolerance = rounded_tolerance(rounded, checked_tolerance(tolerance))
         turns, moves = check_pose_arrays(turns, moves, None, tolerance)
         object.__setattr__(self, "rotations", frozen(turns))
         object.__setattr__(self, "translations", frozen(moves))
