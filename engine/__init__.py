@@ -81,8 +81,8 @@ __all__ = [
     "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
     "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
     "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
-    "contains", "filled", "inspect", "layers", "locate", "locate_scene", "overlay", "overlay_batch", "polygons",
-    "read_layer", "read_mesh", "release", "solid_types", "union_all", "warm",
+    "contains", "default_workers", "filled", "inspect", "layers", "locate", "locate_scene", "overlay", "overlay_batch",
+    "polygons", "read_layer", "read_mesh", "release", "solid_types", "union_all", "warm",
 ]  # fmt: skip
 
 

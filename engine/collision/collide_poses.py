@@ -222,7 +222,7 @@ def as_poses(
         if isfinite(sum(move[0].tolist())) and is_certified_rotation(turn):
             return turn, move
     turns, moves = as_floats(rotations, 3, ("rotations",)), as_floats(translations, 2, ("translations",))
-    turns, moves = check_pose_arrays(turns, moves, dimension)
+    turns, moves = check_pose_arrays(turns, moves, dimension, workers=workers)
     return read_only(turns), read_only(moves)
 
 

@@ -21,7 +21,7 @@ from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import largest_of, scaled_back
 from engine.running.budget import UNLIMITED, Budget, Cancel
-from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
+from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, check_dimension, check_finite, is_ready

@@ -256,7 +256,7 @@ def as_pose_arrays(poses: Any, dimension: int | None) -> tuple[FloatArray, Float
 
 
 def check_pose_arrays(
-    turns: FloatArray, moves: FloatArray, dimension: int | None, tolerance: float = 1e-12
+    turns: FloatArray, moves: FloatArray, dimension: int | None, tolerance: float = 1e-12, workers: int | None = 1
 ) -> tuple[FloatArray, FloatArray]:
     """Return rotations (n, d, d) and translations (n, d) of finite doubles after all other checks, those farther from
     a rotation than 1e-12 replaced by the nearest ones. dimension: None for that of the rotations."""
@@ -281,7 +281,7 @@ def check_pose_arrays(
                 raise
         return np.array(made).reshape(-1, size, size), moves
     if len(turns):
-        check_rotations(turns)
+        check_rotations(turns, workers=workers)
     else:
         turns, moves = np.zeros((0, size, size)), np.zeros((0, size))
     return turns, moves

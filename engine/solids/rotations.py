@@ -10,6 +10,8 @@ import numpy as np
 from engine.compiling.jit import entry_of, kernel
 from engine.errors import InvalidArrayError, NotRigidError
 from engine.predicates.rational import cross, determinant
+from engine.running.budget import Budget
+from engine.running.parallel import run_chunks
 from engine.solids.checks import digits, spell
 from engine.types import BoolArray, FloatArray, read_only
 
@@ -31,6 +33,7 @@ def check_rotations(
     *,
     one: bool = False,
     limit: Fraction = TOLERANCE,
+    workers: int | None = 1,
 ) -> None:
     """Raise for the first matrix of ``(n, d, d)`` finite float64 that is no rotation.
 
@@ -43,8 +46,16 @@ def check_rotations(
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
     sure = (USUAL if limit is TOLERANCE else float(limit)) - _UNSURE
     is_suspect = np.empty(len(rotations), np.bool_)
-    n_suspects = entry_of(find_suspects)(read_only(rotations), sure, is_suspect)
-    for index in np.flatnonzero(is_suspect) if n_suspects else ():
+    matrices = read_only(rotations)
+
+    def task(first: int, last: int) -> None:
+        entry_of(find_suspects)(matrices[first:last], sure, is_suspect[first:last])
+
+    if one:
+        task(0, len(rotations))
+    else:
+        run_chunks(task, len(rotations), budget=Budget(), workers=workers)
+    for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = exact_defect(matrix)
