@@ -28,7 +28,7 @@ from engine.solids.checks import as_point_groups, as_points, check_dimension, ch
 from engine.solids.geometries import geometry_of
 from engine.solids.pictures import Pictured
 from engine.solids.polygon import Polygon
-from engine.solids.ragged import Ragged, summed
+from engine.solids.ragged import Ragged, rings_as_geojson, summed
 from engine.solids.shapes import as_solid, as_solids
 from engine.types import OPEN, Accuracy, BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
@@ -77,9 +77,7 @@ class ClippedPolygons(Pictured, Ragged):
     @property
     def __geo_interface__(self) -> dict[str, Any]:
         """What is left as a GeoJSON MultiPolygon, of each polygon its rings, closed; bridges stay."""
-        left = (self.rings(k) for k in range(len(self)))
-        parts = [[[*ring.tolist(), ring[0].tolist()] for ring in rings] for rings in left if rings]
-        return {"type": "MultiPolygon", "coordinates": parts}
+        return rings_as_geojson(map(self.rings, range(len(self))))
 
     def rings(self, polygon: int) -> list[FloatArray]:
         """Return the rings left of one polygon.
@@ -191,8 +189,7 @@ def clip_polygons(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     if not is_free or report is not False:
         check_options(workers, progress, report=report)
-    if not isinstance(region, Solid):
-        region = as_solid(region, "region")
+    region = region if isinstance(region, Solid) else as_solid(region, "region")
     plan = region.cached("clipping_plan")
     if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
         few = _clip_array(polygons, plan, region.dimension)

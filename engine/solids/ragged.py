@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from itertools import chain, pairwise
 from typing import Any, ClassVar, cast
@@ -196,3 +196,9 @@ def as_geojson(vertices: FloatArray, ring_offsets: IntArray, piece_offsets: IntA
     if len(pieces) == 1:
         return {"type": "Polygon", "coordinates": pieces[0]}
     return {"type": "MultiPolygon", "coordinates": pieces}
+
+
+def rings_as_geojson(polygons: Iterable[list[FloatArray]]) -> dict[str, Any]:
+    """Return polygons, lists of rings that are not closed, as a GeoJSON MultiPolygon; those without rings left out."""
+    parts = [[[*ring.tolist(), ring[0].tolist()] for ring in rings] for rings in polygons if rings]
+    return {"type": "MultiPolygon", "coordinates": parts}
