@@ -47,15 +47,16 @@ def check_rotations(
     sure = (USUAL if limit is TOLERANCE else float(limit)) - _UNSURE
     is_suspect = np.empty(len(rotations), np.bool_)
     matrices = read_only(rotations)
-
-    def task(first: int, last: int) -> None:
-        entry_of(find_suspects)(matrices[first:last], sure, is_suspect[first:last])
-
-    if one:
-        task(0, len(rotations))
+    if len(rotations) < _MANY:
+        has_suspects = entry_of(find_suspects)(matrices, sure, is_suspect)
     else:
+
+        def task(first: int, last: int) -> None:
+            entry_of(find_suspects)(matrices[first:last], sure, is_suspect[first:last])
+
         run_chunks(task, len(rotations), budget=Budget(), workers=workers)
-    for index in np.flatnonzero(is_suspect) if is_suspect.any() else ():
+        has_suspects = is_suspect.any()
+    for index in np.flatnonzero(is_suspect) if has_suspects else ():
         matrix = rotations[index]
         path = where if one else (*where, int(index))
         defect = exact_defect(matrix)
@@ -81,6 +82,8 @@ def is_certified_rotation(matrix: FloatArray) -> bool:
     return not entry_of(find_suspects)(matrix, USUAL - _UNSURE, _UNREAD)
 
 
+_MANY: Final = 1 << 12
+"""Number of matrices from which on several threads check them."""
 _UNREAD: Final = np.empty(1, np.bool_)
 
 
