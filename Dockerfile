@@ -11,20 +11,22 @@ FROM python:3.12-slim AS build
 ARG CPU=x86-64-v3
 
 WORKDIR /src
-COPY pyproject.toml README.md LICENSE ./
+COPY pyproject.toml hatch_build.py README.md LICENSE ./
 COPY engine engine
 COPY service service
 COPY exact_geometry exact_geometry
+COPY benchmarks benchmarks
 
 RUN python -m venv /opt/exact-geometry
 RUN /opt/exact-geometry/bin/pip install --no-cache-dir ".[formats,mcp,telemetry]"
-# -P: the engine that was installed, not the one in this folder
-RUN /opt/exact-geometry/bin/python -P -m engine warm --into /opt/exact-geometry/kernels --cpu $CPU
+# with what was installed, not with the sources in this folder (-P); then again, as the wheel with these kernels
+RUN /opt/exact-geometry/bin/python -P -m exact_geometry warm --into /src/kernels --cpu $CPU
+RUN EXACT_GEOMETRY_KERNELS=/src/kernels /opt/exact-geometry/bin/pip install --no-cache-dir --no-deps --force-reinstall .
 
 FROM python:3.12-slim
 
-# the kernels are read where they are; what the image lacks is compiled into a place that can be written: a tmpfs will do
-ENV ENGINE_CACHE_SEED=/opt/exact-geometry/kernels ENGINE_CACHE_DIR=/tmp/kernels HOME=/tmp
+# kernels are read from the package; what the CPU cannot run is compiled into a place that can be written: a tmpfs will do
+ENV ENGINE_CACHE_DIR=/tmp/kernels HOME=/tmp
 ENV PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1
 ENV GEOMETRY_HOST=0.0.0.0 GEOMETRY_PORT=8000
 

@@ -277,7 +277,9 @@ def watched(words: Sequence[str]) -> int:
         while True:  # bound: each turn but the last leaves a contender out
             asked.write_text("")
             more = [word for name in without for word in ("--without", name)]
-            process = subprocess.Popen([sys.executable, "-m", "engine", "audit", *words, "--asked", str(asked), *more])
+            process = subprocess.Popen(
+                [sys.executable, "-m", "exact_geometry", "audit", *words, "--asked", str(asked), *more]
+            )
             while process.poll() is None:
                 time.sleep(0.05)
                 if asked.read_text() and time.time() - asked.stat().st_mtime > LIMIT:

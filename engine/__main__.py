@@ -14,9 +14,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
@@ -28,7 +30,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.collision.collide_poses import collide_poses
-from engine.compiling.kernel_cache import cache_folder, check_owner, seal
+from engine.compiling.kernel_cache import cache_folder, check_owner, seal, seed
 from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
 from engine.errors import EngineError, InvalidInputError
@@ -42,7 +44,7 @@ from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation
 from engine.version import __version__
-from engine.warmup import warm
+from engine.warmup import GROUPS, OPERATIONS, warm
 
 Options = argparse.Namespace
 
@@ -174,13 +176,8 @@ def _bounds(options: Options) -> None:
 
 
 def _audit(words: Sequence[str]) -> int:
-    """Run `benchmarks.audit` and return its exit code."""
-    try:
-        audit = import_module("benchmarks.audit")
-    except ModuleNotFoundError as error:
-        raise ValueError(
-            f"the audit needs {error.name}: run it in a checkout of the repository after pip install -e '.[bench,test]'"
-        ) from None
+    """Run `benchmarks.audit`, which a wheel has too, and return its exit code."""
+    audit = import_module(f"{warm.__module__.removesuffix('engine.warmup')}benchmarks.audit")
     return int((audit.main if "--asked" in words else audit.watched)(words))
 
 
@@ -189,16 +186,17 @@ def _warm(options: Options) -> None:
         _warm_elsewhere(options)
         return
     with _bar(100, "%", options) as progress:
-        warm(progress or (None if options.quiet else _Lines()), processes=options.processes)
+        shown = progress or (_Lines() if not options.quiet else lambda _: None)
+        warm(shown, processes=options.processes, operations=options.operations or None)
     if not options.quiet:
-        print(f"every kernel is in {cache_folder()}", file=sys.stderr)
+        what = f"every kernel of {', '.join(options.operations)}" if options.operations else "every kernel"
+        print(f"{what} is in {cache_folder()}{f' or {seed()}' if seed() else ''}", file=sys.stderr)
 
 
 def _warm_elsewhere(options: Options) -> None:
-    """Run `warm` in a new process, since the compiler reads its CPU and cache folder only once."""
-    package = (__package__ or "engine").partition(".")[0]
-    command = [sys.executable, "-P", "-m", package, "warm", "--processes", str(options.processes)]
-    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    """Run `warm` in new processes, since the compiler reads its CPU and cache folder only once."""
+    command = [sys.executable, "-P", "-m", "exact_geometry", "warm", "--processes", str(options.processes)]
+    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "PYTHONHASHSEED": "0"}
     if options.cpu:
         surroundings |= {"NUMBA_CPU_NAME": options.cpu, "NUMBA_CPU_FEATURES": ""}
     with TemporaryDirectory() as temporary:
@@ -207,12 +205,33 @@ def _warm_elsewhere(options: Options) -> None:
         if options.into:
             (archive.parent if archive else folder).mkdir(mode=0o755, parents=True, exist_ok=True)
             check_owner(folder)
-            surroundings["ENGINE_CACHE_DIR"] = str(folder.resolve())
-            surroundings.pop("ENGINE_CACHE_SEED", None)
+            surroundings |= {"ENGINE_CACHE_DIR": str(folder.resolve()), "ENGINE_CACHE_SEED": ""}
+            _compile_groups(folder, surroundings, options)
         if subprocess.run([*command, *["--quiet"] * options.quiet], env=surroundings, check=False).returncode:
             raise ValueError("not every kernel was compiled")
+        if options.into and not any(folder.rglob("*.nbc")):
+            raise ValueError("no kernel was written: is the compiler disabled?")
         if options.into:
             seal(folder, archive)
+
+
+def _compile_groups(folder: Path, surroundings: Mapping[str, str], options: Options) -> None:
+    """Compile all kernels into a folder by one process a group of steps, each with a cache of its own: what is compiled
+    does not depend on who is faster."""
+    if not options.quiet:
+        print(f"compiling all kernels: a few minutes on {min(options.processes, len(GROUPS))} core(s)", file=sys.stderr)
+    code = f"import logging, exact_geometry as e; logging.disable(); from {warm.__module__} import call_group"
+    with TemporaryDirectory() as temporary, ThreadPoolExecutor(options.processes) as pool:
+        parts = [Path(temporary) / str(group) for group in range(len(GROUPS))]
+
+        def compile_group(part: Path) -> int:
+            command = [sys.executable, "-P", "-c", f"{code}; call_group({part.name})"]
+            return subprocess.run(command, env={**surroundings, "ENGINE_CACHE_DIR": str(part)}, check=False).returncode
+
+        if any(pool.map(compile_group, parts)):
+            raise ValueError("not every kernel was compiled")
+        for part in reversed(parts):
+            shutil.copytree(part, folder, dirs_exist_ok=True)
 
 
 class _Lines:
@@ -290,6 +309,7 @@ def _parser() -> argparse.ArgumentParser:
     made["join"].add_argument("--outside", action="store_true", help="also write points that no feature contains")
     commands.add_parser("audit", help="compare libraries on your own data, on one page")
     ready = commands.add_parser("warm", help="compile all kernels now, for this machine or to ship them")
+    ready.add_argument("operations", nargs="*", metavar="operation", help=f"{', '.join(OPERATIONS)}; all by default")
     ready.add_argument("--into", metavar="FOLDER", help="a folder or .tar.xz for ENGINE_CACHE_SEED of other machines")
     ready.add_argument("--cpu", metavar="NAME", help="the oldest CPUs to run on: x86-64-v3; this one by default")
     ready.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="one a core by default")

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
 from engine.collision.collide import collide
 from engine.collision.collide_poses import collide_poses
 from engine.collision.triangles import collide_triangles
-from engine.compiling.cold_start import fill_cache, note_full
+from engine.compiling.cold_start import fill_cache, is_full, note_full
+from engine.compiling.kernel_cache import expect_compiling, warn_of_compiling
 from engine.containment.locate import locate
 from engine.containment.methods.rational_locate import rational_location
 from engine.containment.posed_locators import posed_locator
@@ -34,6 +36,7 @@ from engine.segment_clipping.lines import clip_lines
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
 from engine.solids.checks import as_points, shown
+from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit
 from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
@@ -42,12 +45,15 @@ from engine.solids.primitives import Aabb, Convex, HalfSpace, Sphere, Triangle
 
 _MANY = 50_000  # points: some milliseconds of work, and above what makes cells pay for solids this small
 
-_is_warm = threading.Event()
+_done: set[int] = set()
+"""Indices of the `STEPS` that were called."""
 _lock = threading.Lock()
 
 
-def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1) -> None:
-    """Compile or load every kernel; a second call returns at once.
+def warm(
+    progress: Callable[[int], object] | None = None, *, processes: int = 1, operations: Iterable[str] | None = None
+) -> None:
+    """Compile or load every kernel, or those of some operations; a second call returns at once.
 
     Parameters
     ----------
@@ -55,35 +61,65 @@ def warm(progress: Callable[[int], object] | None = None, *, processes: int = 1)
         Called with hundredths of all the work as they are done, 100 in the end: ``tqdm(total=100).update`` fits.
     processes : int, default 1
         Where nothing is cached, up to so many more processes are started that compile (up to 1 GB each), and end.
+    operations : iterable of str, optional
+        Of which operations, by the names of their functions: ``["overlay", "locate"]``; all by default.
 
     Raises
     ------
     InvalidInputError
-        For options of a wrong type.
+        For options of a wrong type, and for an operation that is not known.
 
     Notes
     -----
     Takes some minutes where nothing is cached, else a second or two; what is compiled is logged. Safe to call from
-    several threads (the others wait) and processes (each compiles what it does not find).
+    several threads (the others wait) and processes (each compiles what it does not find). A wheel with kernels for this
+    Python and numba, or ``ENGINE_CACHE_SEED``, needs no compiling.
 
     Examples
     --------
     >>> import engine
-    >>> engine.warm(processes=2)  # doctest: +SKIP
+    >>> engine.warm(processes=2, operations=["overlay"])  # doctest: +SKIP
     """
     check_options(None, progress)
     if isinstance(processes, bool) or not isinstance(processes, int) or processes < 1:
         raise InvalidInputError(f"processes must be a whole number from 1, got {shown(processes)}", ("processes",))
+    chosen = [*range(len(STEPS))] if operations is None else _steps_of(operations)
     with _lock:
-        if _is_warm.is_set():
+        if _done.issuperset(chosen):
             return
-        filled = fill_cache(__name__, SHARES, processes, progress)
-        for index, step in enumerate(STEPS):
-            step()
-            if progress is not None and index not in filled:
-                progress(SHARES[index])
-        note_full(__name__)
-        _is_warm.set()
+        total = sum(SHARES[index] for index in chosen)
+        if progress is not None:
+            expect_compiling()
+        elif not is_full(__name__):
+            warn_of_compiling(__name__, processes * sum(SHARES) / total)
+        ended = 0
+
+        def report(share: int) -> None:
+            nonlocal ended
+            before, ended = 100 * ended // total, ended + share
+            if progress is not None:
+                progress(100 * ended // total - before)
+
+        filled = fill_cache(__name__, SHARES, processes, report, chosen)
+        for index in chosen:
+            STEPS[index]()
+            if index not in filled:
+                report(SHARES[index])
+        _done.update(chosen)
+        if len(_done) == len(STEPS):
+            note_full(__name__)
+
+
+def _steps_of(operations: Iterable[str]) -> list[int]:
+    """Return the indices of the steps for operations; raise InvalidInputError for other words."""
+    chosen = set()
+    for operation in operations:
+        if operation not in OPERATIONS or isinstance(operations, str):
+            raise InvalidInputError(
+                f"operations must be names of {', '.join(OPERATIONS)}, got {shown(operation)}", ("operations",)
+            )
+        chosen |= {STEPS.index(step) for step in OPERATIONS[operation]}
+    return sorted(chosen)
 
 
 def _cube(at: float = 0.0) -> Polyhedron:
@@ -135,16 +171,20 @@ def _warm_cells() -> None:
     locate(np.ascontiguousarray(many[:, :2]), Polygon([np.column_stack([np.cos(around), np.sin(around)])]))
 
 
-def _warm_collision() -> None:
+def _warm_poses() -> None:
     turns, moves = np.broadcast_to(np.eye(3), (3, 3, 3)), np.array([[0.5, 0, 0], [1, 0, 0], [5, 0, 0]])
     bodies = _bodies()
     for first in bodies:
         collide_poses(first, bodies[0], turns, moves, witnesses=True)
+    collide_poses(bodies[0], _cube(0.5), np.repeat(turns, 12, axis=0), np.repeat(moves, 12, axis=0))  # eight at a time
+
+
+def _warm_collision() -> None:
+    for first in _bodies():
         for other in (_cube(1.0), _cube(0.5), HalfSpace([1, 0, 0], -0.5), Sphere([0, 0, 0], 1)):
             collide(first, other)
     cube = _cube()
     collide(Polyhedron(cube.vertices, np.concatenate([cube.triangles] * 2)), _cube(0.5))  # faces that cancel: regions
-    collide_poses(bodies[0], _cube(0.5), np.repeat(turns, 12, axis=0), np.repeat(moves, 12, axis=0))  # eight at a time
 
 
 def _warm_scenes() -> None:
@@ -152,15 +192,6 @@ def _warm_scenes() -> None:
     Scene(_bodies()).collide(moved=[0])
     for scene in [Scene([Sphere([0, 0, 0], 1)])] * 2:  # a question after the first
         scene.locate([[0.25, 0, 0]])
-    segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
-    turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
-    for dimension in (2, 3):
-        some = [*_regions(dimension), *_bodies()[1:2] * (dimension == 3)]
-        pose = turned if dimension == 3 else Pose([[0.6, -0.8], [0.8, 0.6]], [0.25, 0])
-        scene = Scene(some * 2, [None] * len(some) + [pose] * len(some))
-        for keep in ("all", "first", "any"):
-            scene.clip_segments(np.array(segments)[:, :, :dimension], keep=keep)
-        scene.clip_segments(np.tile(np.array(segments)[:, :, :dimension], (10_000, 1, 1)), keep="any")  # put in order
     many = [Aabb([k, 0, 0], [k + 2, 1, 1]) for k in range(300)]
     collide_scene(many)  # their boxes go into a grid
     flat: list[Solid] = [Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]), Triangle([[0, 0], [1, 0], [0, 1]])]
@@ -174,17 +205,31 @@ def _warm_scenes() -> None:
         collide_triangles(corners, corners + 0.25)
 
 
+def _warm_scene_clipping() -> None:
+    segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
+    turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
+    for dimension in (2, 3):
+        some = [*_regions(dimension), *_bodies()[1:2] * (dimension == 3)]
+        pose = turned if dimension == 3 else Pose([[0.6, -0.8], [0.8, 0.6]], [0.25, 0])
+        scene = Scene(some * 2, [None] * len(some) + [pose] * len(some))
+        for keep in ("all", "first", "any"):
+            scene.clip_segments(np.array(segments)[:, :, :dimension], keep=keep)
+        scene.clip_segments(np.tile(np.array(segments)[:, :, :dimension], (10_000, 1, 1)), keep="any")  # put in order
+
+
 def _bodies() -> list[Solid]:
     Surface([[0, 0, 0], [2, 0, 0], [0.5, 0.5, 0], [0, 2, 0]], [[0, 1, 2, 3]])  # not convex: ears are cut
     sheet = Surface([[0, 0, 0.5], [2, 0, 0.5], [0, 2, 0.5]], [[0, 1, 2]])
     return [_cube(), sheet, Aabb([0, 0, 0], [1, 1, 1])]
 
 
-def _warm_clipping() -> None:
-    """Clip in 2D, then in 3D: a third of the kernels are common."""
+def _warm_clipping_2d() -> None:
     _clip(2)
     corners = [[[-1.0, -1.0], [2.0, 2.0]], [[0.0, 0.0], [1.0, 1.0]]]  # through corners, and from one to another
     clip_segments(corners, Polygon([[[0, 0], [4, 0], [1, 1], [0, 4]]]))
+
+
+def _warm_clipping_3d() -> None:
     _clip(3)
     clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
 
@@ -227,9 +272,12 @@ def _warm_bounds() -> None:
 
 
 STEPS = (
-    _warm_collision,
     _warm_overlay,
-    _warm_clipping,
+    _warm_poses,
+    _warm_scene_clipping,
+    _warm_clipping_2d,
+    _warm_collision,
+    _warm_clipping_3d,
     _warm_scenes,
     _warm_bounds,
     _warm_containment,
@@ -237,5 +285,55 @@ STEPS = (
     _warm_cells,
 )
 """Parts of the work, long ones first; a kernel that several need is compiled by the first, or in several processes."""
-SHARES = (24, 20, 19, 14, 8, 7, 4, 4)
+SHARES = (19, 15, 14, 13, 8, 10, 10, 4, 3, 3, 1)
 """Duration of each of `STEPS`, in per cent."""
+GROUPS = ((1, 4, 6, 2, 7, 8, 10), (0, 3, 5, 9))
+"""Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
+decides symbols and inlining. What both compile is that of the first."""
+_LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)
+OPERATIONS = {
+    "locate": _LOCATING,
+    "contains": _LOCATING,
+    "locate_scene": (*_LOCATING, _warm_scenes),
+    "collide": (_warm_collision, _warm_scenes),
+    "collide_poses": (_warm_poses, _warm_collision),
+    "collide_scene": (_warm_collision, _warm_scenes),
+    "clearance": (_warm_scenes, _warm_bounds),
+    "clip_segments": _CLIPPING,
+    "clip_lines": _CLIPPING,
+    "clip_polygons": _CLIPPING,
+    "Scene": (*_LOCATING, _warm_scenes, _warm_scene_clipping),
+    "overlay": (_warm_overlay, _warm_overlay_rest),
+    "overlay_batch": (_warm_overlay, _warm_overlay_rest),
+    "union_all": (_warm_overlay, _warm_overlay_rest),
+    "bounds": (_warm_bounds,),
+}
+"""The steps of each operation."""
+
+
+def call_group(index: int) -> None:
+    """Call the steps of one of `GROUPS`, and compile what only `compare` asks."""
+    for step in GROUPS[index]:
+        STEPS[step]()
+    if index == len(GROUPS) - 1:
+        warm_textbook()
+
+
+def warm_textbook() -> None:
+    """Ask every textbook method that `compare` offers; not a step, since hardly anybody asks more than one."""
+    from engine.textbook import methods
+
+    for dimension in (2, 3):
+        points = as_points(np.linspace(-0.5, 1.5, 6 * dimension).reshape(-1, dimension), dimension)
+        corners = np.eye(3)[:, :dimension]
+        terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
+        for solid in (*_regions(dimension), Triangle(corners), terms, Csg("union", _regions(dimension)[:3])):
+            asked: list[tuple[methods.Methods, tuple[Any, ...]]] = [
+                (methods.of_points(solid), (points,)),
+                (methods.of_segments(solid), (points.reshape(3, 2, dimension),)),
+                (methods.of_polygons(solid), (points.reshape(2, 3, dimension),)),
+                (methods.of_pairs(solid, solid), ()),
+            ]
+            for offered, arguments in asked:
+                for ask, _ in offered.values():
+                    ask(*arguments)

@@ -1,22 +1,17 @@
-"""The command `exact-geometry`: that of the engine, and `serve`, which is `python -m service`."""
+"""The command `exact-geometry`: `serve` starts the service, all else is that of the engine."""
 
 from __future__ import annotations
 
 import sys
 from importlib import import_module
 
-import exact_geometry
 
-
-def main() -> int | None:
-    """Run one command and return its exit code."""
+def main() -> int:
+    """Run the command that the arguments of the process name."""
     if sys.argv[1:2] == ["serve"]:
-        serve = import_module("service.__main__").main
-        serve(sys.argv[2:])
+        import_module("exact_geometry.service.__main__").main(sys.argv[2:])
         return 0
-    package = exact_geometry.locate.__module__.removesuffix(".containment.locate")
-    run = import_module(f"{package}.__main__").main
-    code: int = run()
+    code: int = import_module("exact_geometry.engine.__main__").main()
     return code
 
 

@@ -59,9 +59,9 @@ def config_of(level: str) -> dict[str, Any]:
     return {
         "version": 1,
         "disable_existing_loggers": False,
-        "formatters": {"json": {"()": "service.__main__.JsonFormatter"}},
+        "formatters": {"json": {"()": f"{__package__}.__main__.JsonFormatter"}},
         "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
-        "loggers": {"engine": own, "service": own, "uvicorn": own},
+        "loggers": dict.fromkeys(("engine", "exact_geometry", "service", "uvicorn"), own),
     }
 
 
@@ -127,7 +127,7 @@ def _serve(settings: Settings, log_config: dict[str, Any], stack: ExitStack) -> 
     from service.server import HEALTH_SECONDS, Server, Supervisor
 
     config = uvicorn.Config(
-        "service.__main__:create_app",
+        f"{__package__}.__main__:create_app",
         factory=True,
         host=settings.host,
         port=settings.port,

@@ -32,7 +32,9 @@ def context() -> Any:
     need."""
     started: Any = multiprocessing.get_context(_METHOD)
     if _METHOD == "forkserver":
-        started.set_forkserver_preload(["service.mesh_reader", "service.__main__", "trimesh.exchange.load"])
+        started.set_forkserver_preload(
+            [f"{__package__}.mesh_reader", f"{__package__}.__main__", "trimesh.exchange.load"]
+        )
     return started
 
 

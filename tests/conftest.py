@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import shutil
 import zlib
 from collections import defaultdict
 from pathlib import Path
 
 import pytest
 
-from engine.compiling.cold_start import fill_cache
-from engine.warmup import SHARES
+import engine
+from engine import warmup
+from engine.compiling import jit, kernel_cache
+from engine.compiling.cold_start import fill_cache, has_all
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT.parent / "shared" / "data"
@@ -45,13 +48,29 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Compile by every core before a run of the whole suite, where no kernel is cached yet."""
     if len(session.items) >= WHOLE_SUITE and not session.config.getoption("--collect-only"):
-        fill_cache("engine.warmup", SHARES, os.cpu_count() or 1)
+        fill_cache("engine.warmup", warmup.SHARES, os.cpu_count() or 1)
 
 
 @pytest.fixture(scope="session")
 def data() -> Path:
     """The folder of real meshes and hard sets; tests that use it carry the marker `data`."""
     return DATA
+
+
+@pytest.fixture(scope="session")
+def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A seed of all kernels: a copy of the one in use, if it has all, else from the cache, which is filled first."""
+    engine.warm(processes=os.cpu_count() or 1)
+    warmup.warm_textbook()
+    folder, seed = tmp_path_factory.mktemp("kernels") / "seed", kernel_cache.seed()
+    source = seed if seed is not None and has_all(seed, "engine.warmup") else kernel_cache.cache_folder()
+    assert source is not None
+    modules = {name for name in (kernel.__module__ for kernel in jit.KERNELS) if name.startswith("engine.")}
+    for digest in map(kernel_cache.source_digest, modules | {"engine.warmup"}):
+        if (source / digest).exists():
+            shutil.copytree(source / digest, folder / digest, ignore=shutil.ignore_patterns("lock"))
+    kernel_cache.seal(folder)
+    return folder
 
 
 @pytest.fixture(scope="session")

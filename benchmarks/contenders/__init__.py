@@ -149,7 +149,7 @@ class Prepared:
 
 def make(module: str, kind: str, subject: Any, threads: int = 2, *setting: float) -> Prepared:
     """Build a contender for questions of a kind; ImportError or OSError if its package does not run here."""
-    makers = importlib.import_module(f"benchmarks.contenders.with_{module}").MAKERS
+    makers = importlib.import_module(f"{__name__}.with_{module}").MAKERS
     if kind not in makers:
         raise NotApplicable(f"has no answer to {kind}")
     return makers[kind](subject, threads, *setting)

@@ -37,6 +37,6 @@ def tasks(
 ) -> Iterator[Task]:
     """Yield the rows of tables, or those of the page only."""
     for name in names:
-        for row in importlib.import_module(f"benchmarks.fields.{name}").tasks(size):
+        for row in importlib.import_module(f"{__name__}.{name}").tasks(size):
             if (row.is_on_page or not is_page) and (has_figures or not row.is_figure):
                 yield row._replace(name=f"{name}: {row.name}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import io
 import pickle
 from collections.abc import Callable
 from typing import Any, Final
@@ -13,16 +14,19 @@ from numba import config as numba_config
 from numba.core.caching import NullCache
 from numba.core.codegen import CPUCodeLibrary, JITCPUCodegen, get_host_cpu_features
 from numba.core.compiler import CompileResult, compile_result
+from numba.core.environment import _rebuild_env
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from engine.compiling import require
 from engine.compiling.kernel_cache import (
     COMPLETE,
+    as_imported,
     cache_folder,
     matches_its_source,
     read_cached,
     source_digest,
+    warn_of_compiling,
     write_cached,
 )
 
@@ -95,10 +99,11 @@ class KernelCache(NullCache):  # type: ignore[misc]
             content = read_cached(self._name(types, cpu))
             if content:
                 try:
-                    parts = pickle.loads(content)
+                    parts = _Unpickler(io.BytesIO(content)).load()
                 except (ImportError, AttributeError):  # case: the class of an argument has moved to another module
                     continue
                 return _rebuilt(target_context, *parts)
+        warn_of_compiling(self._function.__module__)
         return None
 
     def save_overload(self, types: Any, result: CompileResult) -> None:
@@ -109,6 +114,17 @@ class KernelCache(NullCache):  # type: ignore[misc]
             constants = [item for item in constants if item.consts]
             content = dumps((name, code, fndesc, environment, signature, reload, constants))
             write_cached(self._name(types, cpus()[0]), content)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads a kernel that was compiled while the engine was imported by this name or its other one."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        return _rebuilt_env if name == "_rebuild_env" else super().find_class(as_imported(module), name)
+
+
+def _rebuilt_env(module: str, *more: Any) -> Any:
+    return _rebuild_env(as_imported(module), *more)
 
 
 def _rebuilt(

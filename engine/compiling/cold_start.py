@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from numba import config as numba_config
@@ -42,29 +42,34 @@ while step := os.read(0, 1):
 
 
 def fill_cache(
-    module: str, shares: Sequence[int], processes: int, progress: Callable[[int], object] | None = None
+    module: str,
+    shares: Sequence[int],
+    processes: int,
+    progress: Callable[[int], object] | None = None,
+    chosen: Sequence[int] | None = None,
 ) -> Sequence[int]:
     """Call the functions in ``STEPS`` of the engine's `module`, one at a time in each of so many `processes`.
 
     Returns the indices of those that succeeded: none if the cache is already complete or cannot be written. Other
     processes that call this meanwhile wait for the one that compiles. What a step failed to store (it was killed, the
     disk is full) is compiled by its first caller. shares: relative duration of each step. progress: called with the
-    share of each step that ended.
+    share of each step that ended. chosen: the indices of the steps to call; all by default.
     """
     folder, seed_folder = cache_folder(), seed()
-    if seed_folder is not None and source_digest(module) is not None and not _has_all(seed_folder, module):
+    if seed_folder is not None and source_digest(module) is not None and not has_all(seed_folder, module):
         log.warning("the kernel seed %s lacks kernels of this version for this CPU: they are compiled", seed_folder)
     digest = source_digest(module)
     if folder is None or digest is None or numba_config.DISABLE_JIT or processes < 2 or not sys.executable:
         return ()
-    if _is_full(module):
+    if is_full(module):
         return ()
+    steps = range(len(shares)) if chosen is None else chosen
     with contextlib.suppress(OSError):
         own = folder / digest
         own.mkdir(mode=0o755, parents=True, exist_ok=True)
         with _locked(own / "lock"):
-            if not _is_full(module):
-                done = _run(module, shares, processes, progress)
+            if not is_full(module):
+                done = _run(module, {step: shares[step] for step in steps}, processes, progress)
                 if len(done) == len(shares):
                     note_full(module)
                 return done
@@ -74,7 +79,7 @@ def fill_cache(
 def note_full(module: str) -> None:
     """Mark the cache as complete for the steps of `module`: every one of them was called."""
     folder, digest = cache_folder(), source_digest(module)
-    if folder is None or digest is None or numba_config.DISABLE_JIT or _is_full(module):
+    if folder is None or digest is None or numba_config.DISABLE_JIT or is_full(module):
         return
     if matches_its_source(module):
         with contextlib.suppress(OSError):
@@ -84,12 +89,13 @@ def note_full(module: str) -> None:
                 (own / marker).touch()
 
 
-def _is_full(module: str) -> bool:
+def is_full(module: str) -> bool:
     """Return whether nothing is left to compile for a CPU whose kernels can run here."""
-    return any(folder is not None and _has_all(folder, module) for folder in (cache_folder(), seed()))
+    return any(folder is not None and has_all(folder, module) for folder in (cache_folder(), seed()))
 
 
-def _has_all(folder: Path, module: str) -> bool:
+def has_all(folder: Path, module: str) -> bool:
+    """Return whether a folder is marked as complete for the steps of `module`, for a CPU whose kernels can run here."""
     digest = source_digest(module)
     return digest is not None and any((folder / digest / marker).exists() for marker in completion_markers())
 
@@ -102,13 +108,15 @@ def _locked(path: Path) -> Iterator[None]:
         yield
 
 
-def _run(module: str, shares: Sequence[int], processes: int, progress: Callable[[int], object] | None) -> Sequence[int]:
+def _run(
+    module: str, shares: Mapping[int, int], processes: int, progress: Callable[[int], object] | None
+) -> Sequence[int]:
     """Return the steps that succeeded; processes take them from one pipe, and report to another."""
     log.info("compiling all kernels, once for these sources: %d parts, %d processes", len(shares), processes)
     done: list[int] = []
     begin, running = time.perf_counter(), []
     (steps, left), (ended, said) = os.pipe(), os.pipe()
-    os.write(left, bytes(range(len(shares))))
+    os.write(left, bytes(shares))
     os.close(left)
     try:
         try:
@@ -120,7 +128,7 @@ def _run(module: str, shares: Sequence[int], processes: int, progress: Callable[
             os.close(said)
         while step := os.read(ended, 1):
             done.append(step[0])
-            seconds, part = time.perf_counter() - begin, sum(shares[each] for each in done) / sum(shares)
+            seconds, part = time.perf_counter() - begin, sum(shares[each] for each in done) / sum(shares.values())
             rest = seconds * (1 - part) / part
             log.info("compiled %.0f %% of all kernels in %.0f s; some %.0f s are left", 100 * part, seconds, rest)
             if progress is not None:

@@ -249,7 +249,13 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         return made
 
     def define_pipelines(self) -> list[Any]:
-        """Drop the passes for whole-array expressions, and for closures in a function that has none."""
+        """Drop the passes for whole-array expressions, and for closures in a function that has none.
+
+        Code that raises holds the name of its file: it gets one that is the same wherever the sources are.
+        """
+        self.state.func_id.filename = (
+            f"{self.state.func_id.modname.removeprefix('exact_geometry.').replace('.', '/')}.py"
+        )
         if not compiles_correctly():
             return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
         steps = DefaultPassBuilder.define_nopython_pipeline(self.state)

@@ -13,11 +13,12 @@ Where none can be written, kernels are compiled in each process again; so are th
 changed since they were imported, or whose bytecode is of other sources: a line in the log says so.
 
 **Seeds.** ``ENGINE_CACHE_SEED`` names a folder or a .tar.xz that ``python -m engine warm --into`` has written, maybe on
-another machine. What the cache lacks is looked up there, read in place and never written.
+another machine; where it is not set, a wheel's own is used, ``kernels/`` beside this package, a folder for each set of
+tools. What the cache lacks is looked up there, read in place and never written.
 
-**Trust.** Each file begins with the sha256 of its name and the rest: one that differs is not run, nor one that belongs
-to neither this user nor root or that another can write, or in such a folder, nor a seed that other tools made; a line
-in the log says so, and its kernels are compiled.
+**Trust.** Each file begins with the sha256 of its name and the rest: one that differs is not run, nor one that another
+user owns or can write (other than root and the owner of these sources), or in such a folder, nor a seed that other
+tools made; one line in the log says so, and the kernels are compiled.
 """
 
 from __future__ import annotations
@@ -31,9 +32,11 @@ import platform
 import re
 import sys
 import tempfile
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import suppress
+from importlib.abc import InspectLoader
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import Any
@@ -49,8 +52,17 @@ COMPLETE = "complete"
 _ROOT = Path(__file__).resolve().parents[1]
 _PREFIX = __name__.removesuffix("engine.compiling.kernel_cache")
 """Prefix of our modules' names: nothing, or ``exact_geometry.`` if `engine` is another package's."""
+_OWN_SEEDS = _ROOT / "kernels"
+"""The seeds of a wheel, a folder for each set of `tools`."""
 _MADE_BY = "MADE_BY"
 """The file of a seed that names its `tools`."""
+_SECONDS = {
+    "containment": 9, "collision": 30, "segment_clipping": 8, "polygon_clipping": 14, "polygon_overlay": 30,
+    "scenes": 20, "distance": 12, "solids": 4, "bounding": 4, "arrangement": 2, "textbook": 2, "warmup": 280,
+}  # fmt: skip
+"""Seconds that the compiler works before the first answer by a part of the engine; "warmup": for all kernels."""
+_REFERENCE = 0.006
+"""Seconds that `_slowness` took on the machine of `_SECONDS`."""
 _LARGEST_SEED = 1 << 28  # bytes, unpacked; all kernels for one CPU are 5 MB
 _OPTIONS = (
     *("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "LLVM_REFPRUNE_PASS", "LLVM_REFPRUNE_FLAGS", "DEBUGINFO_DEFAULT"),
@@ -120,6 +132,8 @@ def read_source(module: str) -> tuple[bytes, set[str]] | None:
     source = None if spec is None else _source(spec)
     if source is None:
         return None
+    if _PREFIX:  # a wheel's imports
+        source = source.replace(f"{_PREFIX}engine".encode(), b"engine")
     named = set()
     for match in _IMPORT.finditer(source.decode("utf-8")):
         package = "engine" + (match[1] or match[3] or "")
@@ -135,10 +149,16 @@ def tools() -> str:
     """Return the versions and options of the tools that compile kernels, without sources and CPU."""
     made_by = [
         f"numba {numba.__version__}, llvmlite {importlib.metadata.version('llvmlite')}",
-        f"{sys.implementation.cache_tag} on {sys.platform} {platform.machine()}",
+        f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')} on {sys.platform} {platform.machine()}",
         *(f"{name}={getattr(numba_config, name, None)}" for name in _OPTIONS),
     ]
     return ", ".join(made_by)
+
+
+def as_imported(module: str) -> str:
+    """Return the name under which a module of the engine is imported here, others as they are."""
+    plain = module.removeprefix("exact_geometry.")
+    return _PREFIX + plain if plain.partition(".")[0] == "engine" else module
 
 
 @functools.cache
@@ -148,7 +168,7 @@ def source_digest(module: str) -> str | None:
     reached = _reached(module.removeprefix(_PREFIX))
     if reached is None:
         return None
-    digest = hashlib.sha256((tools() + _PREFIX).encode())  # compiled code names our modules as they are imported
+    digest = hashlib.sha256(tools().encode())
     for name in sorted(reached):
         digest.update(f"\0{name}\0".encode() + reached[name])
     return digest.hexdigest()[:20]
@@ -186,7 +206,8 @@ def _has_own_bytecode(module: str) -> bool:
     spec: Any = _spec(module)
     get_code = getattr(spec.loader, "get_code", None)  # a loader that has none keeps no bytecode
     source, code = _source(spec), get_code and get_code(spec.name)
-    if source and code and compile(source, code.co_filename, "exec", dont_inherit=True) != code:
+    compiled = getattr(spec.loader, "source_to_code", InspectLoader.source_to_code)
+    if source and code and compiled(source, code.co_filename) != code:
         _uncached("bytecode is not that of the source", module)
         return False
     return True
@@ -195,11 +216,44 @@ def _has_own_bytecode(module: str) -> bool:
 _reported: set[object] = set()
 
 
+def _warn_once(subject: object, text: str, *words: object) -> None:
+    if subject not in _reported:
+        _reported.add(subject)
+        log.warning(text, *words)
+
+
 def _uncached(reason: str, module: str) -> None:
     """Log once why kernels are not cached."""
-    if reason not in _reported:
-        _reported.add(reason)
-        log.warning("kernels are compiled in each process again: %s (%s)", reason, module)
+    _warn_once(reason, "kernels are compiled in each process again: %s (%s)", reason, module)
+
+
+def warn_of_compiling(module: str, processes: float = 1) -> None:
+    """Log, once a process, that kernels are compiled now, about how long that takes here, and how to avoid it."""
+    part = module.removeprefix(f"{_PREFIX}engine.").partition(".")[0]
+    if part in _SECONDS and warn_of_compiling not in _reported:
+        _warn_once(
+            warn_of_compiling,
+            "no compiled kernels for %s yet: compiling them takes about %d s here, %s. Beforehand: engine.warm() or "
+            "python -m engine warm; never: a wheel with kernels for this Python and numba (docs/running.md)",
+            "all operations" if part == "warmup" else part.replace("_", " "),
+            max(1, round(_SECONDS[part] * _slowness() / processes)),
+            "in each process" if cache_folder() is None else "once",
+        )
+
+
+def expect_compiling() -> None:
+    """Leave `warn_of_compiling` out from now on: whoever called shows the progress."""
+    _reported.add(warn_of_compiling)
+
+
+def _slowness() -> float:
+    """Return how many times as long as where `_SECONDS` were measured Python's compiler works here."""
+    source, seconds = _source(__spec__) or b"", []
+    for _ in range(3):
+        start = time.perf_counter()
+        compile(source, "", "exec", dont_inherit=True)
+        seconds.append(time.perf_counter() - start)
+    return min(seconds) / _REFERENCE
 
 
 def _is_writable(folder: Path) -> bool:
@@ -250,15 +304,19 @@ def read_cached(name: str) -> bytes | None:
     for folder in (cache_folder(), seed()):
         if folder is not None:
             try:
-                if not (folder / name).is_file() or not _is_trusted((folder / name).parent):
+                if not (folder / name).is_file():
                     continue
+                check_owner((folder / name).parent)
                 check_owner(folder / name)
                 written = (folder / name).read_bytes()
                 if _seal_of(name, written[32:]) == written[:32]:
                     return written[32:]
                 raise ValueError("it is damaged, or another file")
             except (OSError, ValueError) as error:
-                log.warning("%s in %s is not used: %s", name, folder, error)
+                _warn_once(
+                    (folder, str(error).partition("belongs")[2]),
+                    "%s in %s is not used, nor others of which the same is true: %s", name, folder, error,
+                )  # fmt: skip
     return None
 
 
@@ -272,39 +330,51 @@ def _is_trusted(folder: Path) -> bool:
     try:
         check_owner(folder)
     except ValueError as error:
-        if folder not in _reported:
-            _reported.add(folder)
-            log.warning("compiled kernels in %s are not used: %s", folder, error)
+        _warn_once(folder, "compiled kernels in %s are not used: %s", folder, error)
         return False
     return True
 
 
 @functools.cache
 def seed() -> Path | None:
-    """Return the folder that ``ENGINE_CACHE_SEED`` names, None if there is none or it is not trusted."""
+    """Return the folder that ``ENGINE_CACHE_SEED`` names, else that of this package for these tools; None if there is
+    none, or it is not trusted."""
     named = os.environ.get("ENGINE_CACHE_SEED")
-    if not named:
-        return None
     try:
+        named = _own_seed() if named is None else named
+        if not named:
+            return None
         check_owner(Path(named))
         folder = Path(named) if Path(named).is_dir() else _unpacked(Path(named))
         check_owner(folder / _MADE_BY)
         if (made_by := (folder / _MADE_BY).read_text("utf-8")) != tools():
-            raise ValueError(f"made by {made_by[:1000]}; here is {tools()}")
+            there, here = made_by.split(", "), tools().split(", ")
+            theirs, ours = ([item for item in a if item not in b] for a, b in ((there, here), (here, there)))
+            raise ValueError(f"made with {', '.join(theirs)[:500]}; here is {', '.join(ours)}")
         return folder
     except Exception as error:  # torn in any way
         log.warning("the kernel seed %s is not used: %s", named, error)
         return None
 
 
+def _own_seed() -> str:
+    """Return the folder of this package's kernels for these tools, else any of them, else an empty text."""
+    made_by = {each.parent: each.read_text("utf-8").split(", ") for each in _OWN_SEEDS.glob(f"*/{_MADE_BY}")}
+    here = tools().split(", ")
+    return str(max(sorted(made_by), default="", key=lambda each: sum(map(made_by[each].__contains__, here))))
+
+
 def check_owner(path: Path) -> None:
-    """Raise for a file that others may write: compiled code is executed."""
-    status = path.stat()
-    if hasattr(os, "getuid") and (status.st_uid not in (0, os.getuid()) or status.st_mode & 0o022):
-        raise ValueError(
-            f"{path.name} belongs to user {status.st_uid}, mode {status.st_mode & 0o777:o}; it must be this user's or "
-            "root's, and nobody else's to write: chmod go-w"
-        )
+    """Raise for a file that others may write, and that is not as safe as these sources: compiled code is executed."""
+    if hasattr(os, "getuid"):
+        status, sources = path.stat(), _ROOT.stat() if _ROOT.is_dir() else None  # None: in a zip file
+        owners = {0, os.getuid()} | ({sources.st_uid} if sources else set())
+        others = 0o022 & ~(sources.st_mode if sources and path.is_relative_to(_OWN_SEEDS) else 0)
+        if status.st_uid not in owners or status.st_mode & others:
+            raise ValueError(
+                f"{path.name} belongs to user {status.st_uid}, mode {status.st_mode & 0o777:o}; it must be this user's "
+                "or root's, and nobody else's to write: chmod go-w"
+            )
 
 
 def _unpacked(archive: Path) -> Path:
@@ -332,11 +402,19 @@ def _unpacked(archive: Path) -> Path:
 
 
 def seal(folder: Path, archive: Path | None = None) -> None:
-    """Make a seed of `folder`: add the file that names its tools; write it to `archive` (.tar.xz) if given."""
+    """Make a seed of `folder`: add the file that names its tools; write it to `archive` (.tar.xz) if given.
+
+    The same files make the same archive.
+    """
     (folder / _MADE_BY).touch(mode=0o644)
     (folder / _MADE_BY).write_text(tools(), "utf-8")
     if archive is not None:
         import tarfile
 
         with tarfile.open(archive, "w:xz") as tar:
-            tar.add(folder, ".")
+            tar.add(folder, ".", filter=_plain)
+
+
+def _plain(member: Any) -> Any:
+    """Return a member of a .tar file without what differs between equal files."""
+    return member.replace(mtime=0, uid=0, gid=0, uname="", gname="", deep=False)

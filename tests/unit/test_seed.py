@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import threading
@@ -12,8 +11,7 @@ from pathlib import Path
 import pytest
 from numba import config as numba_config
 
-import engine
-from engine.compiling import jit, kernel_cache
+from engine.compiling import kernel_cache
 
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
@@ -53,17 +51,10 @@ ANSWERS = "-2 -4 2 0 0 0 0 overlapping 6"
 
 
 @pytest.fixture(scope="module")
-def seed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a seed of all kernels, taken from the cache, which is filled first."""
-    engine.warm(processes=os.cpu_count() or 1)
-    cache, folder = kernel_cache.cache_folder(), tmp_path_factory.mktemp("made") / "seed"
-    assert cache is not None
-    modules = {name for name in (kernel.__module__ for kernel in jit.KERNELS) if name.startswith("engine.")}
-    for digest in map(kernel_cache.source_digest, modules | {"engine.warmup"}):
-        if (cache / digest).exists():
-            shutil.copytree(cache / digest, folder / digest)
-    kernel_cache.seal(folder, folder.with_name("seed.tar.xz"))
-    return folder
+def seed(kernels: Path) -> Path:
+    """Return a seed of all kernels, beside it the archive of the same."""
+    kernel_cache.seal(kernels, kernels.with_name("seed.tar.xz"))
+    return kernels
 
 
 def ask(home: Path, before: str = "", **more: str) -> subprocess.Popen[str]:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import engine
+from engine import warmup
 from engine.warmup import STEPS
 
 PROBE = """
@@ -82,8 +84,9 @@ cube = Polyhedron(
 bodies = [Aabb([0, 0, 0], [1, 1, 1]), Sphere([0, 0, 0], 1), cube, HalfSpace([1, 0, 0], 0), cube]
 scene = Scene(bodies, [None, Pose(np.eye(3), [0.5, 0, 0]), None, None, Pose(np.eye(3), [0.5, 0, 0])])
 segments = np.array([[[-1.0, 0.2, 0.3], [3, 0.4, 0.2]], [[0, 0, -2.0], [0.3, 0.3, 3]], [[-1, 0, 0], [3, 0, 0.0]]])
+away = np.tile([[[-9.0, 0, 0], [-9, 1, 1]]], (int(sys.argv[1]), 1, 1))  # ties would be settled one by one, for seconds
 for keep in sys.argv[2:]:
-    scene.clip_segments(np.tile(segments, (int(sys.argv[1]), 1, 1)), keep=keep)
+    scene.clip_segments(np.concatenate([segments, away]), keep=keep)
 assert not compiled, compiled
 """
 
@@ -92,7 +95,7 @@ assert not compiled, compiled
 def test_nothing_is_compiled_after_warm() -> None:
     found = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, timeout=600)
     assert found.returncode == 0, found.stderr[-3000:]
-    for asked in (["1", "all", "any"], ["1", "any", "all"], ["4000", "all"], ["4000", "first"]):  # in another process
+    for asked in (["0", "all", "any"], ["0", "any", "all"], ["12000", "all"], ["12000", "first"]):  # in another process
         found = subprocess.run([sys.executable, "-c", FIRST_CALLS, *asked], capture_output=True, text=True, timeout=600)
         assert found.returncode == 0, (asked, found.stderr[-3000:])
 
@@ -138,4 +141,57 @@ def test_any_step_may_be_the_first(tmp_path: Path, step: str) -> None:
     code = f"from engine import warmup; warmup.{step}()"
     empty = {**os.environ, "ENGINE_CACHE_DIR": str(tmp_path / "cache"), "ENGINE_CACHE_SEED": ""}
     found = subprocess.run([sys.executable, "-c", code], env=empty, capture_output=True, text=True, timeout=600)
+    assert found.returncode == 0, found.stderr[-3000:]
+
+
+def test_steps_are_all_in_some_group_and_some_operation() -> None:
+    assert sorted(step for group in warmup.GROUPS for step in group) == [*range(len(STEPS))]
+    assert {step for steps in warmup.OPERATIONS.values() for step in steps} == {*STEPS}
+    assert len(warmup.SHARES) == len(STEPS)
+    assert all(hasattr(engine, name) for name in warmup.OPERATIONS)
+
+
+@pytest.mark.parametrize("operations", [["volume"], "overlay", [1], ["overlay", "?"]])
+def test_an_unknown_operation_is_refused(operations: list[str]) -> None:
+    with pytest.raises(engine.InvalidInputError, match="overlay_batch"):
+        engine.warm(operations=operations)
+
+
+ONE_OPERATION = """
+import sys
+import engine
+from engine.compiling.jit import KERNELS
+
+cube = engine.Polyhedron(
+    [[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)],
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]],
+)
+square = engine.Polygon([[[0, 0], [2, 0], [0, 2]]])
+done = []
+engine.warm(done.append, operations=[sys.argv[1]])
+assert sum(done) == 100, done
+known = {k: list(k.signatures) for k in KERNELS}
+match sys.argv[1]:
+    case "overlay":
+        engine.overlay(square, engine.Polygon([[[1, 0], [1, 1], [0, 1]]]))
+    case "locate":
+        engine.locate([[0.5, 0.5, 0.5]], cube)
+    case "collide":
+        engine.collide(cube, engine.Sphere([0, 0, 0], 1))
+    case "clip_segments":
+        engine.clip_segments([[[-1, 0.5, 0.5], [2, 0.5, 0.5]]], cube)
+    case "bounds":
+        engine.bounds(cube)
+new = {k.py_func.__name__: k.signatures for k in KERNELS if list(k.signatures) != known[k]}
+assert not new, new
+assert any(not k.signatures for k in KERNELS)  # the others wait
+"""
+
+
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="nothing is compiled")
+@pytest.mark.some(2)
+@pytest.mark.parametrize("operation", ["overlay", "locate", "collide", "clip_segments", "bounds"])
+def test_one_operation_is_made_ready_by_itself(operation: str) -> None:
+    code = [sys.executable, "-c", ONE_OPERATION, operation]
+    found = subprocess.run(code, capture_output=True, text=True, timeout=600)
     assert found.returncode == 0, found.stderr[-3000:]

@@ -23,6 +23,7 @@ def held(**answers: object) -> list[Row]:
     return run_contest(Contest("numbers", "even", True, items, items % 2 == 0, errors.same, contenders), 3, 0.1)
 
 
+@pytest.mark.full
 def test_right_wrong_refused_and_absent_are_told_apart() -> None:
     def absent() -> object:
         raise ImportError("no such package")
@@ -91,6 +92,7 @@ def test_ring_areas() -> None:
     assert ring_areas(np.array(square + triangle, float), np.array([0, 4, 7])).tolist() == [4.0, -2.0]
 
 
+@pytest.mark.full
 def test_the_page_lists_wrong_answers_of_ours_first() -> None:
     rows = held(ours=lambda items: items % 2 == 1, peer=lambda items: items % 2 == 0)
     plain = [

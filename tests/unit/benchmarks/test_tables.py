@@ -99,6 +99,7 @@ def test_every_row_has_its_own_name() -> None:
         assert len(names) == len(set(names))
 
 
+@pytest.mark.full
 def test_a_row_runs(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--quick", "--dry", "--rounds", "2", "--seconds", "0.01", "--only"]
     assert table.main([*words, "sphere 3D"], "segments") == 0
@@ -126,6 +127,7 @@ def test_0_of_n_says_what_it_says() -> None:
     assert high == pytest.approx(1 - low)
 
 
+@pytest.mark.full
 def test_all_are_judged_on_all_items_and_the_worst_is_kept() -> None:
     items = np.arange(100)
     asked = {"ours": lambda rows: rows % 2 == 0, "peer": lambda rows: np.where(rows < 60, rows % 2 == 0, rows == 99)}

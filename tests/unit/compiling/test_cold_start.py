@@ -42,7 +42,7 @@ def place(tmp_path: Path) -> Path:
 
 def fill(place: Path, third: str = "say(2)", **more: str) -> subprocess.Popen[bytes]:
     (place / "engine" / "work.py").write_text(WORK.format(place=str(place / "done"), third=third))
-    variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache"), **more}
+    variables = {"PYTHONPATH": str(place), "ENGINE_CACHE_DIR": str(place / "cache"), "ENGINE_CACHE_SEED": "", **more}
     command = [sys.executable, "-X", "dev", "-c", FILL]  # says of every file that is left open
     return subprocess.Popen(command, env={**os.environ, **variables}, cwd=place, stderr=subprocess.PIPE)
 

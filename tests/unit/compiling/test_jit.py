@@ -7,6 +7,7 @@ import hashlib
 import importlib
 import os
 import pkgutil
+import re
 import shutil
 import stat
 import subprocess
@@ -20,6 +21,7 @@ from numba import config as numba_config
 
 import engine
 from engine.compiling import jit, kernel_cache
+from exact_geometry._renaming import renamed
 
 ROOT = Path(__file__).resolve().parents[3]
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
@@ -184,7 +186,7 @@ def test_files_that_were_swapped_are_noticed(project: Path) -> None:
         source.rename(source.with_name(target))
     words, logged = logged_run(project, both, **cache)
     assert words == ["2.0", "(1+1j)", "0"]
-    assert logged.count("is damaged, or another file") == 2
+    assert logged.count("is damaged, or another file") == 1  # one line for all of a kind
     assert run(project, both, **cache) == ["2.0", "(1+1j)", "2"]
 
 
@@ -323,6 +325,73 @@ def started(project: Path, seed: Path, **more: str) -> tuple[list[str], str]:
     """Return the words of a process that has an empty cache and this seed, and its log."""
     cache = {"ENGINE_CACHE_DIR": str(project / "cache"), "ENGINE_CACHE_SEED": str(seed), **more}
     return logged_run(project, **cache)
+
+
+@pytest.fixture
+def own_seed(project: Path, seed: Path) -> Path:
+    """Return the seed within the package, as a wheel has it."""
+    return Path(shutil.move(seed, project / "engine" / "kernels" / "some name"))
+
+
+def test_the_kernels_of_a_wheel_are_used_unless_they_are_switched_off(project: Path, own_seed: Path) -> None:
+    cache = {"ENGINE_CACHE_DIR": str(project / "cache")}
+    assert logged_run(project, **cache) == ([*run(project, **cache)], "")
+    assert run(project, **cache)[:2] == ["2.0", "1"]
+    assert run(project, **cache, ENGINE_CACHE_SEED="")[:2] == ["2.0", "0"]
+
+
+def test_the_kernels_of_a_wheel_are_those_of_both_names(project: Path, own_seed: Path) -> None:
+    """They were compiled as `engine`; in the wheel the same sources are `exact_geometry.engine`."""
+    for path in (project / "engine").rglob("*.py"):
+        path.write_text(renamed(path.read_text()))
+    (project / "exact_geometry").mkdir()
+    (project / "engine").rename(project / "exact_geometry" / "engine")
+    use = USE.replace("from engine", "from exact_geometry.engine")
+    words, logged = logged_run(project, use, ENGINE_CACHE_DIR=str(project / "cache"))
+    assert words[:2] == ["2.0", "1"], logged
+    assert logged == ""
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("kind", ["older", "options", "damaged", "writable"])
+def test_kernels_of_a_wheel_that_do_not_fit_are_left_with_one_line(project: Path, own_seed: Path, kind: str) -> None:
+    made_by, (file,) = own_seed / "MADE_BY", own_seed.rglob("*.nbc")
+    match kind:
+        case "older":
+            made_by.write_text(re.sub(r"numba [\d.]+", "numba 0.61.0", made_by.read_text()))
+        case "options":
+            made_by.write_text(made_by.read_text().replace("USING_SVML=False", "USING_SVML=True"))
+        case "damaged":
+            file.write_bytes(file.read_bytes()[:-1])
+        case "writable":
+            file.chmod(0o666)
+    words, logged = logged_run(project, ENGINE_CACHE_DIR=str(project / "cache"))
+    assert words[:2] == ["2.0", "0"]
+    assert len(logged.splitlines()) == 1
+    words_of = {"older": "made with numba 0.61.0; here is", "options": "made with USING_SVML=True; here is USING_SVML="}
+    assert (words_of | {"damaged": "it is damaged", "writable": "chmod go-w"})[kind] in logged
+    assert "llvmlite" not in logged  # nor what is equal
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="only root gives files away")
+def test_kernels_of_whom_the_sources_belong_to_are_trusted(project: Path, own_seed: Path) -> None:
+    for path in [project / "engine", *(project / "engine").rglob("*")]:
+        os.chown(path, 12345, 12345)
+        path.chmod(path.stat().st_mode | 0o020)  # as umask 002 leaves them
+    assert run(project, ENGINE_CACHE_DIR=str(project / "cache"))[:2] == ["2.0", "1"]
+
+
+@pytest.mark.some(2)
+@pytest.mark.parametrize("kind", ["edited", "bytecode", "zip"])
+def test_kernels_of_a_wheel_never_answer_for_other_sources(project: Path, own_seed: Path, kind: str) -> None:
+    helper = project / "engine" / "deep" / "helper.py"
+    edit_in_place(helper, HELPER.format(step=3.0))
+    if kind == "bytecode":
+        subprocess.run([sys.executable, "-m", "compileall", "-q", "-b", project / "engine"], check=True)
+        for path in (project / "engine").rglob("*.py"):
+            path.unlink()
+    around = {"PYTHONPATH": str(zipped(project)), "PYTHONSAFEPATH": "1"} if kind == "zip" else {}
+    assert run(project, ENGINE_CACHE_DIR=str(project / "cache"), **around)[:2] == ["4.0", "0"]
 
 
 def test_an_archive_is_unpacked_where_new_files_are_the_group_s_to_write(project: Path, seed: Path) -> None:
