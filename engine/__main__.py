@@ -195,7 +195,8 @@ def _warm(options: Options) -> None:
 
 def _warm_elsewhere(options: Options) -> None:
     """Run `warm` in new processes, since the compiler reads its CPU and cache folder only once."""
-    command = [sys.executable, "-P", "-m", "exact_geometry", "warm", "--processes", str(options.processes)]
+    processes = "1" if options.into else str(options.processes)
+    command = [sys.executable, "-P", "-m", "exact_geometry", "warm", "--processes", processes]
     surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "PYTHONHASHSEED": "0"}
     if options.cpu:
         surroundings |= {"NUMBA_CPU_NAME": options.cpu, "NUMBA_CPU_FEATURES": ""}

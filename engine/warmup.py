@@ -7,6 +7,7 @@ test compares the kernels reached here with those the engine has.
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -312,7 +313,11 @@ OPERATIONS = {
 
 
 def call_group(index: int) -> None:
-    """Call the steps of one of `GROUPS`, and compile what only `compare` asks."""
+    """Call the steps of one of `GROUPS`, and compile what only `compare` asks; on one core, so that no other thread
+    compiles: the order in which functions are compiled is part of their names."""
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[index % len(cores)]})
     for step in GROUPS[index]:
         STEPS[step]()
     if index == len(GROUPS) - 1:

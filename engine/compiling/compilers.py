@@ -284,6 +284,9 @@ class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
     Raises: TypeError if a function that returns arrays, and its caller, do not both count.
     """
 
+    def __repr__(self) -> str:
+        return f"{self.py_func.__module__}.{self.py_func.__qualname__}"  # part of the names of those it is passed to
+
     def get_call_template(self, args: Any, kws: Any) -> Any:
         plain = {name: unliteral(kind) for name, kind in kws.items()}
         template = super().get_call_template(tuple(map(unliteral, args)), plain)

@@ -247,6 +247,7 @@ def test_packages_of_the_same_names_and_ours_do_not_touch_each_other(full: Path,
     assert {path.name for path in environment.site.iterdir()} <= {"zz_dependencies.pth", "__pycache__"}
 
 
+@pytest.mark.full
 def test_ours_is_removed_and_the_others_stay(plain: Path, tmp_path: Path) -> None:
     environment = Environment(tmp_path, plain, stranger(tmp_path, "service"))
     environment.pip("uninstall", "-y", "exact-geometry")

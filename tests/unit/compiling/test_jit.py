@@ -327,6 +327,34 @@ def started(project: Path, seed: Path, **more: str) -> tuple[list[str], str]:
     return logged_run(project, **cache)
 
 
+PASSING = """
+from engine.compiling.jit import inline, kernel
+from engine.deep.middle import step
+
+@inline
+def applied(function, x):
+    if x > 1e300:
+        raise ValueError("too large")
+    return function(x)
+
+@kernel
+def run(x):
+    return applied(step, x)
+"""
+
+
+def test_the_same_sources_give_the_same_bytes_wherever_they_are(tmp_path: Path) -> None:
+    """What raises had the path of its file within, and who passes a function its address."""
+    made = []
+    for place in ("here", "there/and further"):
+        (tmp_path / place).mkdir(parents=True)
+        project = make_project(tmp_path / place)
+        (project / "engine" / "work.py").write_text(PASSING)
+        assert run(project, PYTHONHASHSEED="0", ENGINE_CACHE_DIR=str(project / "cache"))[0] == "2.0"
+        made.append({path.name: path.read_bytes() for path in (project / "cache").rglob("*.nbc")})
+    assert made[0] == made[1] != {}
+
+
 @pytest.fixture
 def own_seed(project: Path, seed: Path) -> Path:
     """Return the seed within the package, as a wheel has it."""
@@ -345,6 +373,7 @@ def test_the_kernels_of_a_wheel_are_those_of_both_names(project: Path, own_seed:
     for path in (project / "engine").rglob("*.py"):
         path.write_text(renamed(path.read_text()))
     (project / "exact_geometry").mkdir()
+    (project / "exact_geometry" / "__init__.py").touch()
     (project / "engine").rename(project / "exact_geometry" / "engine")
     use = USE.replace("from engine", "from exact_geometry.engine")
     words, logged = logged_run(project, use, ENGINE_CACHE_DIR=str(project / "cache"))
