@@ -114,8 +114,8 @@ def warm(
 def _steps_of(operations: Iterable[str]) -> list[int]:
     """Return the indices of the steps for operations; raise InvalidInputError for other words."""
     chosen = set()
-    for operation in operations:
-        if operation not in OPERATIONS or isinstance(operations, str):
+    for operation in operations if isinstance(operations, Iterable) else [operations]:
+        if not isinstance(operation, str) or operation not in OPERATIONS:
             raise InvalidInputError(
                 f"operations must be names of {', '.join(OPERATIONS)}, got {shown(operation)}", ("operations",)
             )
@@ -333,12 +333,12 @@ def warm_textbook() -> None:
         corners = np.eye(3)[:, :dimension]
         terms = Implicit([{"powers": [2] * dimension, "coefficient": 1.0}])
         for solid in (*_regions(dimension), Triangle(corners), terms, Csg("union", _regions(dimension)[:3])):
-            asked: list[tuple[methods.Methods, tuple[Any, ...]]] = [
+            questions: list[tuple[methods.Methods, tuple[Any, ...]]] = [
                 (methods.of_points(solid), (points,)),
                 (methods.of_segments(solid), (points.reshape(3, 2, dimension),)),
                 (methods.of_polygons(solid), (points.reshape(2, 3, dimension),)),
                 (methods.of_pairs(solid, solid), ()),
             ]
-            for offered, arguments in asked:
+            for offered, arguments in questions:
                 for ask, _ in offered.values():
                     ask(*arguments)

@@ -1,8 +1,8 @@
 """The names `engine` and `service` where a wheel is installed: those of another package, if there is one, else ours.
 
 In the wheel this file stands at the top, as `_exact_geometry_names`, and a .pth file imports it when Python starts. It
-imports nothing itself, and is asked after all other places: whichever package is installed first, neither touches the
-other's files. What it finds are the modules of `exact_geometry` themselves.
+imports nothing itself, and its finder comes last: a package of another project with such a name is imported in place of
+ours, whichever is installed first, and neither touches files of the other. Ours are the modules of `exact_geometry`.
 """
 
 import sys

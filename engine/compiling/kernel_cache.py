@@ -242,7 +242,7 @@ def warn_of_compiling(module: str, processes: float = 1) -> None:
 
 
 def expect_compiling() -> None:
-    """Leave `warn_of_compiling` out from now on: whoever called shows the progress."""
+    """Leave `warn_of_compiling` out from now on: the caller shows the progress."""
     _reported.add(warn_of_compiling)
 
 

@@ -231,21 +231,21 @@ def test_kernels_for_others_are_compiled_whatever_is_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], writes: bool
 ) -> None:
     """With an installed seed nothing was compiled, an empty one was written, and the exit code was 0."""
-    asked: list[dict[str, str]] = []
+    around: list[dict[str, str]] = []
 
     def run(_: object, env: dict[str, str], check: bool) -> SimpleNamespace:
-        asked.append(env)
+        around.append(env)
         Path(env["ENGINE_CACHE_DIR"]).mkdir(exist_ok=True)
         if writes:
-            (Path(env["ENGINE_CACHE_DIR"]) / f"{len(asked)}.nbc").touch()
+            (Path(env["ENGINE_CACHE_DIR"]) / f"{len(around)}.nbc").touch()
         return SimpleNamespace(returncode=0)
 
     monkeypatch.setenv("ENGINE_CACHE_SEED", str(tmp_path / "seed"))
     monkeypatch.setattr("engine.__main__.subprocess.run", run)
     assert main(["warm", "--into", str(tmp_path / "made"), "--cpu", "generic", "--processes", "1"]) == 2 * (not writes)
-    assert {env["ENGINE_CACHE_SEED"] for env in asked} == {""}
-    assert {env["PYTHONHASHSEED"] for env in asked} == {"0"}
-    assert {env["NUMBA_CPU_NAME"] for env in asked} == {"generic"}
-    assert len({env["ENGINE_CACHE_DIR"] for env in asked}) == 3  # a folder each, then all together
+    assert {env["ENGINE_CACHE_SEED"] for env in around} == {""}
+    assert {env["PYTHONHASHSEED"] for env in around} == {"0"}
+    assert {env["NUMBA_CPU_NAME"] for env in around} == {"generic"}
+    assert len({env["ENGINE_CACHE_DIR"] for env in around}) == 3  # a folder each, then all together
     assert (tmp_path / "made" / "MADE_BY").exists() == writes
     assert ("no kernel was written" in capsys.readouterr().err) != writes

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -151,8 +152,8 @@ def test_steps_are_all_in_some_group_and_some_operation() -> None:
     assert all(hasattr(engine, name) for name in warmup.OPERATIONS)
 
 
-@pytest.mark.parametrize("operations", [["volume"], "overlay", [1], ["overlay", "?"]])
-def test_an_unknown_operation_is_refused(operations: list[str]) -> None:
+@pytest.mark.parametrize("operations", [["volume"], "overlay", [1], ["overlay", "?"], 5, [[]]])
+def test_an_unknown_operation_is_refused(operations: Any) -> None:
     with pytest.raises(engine.InvalidInputError, match="overlay_batch"):
         engine.warm(operations=operations)
 
@@ -193,5 +194,5 @@ assert any(not k.signatures for k in KERNELS)  # the others wait
 @pytest.mark.parametrize("operation", ["overlay", "locate", "collide", "clip_segments", "bounds"])
 def test_one_operation_is_made_ready_by_itself(operation: str) -> None:
     code = [sys.executable, "-c", ONE_OPERATION, operation]
-    found = subprocess.run(code, capture_output=True, text=True, timeout=600)
-    assert found.returncode == 0, found.stderr[-3000:]
+    done = subprocess.run(code, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr[-3000:]
