@@ -45,7 +45,8 @@ Located: TypeAlias = tuple[Int8Array, int, int, str]
 
 
 def locate_small_batch(points: object, solid: object) -> Located | None:
-    """Locate a small batch on the fast path; None where the general path must be taken. Raises as `locate` does."""
+    """Return the locations of a small batch on the fast path, and counts; None where the general path must be taken.
+    Raises as `locate` does."""
     if not isinstance(solid, Solid):
         return None
     array: Any = points

@@ -171,7 +171,8 @@ def check_operation(operation: str) -> None:
 
 
 def polygons_in(solids: SolidsLike, name: str) -> Sequence[Solid]:
-    """Return polygons, other shapes read; raise for anything that is no polygon, naming its index."""
+    """Return a sequence of polygons, other shapes read (`as_solids`). name: of the argument, for errors. Raises
+    UnsupportedSolidError for what is no polygon, with its index."""
     read = as_solids(solids, name)
     if set(map(type, read)) - {Polygon}:
         for k, each in enumerate(read):
@@ -366,7 +367,8 @@ def filled(rings: object, rule: FillRule, *, deadline: float | None = None, canc
 def _arrange_all(
     polygons: SolidsLike, rule: Rule, budget: Budget, grid: float | None = None
 ) -> tuple[Overlay, Accuracy]:
-    """Return the overlay of the rings of all polygons by a fill rule, each polygon a source."""
+    """Return the overlay of the rings of all polygons by a fill rule, each polygon a source of its own, and the
+    accuracy report. grid: spacing to which the result is snapped."""
     rings, sources, starts = _rings_of_all(polygons)
     nesting = Nesting(sources, np.zeros(0), int(rule))
     result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)

@@ -255,8 +255,8 @@ def _address(array: Any) -> int:
 
 
 def order_of(segments: FloatArray, t: float, where: Any, budget: Budget, workers: int | None) -> IntArray:
-    """Return an order of segments in which neighbours at t follow each other, if there are many: their data stays in
-    the cache."""
+    """Return an order of segments (n, 2, dim) in which neighbours in space, at parameter t, follow each other, for the
+    cache; few stay as given. where: `Where` of the bodies."""
     n = len(segments)
     if n < _MANY:
         return _AS_GIVEN[:n]

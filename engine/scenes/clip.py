@@ -143,7 +143,8 @@ def meets_any(
 def _first_hits(
     segments: FloatArray, scene: Placements, is_any: bool, budget: Budget, workers: int | None
 ) -> tuple[FlagArray, Any]:
-    """Return the state of each segment and, unless `is_any`, the first pieces of those that are MET."""
+    """Return, by segment, its state (MET, OPEN, SETTLED: meets none), and the first pieces of those that are MET, not
+    computed if `is_any`."""
     n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget), budget, workers)
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
 

@@ -95,7 +95,9 @@ def sort_pieces(
     pieces: LoosePieces, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED,
     workers: int | None = 1,
 ) -> ScenePieces:  # fmt: skip
-    """Return pieces in the exact order of their starts; those of one source and body are in order already."""
+    """Return pieces of n_sources segments sorted by segment and exact start. Caller guarantees that those of one
+    segment and body are in order. exact: makes the function that gives exact parameters, called if doubles do not
+    decide."""
     m = len(pieces.source)
     numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, pieces.ends.shape[2]))
     out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)

@@ -135,7 +135,8 @@ def _clip(
     segments: FloatArray, region: Solid, method: Method, scene: Scaled, most_open: int, budget: Budget,
     workers: int | None, progress: Progress | None,
 ) -> Clipped | None:  # fmt: skip
-    """Return the pieces; None if more than `most_open` items are left to the exact fallback."""
+    """Return the pieces of a batch and counts; None if more than `most_open` segments need the exact fallback. scene:
+    the batch as kernels take it."""
     n_threads = default_workers() if workers is None else workers
     batch = _Batch(method, scene, budget, _PER_BLOCK if n_threads <= FEW_THREADS else _PER_SHARED_BLOCK)
     run_chunks(batch.clip, len(segments), budget=budget, workers=workers, progress=progress, in_order=True)

@@ -134,8 +134,8 @@ def kind_of(solid: object) -> str:
 def refused(
     solid: object, what: str, takes: Callable[[Row], object], more: str = "", where: Where = ()
 ) -> UnsupportedSolidError:
-    """Return the error for a solid that an operation does not take; what: the beginning of the sentence, before the
-    solid."""
+    """Return the error for a solid that an operation does not take: "<what> a <type>; give a <types whose rows it
+    takes><more>". where: the path of the argument."""
     return UnsupportedSolidError(f"{what} {named(kind_of(solid))}; give {named(names(takes))}{more}", where)
 
 

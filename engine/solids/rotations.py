@@ -39,8 +39,8 @@ def check_rotations(
 
     Decided exactly: entries of ``R^T R - I`` are computed in float64 for all matrices, and in rationals for those
     within rounding of the limit. A matrix within the usual limit has |det| within 1e-11 of 1, so that its float64 sign
-    is right; within the widest, |det| > 0.5. one: `rotations` has a single matrix and `where` is its own path. limit:
-    at most 0.1.
+    is right; within the widest, |det| > 0.5. where: the path of the argument; one: it is that of a single matrix.
+    limit: largest magnitude of an entry of ``R^T R - I``, at most 0.1.
     """
     if rotations.ndim != 3 or rotations.shape[1] != rotations.shape[2]:
         raise InvalidArrayError(f"{spell(where)} must have shape (n, d, d), got {rotations.shape}", where)
@@ -77,7 +77,7 @@ def check_rotations(
 
 
 def is_certified_rotation(matrix: FloatArray) -> bool:
-    """Return whether floats prove that a read-only ``(1, d, d)`` float64 is a rotation; if not, `check_rotations`
+    """Return whether floats prove that a read-only ``(1, d, d)`` float64 is a rotation; if False, `check_rotations`
     decides."""
     return not entry_of(find_suspects)(matrix, USUAL - _UNSURE, _UNREAD)
 
@@ -89,9 +89,9 @@ _UNREAD: Final = np.empty(1, np.bool_)
 
 @kernel
 def find_suspects(matrices: FloatArray, limit: float, is_suspect: BoolArray) -> int:
-    """Fill is_suspect (n,) for matrices (n, d, d): computed max|R^T R - I| > limit, or det <= 0; return the number of
-    True. An entry of the product is a sum of d products, det a sum of d! of d; matrices whose numbers overflow are
-    suspect."""
+    """Set is_suspect (n,) for the matrices (n, d, d) that may be no rotations: computed max|R^T R - I| > limit, or det
+    <= 0; return the number of True. An entry of the product is a sum of d products, det a sum of d! products of d
+    factors; matrices whose numbers overflow are suspect."""
     dimension, n_suspects = matrices.shape[1], 0
     for item in range(matrices.shape[0]):
         suspect = False
@@ -139,8 +139,9 @@ def nearest_rotation(matrix: FloatArray) -> FloatArray:
 
 
 def _orthogonal_factor(matrix: FloatArray, bits: int) -> list[list[int]]:
-    """Return the orthogonal factor in units of 2^-bits by Newton's iteration X <- (X + X^-T) / 2, which squares the
-    error. Source: N. Higham, Computing the polar decomposition, with applications, 1986."""
+    """Return the orthogonal factor of the polar decomposition of a matrix, as rows of integers in units of 2^-bits, by
+    Newton's iteration X <- (X + X^-T) / 2, which squares the error. Source: N. Higham, Computing the polar
+    decomposition, with applications, 1986."""
     rows = [[int(Fraction(value) * (1 << bits)) for value in row] for row in matrix.tolist()]
     while True:  # bound: the error is below 1 and squared
         if len(rows) == 2:
