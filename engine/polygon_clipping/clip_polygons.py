@@ -209,8 +209,7 @@ def clip_polygons(
 
 
 def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> ClippedPolygons | None:
-    """Clip an array of few polygons (n, size, dim) on a fast path; None if the general path is needed, which also
-    checks the array."""
+    """Clip an array (n, size, dim) of few polygons; None if it needs the general path, which also checks it."""
     if plan.tables is None or polygons.ndim != 3 or not is_ready(polygons, polygons.shape[1], dimension):
         return None
     n, size, _ = polygons.shape
@@ -222,8 +221,7 @@ def _clip_array(polygons: npt.NDArray[Any], plan: Plan, dimension: int) -> Clipp
 
 
 def _equal_rings(n: int, size: int) -> tuple[IntArray, IntArray]:
-    """Return ring offsets and polygon offsets of n polygons of one ring of `size` vertices; read-only, as kernels
-    expect."""
+    """Return ring offsets and polygon offsets, read-only, of n polygons of one ring of `size` vertices each."""
     numbers = np.arange(n + 1)
     return read_only(size * numbers), read_only(numbers)
 
@@ -245,8 +243,7 @@ class Contours(NamedTuple):
 
 
 class Batch(NamedTuple):
-    """A batch as chunks take it. contours, plan, scene: polygons and planes; the other fields: arrays to fill, see
-    `Clipped` and `ClippedPolygons`."""
+    """Polygons and planes (contours, plan, scene), and arrays to fill: see `Clipped` and `ClippedPolygons`."""
 
     contours: Contours
     plan: Plan
@@ -426,8 +423,7 @@ def _assemble(
     for rings that vanished; polygon_offsets: of polygons into all given rings."""
     left = np.flatnonzero(sizes)
     if len(polygon_offsets) == len(sizes) + 1:  # a ring each
-        contours = np.zeros(len(left), np.int64)
-        ends = polygon_offsets if len(left) == len(sizes) else summed(sizes > 0)
+        ends, contours = summed(sizes > 0), np.zeros(len(left), np.int64)
         return ClippedPolygons(vertices, summed(sizes[left]), ends, contours, status, may_have_bridges)
     owners = np.repeat(polygon_offsets[:-1], np.diff(polygon_offsets))
     contours, ends = (np.arange(len(sizes)) - owners)[left], summed(sizes > 0)[polygon_offsets]

@@ -238,8 +238,7 @@ def collide_bodies(
 def _settle(
     bodies: SceneBodies, pairs: IntArray, answers: Answers, workers: int | None, progress: Progress | None
 ) -> None:
-    """Decide the pairs (n, 2) of a block that the batches left UNSETTLED, one by one, in parallel chunks; write to
-    `answers`."""
+    """Decide those pairs (n, 2) of a block one by one that the batches left UNSETTLED, and write to `answers`."""
     left = answers.left()
     if progress is not None and len(left) < len(pairs):
         progress(len(pairs) - len(left))
@@ -315,8 +314,7 @@ def _candidates(
 
 
 def _meeting(low: FloatArray, high: FloatArray, keys: IntArray) -> Iterator[IntArray]:
-    """Yield blocks (m, 2) of those pairs, among the given keys first * n + second, whose boxes low, high (n, d)
-    intersect."""
+    """Yield blocks (m, 2) of the pairs, given as keys first * n + second, whose boxes low, high (n, d) intersect."""
     for start in range(0, len(keys), BLOCK):
         first, second = np.divmod(keys[start : start + BLOCK], len(low))
         meet = (first < second) & ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
