@@ -25,6 +25,7 @@ from engine.containment.posed_locators import posed_locator
 from engine.distance.clearance import clearance
 from engine.errors import InvalidInputError
 from engine.polygon_clipping.clip_polygons import clip_polygons
+from engine.polygon_clipping.planes import orientations
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
 from engine.running.budget import Budget
@@ -270,6 +271,7 @@ def _warm_bounds() -> None:
     for body in (Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9), _cube(5.0)):
         clearance(body, Sphere([3, 0, 0], 1))
     collide_scene([Sphere([0, 0, 0], 1), Sphere([3, 0, 0], 1)], gap=2.0)
+    orientations(*np.zeros((4, 1, 3)))  # of meshes that are inspected
 
 
 STEPS = (

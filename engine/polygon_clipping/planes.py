@@ -30,7 +30,7 @@ from engine.solids.convexity import convexity
 from engine.solids.mesh import Polyhedron
 from engine.solids.primitives import Aabb, Convex, HalfSpace, rows_of
 from engine.solids.registry import refused, row_of
-from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray, Location
+from engine.types import UNDECIDED, FloatArray, Int8Array, IntArray, Location, read_only
 
 Check = Callable[[], object]
 
@@ -44,7 +44,7 @@ def orientations(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> 
     """Return the exact orient3d of each row of a, b, c, d (n, 3)."""
     signs = np.empty(len(a), np.int8)
     with np.errstate(all="ignore"):
-        orient3d_batch(*(np.ascontiguousarray(points) for points in (a, b, c, d)), signs)
+        orient3d_batch(*(read_only(np.ascontiguousarray(points)) for points in (a, b, c, d)), signs)
     for i in np.flatnonzero(signs == UNDECIDED):
         signs[i] = orient3d_rational(a[i].tolist(), b[i].tolist(), c[i].tolist(), d[i].tolist())
     return signs

@@ -146,6 +146,7 @@ WORK: dict[str, Callable[[], Any]] = {
     },
     "overlay_batch": far_apart_batch,
     "put_solid": lambda: prism(comb(1_200)),
+    "inspect_solid": lambda: prism(circle(20_000)),
     "contains_stored": lambda: (POLYNOMIAL, np.tile([3.0, 5.0], 100_000).tobytes()),
     "clip_segments_stored": lambda: (MANY_SIDES, np.tile([[-2.0, 0.1], [2.0, 0.2]], (60_000, 1)).tobytes()),
     "import_solid": lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n" + b"f 1 2 3\nf 1 2 3 1 2 3\n" * 75_000,

@@ -142,6 +142,9 @@ SIZES = [[1e200], [1e-200], [1.0]], [[1e-150], [1e150], [3.0]]
 FAR = [np.tile(IN_A_PLANE * sizes, (100_000, 1, 1)) for sizes in SIZES]
 """Triangles of one plane whose exponents only integers hold."""
 WORK: dict[str, Callable[..., Any]] = {
+    "Polygon": lambda **end: engine.Polygon(
+        {"type": "MultiPolygon", "coordinates": [[bar] for bar in [*stripes(1_500), *across(1_500), TINY]]}, **end
+    ),
     "Polyhedron": lambda **end: engine.Polyhedron(*arrows(), **end),
     "Scene.clip_segments": lambda **end: engine.Scene([solid("comb")]).clip_segments(ALONG, **end),
     "Scene.collide": lambda **end: engine.Scene([solid("tin")] * 60, TINS).collide(**end),
@@ -160,6 +163,7 @@ WORK: dict[str, Callable[..., Any]] = {
     "compare": lambda **end: engine.compare("clip_segments", CHORDS, solid("many sides"), **end),
     "contains": lambda **end: engine.contains(POINTS, solid("vanishing"), **end),
     "filled": lambda **end: engine.filled(fan(1_500), "non_zero", **end),
+    "inspect": lambda **end: engine.inspect(soup(), **end),
     "locate": lambda **end: engine.locate(POINTS, solid("vanishing"), **end),
     "locate_scene": lambda **end: engine.locate_scene(POINTS, [solid("vanishing")], **end),
     "overlay": lambda **end: engine.overlay(*far_pair(), "union", **end),

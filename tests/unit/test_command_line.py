@@ -198,7 +198,7 @@ def test_every_mesh_format(suffix: str, tmp_path: Path, capsys: pytest.CaptureFi
         (["contains", "broken.glb", "p.csv"], "cannot be read as glb"),
         (["contains", "open.off", "p.csv"], "not_closed"),
         (["clip", SPHERE, "p.csv"], "rows of 2 x 3 numbers expected"),
-        (["overlay", "square.geojson", SPHERE], "unsupported_solid at right.features.0"),
+        (["overlay", "square.geojson", SPHERE], "no GeoJSON: its type is 'sphere'"),
         (["contains", BOX, "ok.csv", "-o", "out.xml"], "this answer is written to"),
     ],
 )

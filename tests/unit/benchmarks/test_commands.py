@@ -39,7 +39,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["no.json"], "No such file"),
+        (["no.json"], "no such file"),
         (["box.json"], "one file is a mesh or a polygon"),
         (["two.geojson"], "holds 2 polygons"),
         (["two.geojson", "points.npy"], "holds 2 polygons"),
