@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import io
 import multiprocessing
+import os
 import sys
+import tempfile
 import time
 from concurrent import futures
 from importlib.util import find_spec
@@ -24,14 +26,17 @@ _FOOTPRINT: Final = 16
 """Memory limit of a child besides what it starts with, and for each byte of a file."""
 _POLL_SECONDS: Final = 0.05
 _starter: Final = futures.ThreadPoolExecutor(1, thread_name_prefix="mesh reader")
-_METHOD: Final = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+_LONGEST: Final = 70
+"""Length of the folder of temporary files up to which the server's socket has a name that systems take (104 bytes)."""
 
 
 def context() -> Any:
     """Return the multiprocessing context; the first one of this process starts its server, which imports what readers
     need."""
-    started: Any = multiprocessing.get_context(_METHOD)
-    if _METHOD == "forkserver":
+    has_server = "forkserver" in multiprocessing.get_all_start_methods()
+    has_server = has_server and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST
+    started: Any = multiprocessing.get_context("forkserver" if has_server else "spawn")
+    if has_server:
         started.set_forkserver_preload(
             [f"{__package__}.mesh_reader", f"{__package__}.__main__", "trimesh.exchange.load"]
         )
@@ -50,7 +55,8 @@ def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -
     try:
         while not futures.wait([starting], _POLL_SECONDS).done or not wait([mine], _POLL_SECONDS):
             call.remaining()
-        starting.result()
+            if starting.done():
+                starting.result()  # raises what kept the child from starting, which nothing would answer for
         theirs.close()
         try:
             received = mine.recv()

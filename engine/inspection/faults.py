@@ -39,8 +39,9 @@ class Edges(NamedTuple):
 
 def edges_of(faces: IntArray) -> Edges:
     sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    ends, of, uses = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    of = of.reshape(-1)
+    n = int(faces.max(initial=0)) + 1  # below 2^31: keys are whole
+    keys, of, uses = np.unique(sides.min(axis=1) * n + sides.max(axis=1), return_inverse=True, return_counts=True)
+    ends, of = np.stack(np.divmod(keys, n), axis=1), of.reshape(-1)
     net = np.bincount(of, np.sign(sides[:, 1] - sides[:, 0]), len(ends)).astype(np.int64)
     uses = np.where(ends[:, 0] == ends[:, 1], 0, uses)  # of a face that names a vertex twice
     return Edges(ends, of.reshape(-1, 3), uses, net)
@@ -82,10 +83,11 @@ def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
     return rows[np.lexsort((across, rows[:, 1], rows[:, 0]))]
 
 
-def shells_of(edges: Edges) -> list[IntArray]:
+def shells_of(edges: Edges, budget: Budget) -> list[IntArray]:
     """Return the faces of each part that hangs together by edges, by smallest labels that spread."""
     labels = np.arange(len(edges.of))
     while True:  # bound: labels only fall; pointers are halved each turn
+        budget.check()
         least = np.full(len(edges.ends), len(labels))
         np.minimum.at(least, edges.of.reshape(-1), labels.repeat(3))
         spread = np.minimum(labels, least[edges.of].min(axis=1))

@@ -91,7 +91,7 @@ def oriented(points: FloatArray, faces: IntArray, budget: Budget, mended: list[s
                         waiting.append(other)
     made = np.where(turned[:, None] == 1, faces[:, ::-1], faces)
     n_wrong = int((edges_of(made).net != 0).sum())
-    for shell, is_turned in [*nesting(points, made, shells_of(edges), budget)]:
+    for shell, is_turned in [*nesting(points, made, shells_of(edges, budget), budget)]:
         if is_turned:
             made[shell] = made[shell][:, ::-1]
     n_turned = int((made != faces).any(axis=1).sum())

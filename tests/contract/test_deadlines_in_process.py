@@ -131,6 +131,15 @@ def fan(n: int) -> list[Any]:
     return [np.stack([end, -end, -end + 0.01 * end[::-1]]) for end in ends]
 
 
+@cache
+def crossing_triangles() -> tuple[Any, Any]:
+    """Return thin triangles through the origin, nearly all of which cross each other."""
+    draw = np.random.default_rng(0)
+    ends = draw.normal(size=(5_000, 3))
+    corners = np.stack([ends, -ends, -ends + 0.01 * draw.normal(size=ends.shape)], axis=1)
+    return corners.reshape(-1, 3), np.arange(15_000).reshape(-1, 3)
+
+
 POSE = engine.Pose(np.eye(3), [0, 0, 1])
 ALONG = np.tile([[-1.0, 0.0], [9_000.0, 0.0]], (20_000, 1, 1))
 CHORDS = np.tile([[-2.0, 0.1], [2.0, 0.2]], (60_000, 1, 1))
@@ -163,7 +172,7 @@ WORK: dict[str, Callable[..., Any]] = {
     "compare": lambda **end: engine.compare("clip_segments", CHORDS, solid("many sides"), **end),
     "contains": lambda **end: engine.contains(POINTS, solid("vanishing"), **end),
     "filled": lambda **end: engine.filled(fan(1_500), "non_zero", **end),
-    "inspect": lambda **end: engine.inspect(soup(), **end),
+    "inspect": lambda **end: engine.inspect(crossing_triangles(), **end),
     "locate": lambda **end: engine.locate(POINTS, solid("vanishing"), **end),
     "locate_scene": lambda **end: engine.locate_scene(POINTS, [solid("vanishing")], **end),
     "overlay": lambda **end: engine.overlay(*far_pair(), "union", **end),

@@ -156,6 +156,7 @@ def candidates(ts: Any, us: Any) -> Any:
     return found
 
 
+@pytest.mark.some(4)
 @pytest.mark.parametrize("seed", range(12))
 def test_crossings_are_those_of_rational_arithmetic(seed: int) -> None:
     draw = np.random.default_rng(seed)

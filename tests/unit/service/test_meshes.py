@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import engine
+from service import mesh_reader
 
 pytestmark = [pytest.mark.anyio, pytest.mark.data]
 HARD = ["c3d_spot", "c3d_spot_off1e6", "syn_bracket_off1e9", "syn_gear_off1e9", "syn_menger2", "syn_sliver_uv"]
@@ -75,3 +77,13 @@ async def test_segments_are_clipped_by_the_menger_sponge(client: httpx.AsyncClie
     middles = [np.mean([piece["start"], piece["end"]], axis=0).tolist() for piece in answer.json()["pieces"]]
     inside = await client.post("/v1/contains", json={"solid": solid, "points": middles}, timeout=120)
     assert all(inside.json()["contained"])
+
+
+def test_a_long_folder_of_temporary_files_needs_no_socket_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The name of a socket has at most some hundred bytes: its server would not start, and nothing would answer."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / ("long" * 30)))
+    assert mesh_reader.context().get_start_method() == "spawn"
+    monkeypatch.setattr(tempfile, "tempdir", "/tmp")
+    assert mesh_reader.context().get_start_method() in ("forkserver", "spawn")

@@ -24,6 +24,7 @@ def pairs_of(tree, found):  # type: ignore[no-untyped-def]
     return total
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("n", [1, 3, 4, 5, 33, 41, 300, 1500])
 @pytest.mark.parametrize("share", [1.0, 0.2])
 @pytest.mark.parametrize("wanders", [True, False])
