@@ -64,6 +64,11 @@ def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -
             raise ServiceError(
                 "invalid_mesh", f"the reader of {kind or 'mesh'} files ended without an answer"
             ) from None
+    except OSError as error:
+        raise ServiceError(
+            "out_of_memory",
+            f"the process that reads the file did not start or was lost ({error}); try again later, or send the solid",
+        ) from None
     finally:
         starting.add_done_callback(lambda _: _end(child, mine, theirs))
     if isinstance(received, str):

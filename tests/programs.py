@@ -7,6 +7,21 @@ import shutil
 
 import pytest
 
+COUNTER = """
+from numba.core import event
+
+class Counter(event.Listener):
+    n = 0
+    def on_start(self, happening):
+        self.n += 1
+    def on_end(self, happening):
+        pass
+
+counter = Counter()
+event.register("numba:compile", counter)
+"""
+"""Code for a process of its own: counts what numba compiles after it."""
+
 
 def program(*names: str, package: str) -> str:
     """Return the path of the first of these that is there; skip the test where none is. package: Debian's."""

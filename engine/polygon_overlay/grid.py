@@ -112,11 +112,11 @@ class _SnappedRings(NamedTuple):
 
     | field | topology kept | topology changed |
     | --- | --- | --- |
-    | n_moved | number of vertices that are no integer points | the same |
+    | n_moved | number of vertices of `vertices` that moved | number of all vertices that moved |
     | keeps_topology | True | False |
-    | are_apart | no edge is within half a cell of another vertex | the same |
+    | are_apart | a vertex moved, and no edge is within half a cell of another vertex | as on the left |
     | vertices, offsets | the snapped rings | the integer points of all vertices |
-    | edges | by vertex the input vertex whose edge continues there; None: the same | None |
+    | edges | (m,) by vertex the input vertex whose edge continues there; None: all vertices, in order | None |
     | passages | unused | edges, and vertices whose pixels they pass |
     """
 

@@ -19,7 +19,7 @@ from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.on_boundary.contacts import are_same
-from engine.segment_clipping.outside import Columns, parts_outside
+from engine.segment_clipping.outside import PartColumns, parts_outside
 from engine.segment_clipping.pieces import Pieces
 from engine.solids.accepted import LinesLike, SolidLike
 from engine.solids.checks import as_points, shown
@@ -185,7 +185,7 @@ def clip_lines(
         pieces, n_beyond, n_rational = plan.cut(read_only(segments), region, plan, budget, workers, progress)
         made = _joined(pieces, firsts, vertices, offsets, budget)
         if keep == "outside":
-            columns = Columns(made.source, made.vertices, made.offsets, made.segments, made.t, made.faces)
+            columns = PartColumns(made.source, made.vertices, made.offsets, made.segments, made.t, made.faces)
             made = LinePieces(*parts_outside(columns, vertices, offsets))
     return (made, Accuracy("exact", 0.5, len(firsts), n_beyond, n_rational, plan.name)) if report else made
 

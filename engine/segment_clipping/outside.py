@@ -24,8 +24,8 @@ class Mark(NamedTuple):
     face: int
 
 
-class Columns(NamedTuple):
-    """Columns of `LinePieces`."""
+class PartColumns(NamedTuple):
+    """PartColumns of `LinePieces`."""
 
     source: IntArray
     vertices: FloatArray
@@ -35,7 +35,7 @@ class Columns(NamedTuple):
     faces: IntArray
 
 
-def parts_outside(pieces: Columns, vertices: FloatArray, offsets: IntArray) -> Columns:
+def parts_outside(pieces: PartColumns, vertices: FloatArray, offsets: IntArray) -> PartColumns:
     """Return the parts of lines that pieces, of `clip_lines`, leave; vertices, offsets: of the lines.
 
     A line that ends where it begins closes there: the part through that vertex is one, the line's last.
@@ -49,7 +49,7 @@ def parts_outside(pieces: Columns, vertices: FloatArray, offsets: IntArray) -> C
             made += [(line, *part) for part in _parts_of(own, ends)]
     chains = [[first.at, *between, last.at] for _, first, last, between in made]
     empty = np.zeros((0, vertices.shape[1]))
-    return Columns(
+    return PartColumns(
         np.array([line for line, *_ in made], np.int64),
         np.array([at for chain in chains for at in chain], np.float64).reshape(-1, empty.shape[1]),
         np.cumsum([0, *map(len, chains)]),
@@ -59,7 +59,7 @@ def parts_outside(pieces: Columns, vertices: FloatArray, offsets: IntArray) -> C
     )
 
 
-def _ends_of(pieces: Columns, piece: int) -> tuple[Mark, Mark]:
+def _ends_of(pieces: PartColumns, piece: int) -> tuple[Mark, Mark]:
     places = pieces.offsets[piece], pieces.offsets[piece + 1] - 1
     first, last = (
         Mark(int(segment), float(t), pieces.vertices[place], int(face))

@@ -278,7 +278,7 @@ def find_self_contact(ring: Ring, where: IntArray, flag: FlagArray) -> int:
     | SIMPLE | no self-contact |
     | TURNS_BACK | at corner where[0] |
     | MEETS | side where[0] meets side where[1]; side i goes from corner i to the next one |
-    | ENDED_EARLY | the flag is set or a turn is wanted |
+    | ENDED_EARLY | the flag is set, or floats leave the sign of a turn open: its corners are in `ring.wanted` |
     """
     x, y, n = ring.x, ring.y, ring.x.shape[0]
     for i in range(n):

@@ -128,8 +128,8 @@ def _from_mesh(value: Any) -> Polyhedron | None:
 
 
 def mesh_arrays_of(value: Any) -> tuple[Any, Any] | None:
-    """Return vertices and faces of a mesh of another package, by what its objects have, in the order of the docstring
-    above; None for anything else."""
+    """Return (vertices, faces), unchecked, of a mesh of trimesh, open3d, pyvista or meshio, known by its attributes;
+    None for anything else."""
     if hasattr(value, "vertices") and hasattr(value, "faces"):  # trimesh
         return value.vertices, value.faces
     if hasattr(value, "vertices") and hasattr(value, "triangles"):  # open3d, legacy

@@ -15,6 +15,7 @@ import pytest
 from numba import config as numba_config
 
 from tests.acceptance.test_versions import ask_everything
+from tests.programs import COUNTER
 from tests.unit.service.test_live import Service
 
 pytest.importorskip("hatchling", reason="builds wheels")
@@ -22,20 +23,13 @@ pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the comp
 ROOT = Path(__file__).resolve().parents[2]
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
 
-ASK = """
+ASK = (
+    """
 import numpy as np
-from numba.core import event
 import exact_geometry as eg
-
-class Counter(event.Listener):
-    n = 0
-    def on_start(self, happening):
-        self.n += 1
-    def on_end(self, happening):
-        pass
-
-counter = Counter()
-event.register("numba:compile", counter)
+"""
+    + COUNTER
+    + """
 corners = [[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]
 cube = eg.Polyhedron(corners, [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]])
 ball, box = eg.Sphere((0, 0, 0), 1), eg.Aabb((0, 0), (1, 1))
@@ -66,6 +60,7 @@ answers = {
 }
 print([name for name, is_right in answers.items() if not is_right], counter.n)
 """
+)
 LOCATE = "import exact_geometry as eg; print(eg.locate([(3.0, 4.0), (3.1, 4.0)], eg.Sphere((0, 0), 5)).tolist())"
 
 

@@ -12,25 +12,19 @@ import pytest
 from numba import config as numba_config
 
 from engine.compiling import kernel_cache
+from tests.programs import COUNTER
 
 pytestmark = pytest.mark.skipif(bool(numba_config.DISABLE_JIT), reason="the compiler is disabled")
 
-PROBE = """
+PROBE = (
+    """
 import logging
 logging.basicConfig()
 import numpy as np
-from numba.core import event
 import engine
-
-class Counter(event.Listener):
-    n = 0
-    def on_start(self, happening):
-        self.n += 1
-    def on_end(self, happening):
-        pass
-
-counter = Counter()
-event.register("numba:compile", counter)
+"""
+    + COUNTER
+    + """
 corners = [[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)]
 faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
 cube, other = engine.Polyhedron(corners, faces), engine.Polyhedron(np.array(corners) + 0.5, faces)
@@ -47,6 +41,7 @@ answers = [
 engine.warm(processes=2)
 print(*answers, counter.n)
 """
+)
 ANSWERS = "-2 -4 2 0 0 0 0 overlapping 6"
 
 

@@ -13,6 +13,7 @@ import pytest
 import engine
 from engine import warmup
 from engine.warmup import STEPS
+from tests.programs import COUNTER
 
 PROBE = """
 import importlib, pkgutil
@@ -101,18 +102,9 @@ def test_nothing_is_compiled_after_warm() -> None:
         assert found.returncode == 0, (asked, found.stderr[-3000:])
 
 
-COUNT = """
-from numba.core import event
-
-class Counter(event.Listener):
-    n = 0
-    def on_start(self, happening):
-        self.n += 1
-    def on_end(self, happening):
-        pass
-
-counter = Counter()
-event.register("numba:compile", counter)
+COUNT = (
+    COUNTER
+    + """
 import numpy as np
 import engine
 engine.locate(np.zeros((4, 3)), engine.Sphere([0, 0, 0], 1))
@@ -120,6 +112,7 @@ print(counter.n)
 engine.clip_segments(np.linspace(-1, 2, 24).reshape(4, 2, 3), engine.Aabb([0, 0, 0], [1, 1, 1]))
 print(counter.n)
 """
+)
 COMPILATIONS = [17, 61]
 """Of kernels and inner functions, up to the first answer of each: a new one, or one for other types, is seen here.
 Three are those of the compilers' canary."""

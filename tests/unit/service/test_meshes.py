@@ -12,6 +12,10 @@ import pytest
 
 import engine
 from service import mesh_reader
+from service.errors import ServiceError
+from service.settings import Settings
+from service.store import Store
+from service.work import Call, Memory
 
 pytestmark = [pytest.mark.anyio, pytest.mark.data]
 HARD = ["c3d_spot", "c3d_spot_off1e6", "syn_bracket_off1e9", "syn_gear_off1e9", "syn_menger2", "syn_sliver_uv"]
@@ -87,3 +91,15 @@ def test_a_long_folder_of_temporary_files_needs_no_socket_in_it(
     assert mesh_reader.context().get_start_method() == "spawn"
     monkeypatch.setattr(tempfile, "tempdir", "/tmp")
     assert mesh_reader.context().get_start_method() in ("forkserver", "spawn")
+
+
+def test_a_reader_that_cannot_start_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: Any = mesh_reader.context()
+
+    def refuse(_: object) -> None:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(started.Process, "start", refuse)
+    call = Call(Settings(), Store(1), Memory(1 << 30))
+    with pytest.raises(ServiceError, match="temporarily unavailable"):
+        mesh_reader.read(b"solid", "stl", call)
