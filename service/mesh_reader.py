@@ -64,6 +64,8 @@ def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -
             raise ServiceError(
                 "invalid_mesh", f"the reader of {kind or 'mesh'} files ended without an answer"
             ) from None
+    except engine.EngineError:  # a deadline is an OSError too (TimeoutError)
+        raise
     except OSError as error:
         raise ServiceError(
             "out_of_memory",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -103,3 +104,11 @@ def test_a_reader_that_cannot_start_is_said_at_once(monkeypatch: pytest.MonkeyPa
     call = Call(Settings(), Store(1), Memory(1 << 30))
     with pytest.raises(ServiceError, match="temporarily unavailable"):
         mesh_reader.read(b"solid", "stl", call)
+
+
+def test_a_reader_that_is_late_is_no_lost_reader(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: Any = mesh_reader.context()
+    monkeypatch.setattr(started.Process, "start", lambda _: time.sleep(0.5))
+    call = Call(Settings(deadline_seconds=0.1), Store(1), Memory(1 << 30))
+    with pytest.raises(engine.DeadlineExceededError):
+        mesh_reader.read(b"v 0 0 0\n", "obj", call)
