@@ -3,7 +3,7 @@
 | code | values | module |
 |---|---|---|
 | relation of two bodies | as `engine.types.Relation`, or UNSETTLED | here |
-| class of two faces | APART, CROSSING, UNDECIDED, CONTACT, COPLANAR; CORNER + 3 k + m | triangle_triangle |
+| class of two faces | APART, CROSSING, ..., COMMON_AREA; CORNER + 3 k + m | triangle_triangle |
 | decided class | DECIDED + 3 bits of corners a face; NO_SHARED_AREA + bits, ... | touching, pose_batch |
 | kind of a contact | FACE_FACE ... CONTAINED, the places of names in STRENGTH, the strongest first | contact_kinds |
 | state of a face | STATE_UNKNOWN, STATE_CLEAN, STATE_CROSSED, STATE_STACKED, the worst last | mesh_arrays |
@@ -19,3 +19,14 @@ UNSETTLED = -1
 """Code in place of a relation that is undecided: weak contacts, undecided signs, or only some components inside."""
 
 DISJOINT, FIRST_INSIDE_SECOND, SECOND_INSIDE_FIRST, OVERLAPPING, TOUCHING = range(5)  # as in engine.types.Relation
+
+RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)
+N_COLUMNS = 5
+"""Columns of the rows that `pose_batch.relate_poses` fills.
+
+| column | meaning |
+|---|---|
+| RELATION | the relation, or UNSETTLED |
+| KIND, FIRST_FACE, SECOND_FACE | the witness, if requested and decided; the least face of a body that is inside |
+| N_CONTACTS | number of contacts listed, ONE_SETTLES if it is one crossing that decides |
+"""

@@ -10,15 +10,15 @@ import numpy as np
 
 from engine.collision import collide as one_pair
 from engine.collision.batches import posed_batch
-from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
+from engine.collision.codes import DISJOINT, N_COLUMNS, N_CONTACTS, OVERLAPPING, RELATION, UNSETTLED
 from engine.collision.meshes.contact_kinds import N_NAMED
-from engine.collision.meshes.dual_traversal import PIERCING
+from engine.collision.meshes.dual_traversal import PIERCING, SEEK_CROSSING, SEEK_OVERLAP
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, STILL, mesh_body_of
 from engine.collision.meshes.mesh_mesh import decode_row, relation_from_kernel
 from engine.collision.meshes.mesh_pair import SPACE, search_goal
 from engine.collision.meshes.parity import states_of
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.pose_batch import N_COLUMNS, N_CONTACTS, ONE_SETTLES, RELATION, relate_poses
+from engine.collision.meshes.pose_batch import ONE_SETTLES, relate_poses
 from engine.collision.result import (
     RELATIONS,
     SWAPPED_RELATION,
@@ -244,6 +244,8 @@ def batch_of(
         return batch
     a, b = mesh_body_of(first), mesh_body_of(second)
     seek = search_goal(a, b, Work(budget, is_named, answers.boolean))
+    if has_detail and seek == SEEK_OVERLAP:  # it is known of overlaps that a crossing proves
+        seek = SEEK_CROSSING
 
     def fill(start: int, stop: int) -> None:
         if batch is not None:

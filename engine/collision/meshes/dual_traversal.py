@@ -16,13 +16,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.bounding.bvh import MAX_DEPTH
+from engine.bounding.bvh import MAX_DEPTH, STACK
+from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes.contact_kinds import N_NAMED, N_SIGNS, common_corner, insert_sorted
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, MeshArrays, triangle_of
-from engine.collision.meshes.parity import proves_overlap, state_of
+from engine.collision.meshes.parity import SIDE_UNKNOWN, inner_side, proves_overlap, state_of
 from engine.collision.meshes.placement import Placement, PoseArrays, axis_at, defect_of, place_pair, placed, set_frame
-from engine.collision.meshes.triangle_triangle import APART, CORNER, CROSSING, Facet, classify, classify_near, with_pose
-from engine.compiling.jit import inline, merged
+from engine.collision.meshes.separating_planes import Vertices, nodes_are_separated
+from engine.collision.meshes.triangle_triangle import (
+    APART,
+    COMMON_AREA,
+    CORNER,
+    CROSSING,
+    Facet,
+    classify,
+    classify_near,
+    off_plane_point,
+    sign_of_four,
+    with_pose,
+)
+from engine.compiling.jit import called, inline, merged
 from engine.lanes.boxes import FRAME_ROWS, discs_meeting, meeting
 from engine.lanes.faces import WORK_ROWS, faces_meeting
 from engine.lanes.lanes import lowest_bit
@@ -34,9 +47,11 @@ SEEK_OVERLAP = 0
 SEEK_PIERCING_BY_FIRST = 1
 SEEK_PIERCING_BY_SECOND = 2
 SEEK_CONTACT = 3
+SEEK_CROSSING = 4
 PIERCING = SEEK_PIERCING_BY_FIRST, SEEK_PIERCING_BY_SECOND
-"""Goals that end a search early: a crossing that proves overlapping interiors; one that proves that the first (second)
-body, a surface, passes through the interior of the other; any contact."""
+"""Goals that end a search early: a contact that proves overlapping interiors; a crossing that proves that the first
+(second) body, a surface, passes through the interior of the other; any contact; a crossing that proves overlapping
+interiors, and so parts of either body outside the other."""
 
 DONE, SETTLED, FULL, INTERRUPTED = range(4)
 """| outcome | meaning |
@@ -46,10 +61,13 @@ DONE, SETTLED, FULL, INTERRUPTED = range(4)
 | FULL | more pairs than room |
 | INTERRUPTED | the flag was set |
 """
-LEAST_LOOK = 4096
-"""A search counts at least so many pairs even if the room is smaller: a later pair may decide the query."""
+ROOM = 4096
+"""Number of pairs of faces in contact for which work space has room; more are rare."""
+_N_BLOCKS, _N_MORE = 1024, 64
+"""After so many pairs of blocks whose faces were classified, planes of faces are tried (`separating_planes.py`); after
+a try that separates nothing, again after so many more."""
 
-STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH
+STACK_ROWS = LANES * LANES * 2 * MAX_DEPTH + STACK
 """Bound on the pairs of nodes on the stack: a pair is replaced by at most 64, one of its nodes a level deeper."""
 
 
@@ -191,23 +209,39 @@ def class_of_corner(s: Search, i: int, j: int, t: Facet, u: Facet) -> int:
 
 @merged
 def settle_class(s: Search, i: int, j: int) -> int:
-    """Return the class of faces i and j by exact signs: APART, CROSSING, CONTACT or COPLANAR; UNDECIDED if a face has
-    no area, or exponents are out of range."""
+    """Return the class of faces i and j by exact signs: APART, CROSSING, CONTACT, COPLANAR or COMMON_AREA; UNDECIDED if
+    a face has no area, or exponents are out of range."""
     if s.first.axis[i] < 0 or s.second.axis[j] < 0:
         return UNDECIDED
     own, their, axis, _ = exact_faces(s, i, j)
     return classify(s.descent.poses, own, their, axis, exact_error(s))
 
 
+@called
+def relation_of_flush(s: Search, i: int, j: int) -> int:
+    """Return the relation that faces i and j with a common area prove: OVERLAPPING if both bodies lie on one side of
+    them, else TOUCHING; UNSETTLED if a face is not clean, or a sign is undecided."""
+    t, u, axis, _ = exact_faces(s, i, j)
+    poses, error, off = s.descent.poses, exact_error(s), off_plane_point(t, axis)
+    by_t, by_u = sign_of_four(poses, t.p, t.q, t.r, off, error), sign_of_four(poses, u.p, u.q, u.r, off, error)
+    inner, theirs = inner_side(s.first, i, poses), inner_side(s.second, j, poses)
+    if by_t == UNDECIDED or by_u == UNDECIDED or inner == SIDE_UNKNOWN or theirs == SIDE_UNKNOWN:
+        return UNSETTLED
+    return OVERLAPPING if inner * by_t == theirs * by_u else TOUCHING
+
+
 @merged
 def is_decisive(s: Search, kind: int, i: int, j: int) -> bool:
     """Return whether a contact of class ``kind`` between faces i and j reaches the goal ``s.seek``: any contact, or a
-    strict crossing that proves overlapping interiors, or one of a clean face of the body to be pierced."""
+    strict crossing that proves overlapping interiors, or one of a clean face of the body to be pierced, or a common
+    area with both bodies on one side."""
     if s.seek == SEEK_CONTACT:
         return True
+    if kind == COMMON_AREA and s.seek == SEEK_OVERLAP:
+        return relation_of_flush(s, i, j) == OVERLAPPING
     if kind != CROSSING:
         return False
-    if s.seek == SEEK_OVERLAP:
+    if s.seek == SEEK_OVERLAP or s.seek == SEEK_CROSSING:
         return proves_overlap(s.first, i, s.second, j, s.descent.poses)
     if s.seek == SEEK_PIERCING_BY_FIRST:
         return state_of(s.second, j, s.descent.poses) == STATE_CLEAN
@@ -256,7 +290,7 @@ def classify_faces(s: Search, i: int, j: int, low: int, high: int, n_pairs: int)
         if n_pairs < room:
             pairs[n_pairs, 0], pairs[n_pairs, 1], kinds[n_pairs] = i_face, j_face, kind
         n_pairs += 1
-        if n_pairs > max(LEAST_LOOK, room):
+        if n_pairs > room:
             return FULL, n_pairs
         if s.flag[0] != 0:
             return INTERRUPTED, n_pairs
@@ -297,20 +331,43 @@ def expand_pair(s: Search, i: int, j: int, n_stack: int) -> tuple[int, int, int]
     return n_stack, 0, 0
 
 
+@inline
+def pose_number(s: Search, place: Placement, number: int) -> int:
+    """Return the pose number of a body's points as `exact_faces` gives them: UNPOSED where placing rounds nothing."""
+    return UNPOSED if s.place.error == 0.0 or not place.is_posed else number
+
+
+@called
+def are_parted(s: Search, i: int, j: int, n_stack: int) -> bool:
+    """Return whether the plane of a face separates all faces below nodes i and j. n_stack: pairs on the stack."""
+    u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
+    v = Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
+    free = s.descent.stack[n_stack:]
+    return nodes_are_separated(s.descent.poses, s.first, u, i, s.second, v, j, free, exact_error(s))
+
+
 @merged
 def search(s: Search) -> tuple[int, int]:
     """Write all pairs of faces in contact to ``s.contacts``; return the outcome (DONE, ...) and the number of pairs,
     which may exceed the room. SETTLED: the one pair that decides the query stands in row 0."""
     stack = s.descent.stack
     stack[0, 0], stack[0, 1] = 0, 0
-    n_stack, n_pairs = 1, 0
+    n_stack, n_pairs, n_blocks, next_try = 1, 0, 0, _N_BLOCKS
     while n_stack > 0:  # bound: each pair of nodes enters once
         if s.flag[0] != 0:
             return INTERRUPTED, n_pairs
         n_stack -= 1
         i, j = int(stack[n_stack, 0]), int(stack[n_stack, 1])
+        if n_blocks >= next_try and s.first.child[i, 0] >= 0 and s.second.child[j, 0] >= 0:
+            if next_try == _N_BLOCKS and n_pairs == 0 and are_parted(s, 0, 0, n_stack):
+                return DONE, 0
+            next_try = max(n_blocks, _N_BLOCKS + 1)
+            if are_parted(s, i, j, n_stack):
+                continue
+            next_try = n_blocks + _N_MORE
         n_stack, low, high = expand_pair(s, i, j, n_stack)
         if low != 0 or high != 0:
+            n_blocks += 1
             how, n_pairs = classify_faces(s, i, j, low, high, n_pairs)
             if how != DONE:
                 return how, n_pairs

@@ -24,7 +24,7 @@ from engine.bounding.bvh import STACK, WIDTH
 from engine.collision.exact_images import rounded_quotient
 from engine.collision.meshes.mesh_arrays import MeshArrays, MeshBody, lattice_shift
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING
+from engine.collision.meshes.triangle_triangle import APART, COMMON_AREA, CONTACT, COPLANAR, CROSSING
 from engine.collision.result import Kind, Poses
 from engine.compiling.jit import allocating_kernel, entry_of, inline
 from engine.lanes.boxes import EMPTY
@@ -244,7 +244,7 @@ def _simplices_intersect(s: tuple[Vector, ...], t: tuple[Vector, ...], *, within
 
 
 def classify_exact(t1: Corners, t2: Corners) -> int:
-    """Return the class of two faces, with or without area: APART, CROSSING, CONTACT or COPLANAR; never UNDECIDED."""
+    """Return the class of two faces, with or without area; never UNDECIDED."""
     plane1, plane2 = plane_through(t1), plane_through(t2)
     sides1, sides2 = [sign_of(value_at(plane2, p)) for p in t1], [sign_of(value_at(plane1, p)) for p in t2]
     s1, s2 = as_simplex(t1), as_simplex(t2)
@@ -253,7 +253,7 @@ def classify_exact(t1: Corners, t2: Corners) -> int:
     if len(s1) < 3 or len(s2) < 3:
         return CONTACT
     if not any(sides2):
-        return COPLANAR
+        return COMMON_AREA if _simplices_intersect(s1, s2, within=True) else COPLANAR
     both_straddle = {1, -1} <= set(sides1) and {1, -1} <= set(sides2)
     return CROSSING if both_straddle and _simplices_intersect(s1, s2, within=True) else CONTACT
 

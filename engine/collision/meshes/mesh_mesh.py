@@ -24,15 +24,15 @@ from functools import lru_cache
 
 import numpy as np
 
-from engine.collision.codes import DISJOINT, OVERLAPPING, TOUCHING, UNSETTLED
+from engine.collision.codes import DISJOINT, OVERLAPPING, RELATION, TOUCHING, UNSETTLED
 from engine.collision.meshes import exact_regions as regions
-from engine.collision.meshes.contact_kinds import CONTAINED, STRENGTH
-from engine.collision.meshes.dual_traversal import PIERCING, SEEK_OVERLAP, Contacts
+from engine.collision.meshes.contact_kinds import CONTAINED, FACE_FACE, STRENGTH
+from engine.collision.meshes.dual_traversal import PIERCING, SEEK_CROSSING, SEEK_OVERLAP, Contacts
 from engine.collision.meshes.exact_body import as_simplex
 from engine.collision.meshes.mesh_arrays import STATE_CLEAN, STILL, MeshBody, mesh_body_of
 from engine.collision.meshes.mesh_pair import MeshPair, PosedPair, relate, search_goal, unless_identity
-from engine.collision.meshes.parity import INSIDE, OUTSIDE
-from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, RELATION, SAME_SIDE
+from engine.collision.meshes.parity import INSIDE, OUTSIDE, state_at
+from engine.collision.meshes.pose_batch import DETAIL, ONE_SETTLES, OPPOSITE, SAME_SIDE
 from engine.collision.result import NO_CONTACT, RELATIONS, UNNAMED, Collision, Containing, Parts, Poses, Witness, Work
 from engine.predicates.rational import sign_of
 from engine.solids.base import Solid
@@ -88,6 +88,10 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
     if poses[0] is not None or poses[1] is not None:
         poses = unless_identity(poses)
         posed = a.posed(poses[0]), b.posed(poses[1])
+    if a.has_inside and poses[0] == poses[1] and not work.boolean and _have_same_arrays(a, b) and _has_clean_face(a):
+        face = int(a.faces[a.arrays.axis >= 0].min())
+        same = decode_row(OVERLAPPING, FACE_FACE, face, face, False)
+        return same if work.witness and same is not None else UNNAMED[OVERLAPPING]
     answer = relation_from_kernel(a, b, posed, work)
     if isinstance(answer, Collision):
         return answer
@@ -96,6 +100,23 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
         pair = MeshPair(a, b, poses, work)
         pair.find_contacts(answer)
         return _relation(pair)
+
+
+def _have_same_arrays(first: MeshBody, second: MeshBody) -> bool:
+    """Return whether two bodies have the same vertices and faces in the same order."""
+    a, b = first.arrays, second.arrays
+    if a is b:
+        return True
+    if a.extent != b.extent or len(a.faces) != len(b.faces) or len(a.vertices) != len(b.vertices):
+        return False
+    pairs = (a.vertices, b.vertices), (a.triangles, b.triangles), (a.faces, b.faces)
+    return all(np.array_equal(own, their) for own, their in pairs)
+
+
+def _has_clean_face(body: MeshBody) -> bool:
+    """Return whether one of the first faces is clean, so that the body has an interior beside it."""
+    with np.errstate(all="ignore"):
+        return any(state_at(body.arrays, face) == STATE_CLEAN for face in range(min(len(body.faces), 4)))
 
 
 def relation_from_kernel(
@@ -224,6 +245,7 @@ class _OverlappingPair(MeshPair):
     def parts(self) -> Parts:
         """Return whether the first, and whether the second body sticks out, and whether their boundaries meet."""
         self._sticks_out = [False, False]
+        self.seek = SEEK_CROSSING
         self.find_contacts()
         if self.is_settled:  # by a crossing: overlapping is known
             return Parts(True, True, True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from engine.collision.codes import UNSETTLED
+from engine.collision.codes import KIND, N_COLUMNS, N_CONTACTS, UNSETTLED
 from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.contact_kinds import N_NAMED, STRENGTH
 from engine.collision.meshes.exact_body import ExactBody, classify_exact, exact_pair, kind_of_contact
@@ -15,7 +15,7 @@ from engine.collision.meshes.exact_regions import Sides, regions_of, sides_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_CLEAN, STATE_STACKED, MeshBody, join_vertices
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_vertices, state_at, states_of
 from engine.collision.meshes.placement import PoseArrays
-from engine.collision.meshes.pose_batch import KIND, N_COLUMNS, N_CONTACTS, ONE_SETTLES, relate_poses
+from engine.collision.meshes.pose_batch import ONE_SETTLES, relate_poses
 from engine.collision.meshes.triangle_triangle import APART, CROSSING
 from engine.collision.result import Poses, Witness, Work
 from engine.compiling.jit import entry_of
@@ -30,7 +30,7 @@ class _WorkSpace(threading.local):
     def __init__(self) -> None:
         self.descent, self.contacts, self.rows = (
             dual.new_descent(),
-            dual.new_contacts(INITIAL_ROOM),
+            dual.new_contacts(dual.ROOM),
             np.empty((1, N_COLUMNS), np.int64),
         )
         self.row = self.rows[0]
@@ -38,7 +38,6 @@ class _WorkSpace(threading.local):
 
 PosedPair = tuple[PoseArrays, PoseArrays]
 """The poses of both bodies, in the form that kernels take."""
-INITIAL_ROOM = 256
 SPACE = _WorkSpace()
 
 
@@ -69,7 +68,7 @@ def relate(
         if n <= room:
             return row, contacts
         work.budget.check()
-        room = n if n <= dual.LEAST_LOOK else 16 * n
+        room = 16 * n
         contacts = dual.new_contacts(room, len(first.faces) + len(second.faces))
 
 

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
+from engine.collision.codes import (
+    DISJOINT,
+    FIRST_FACE,
+    FIRST_INSIDE_SECOND,
+    KIND,
+    N_CONTACTS,
+    OVERLAPPING,
+    RELATION,
+    SECOND_FACE,
+    SECOND_INSIDE_FIRST,
+    TOUCHING,
+    UNSETTLED,
+)
 from engine.collision.meshes import contact_kinds as contact
 from engine.collision.meshes import dual_traversal as dual
 from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_point, to_local_frame
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
-from engine.collision.meshes.touching import DECIDED, flush, relate_by_contacts
-from engine.collision.meshes.triangle_triangle import COPLANAR, CORNER, CROSSING, off_plane_point
-from engine.compiling.jit import called, inline, kernel, merged
+from engine.collision.meshes.separated import FEW, kind_of_pair, touches_in_planes
+from engine.collision.meshes.touching import DECIDED, N_FACES, are_separated, flush, relate_by_contacts
+from engine.collision.meshes.triangle_triangle import COMMON_AREA, COPLANAR, CORNER, CROSSING, off_plane_point
+from engine.compiling.jit import called, inline, kernel
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED, FlagArray, Int8Array, IntArray
 
-RELATION, KIND, FIRST_FACE, SECOND_FACE, N_CONTACTS = range(5)
-N_COLUMNS = 5
-"""| column | meaning |
-|---|---|
-| RELATION | the relation, or UNSETTLED |
-| KIND, FIRST_FACE, SECOND_FACE | the witness, if requested and decided; the least face of a body that is inside |
-| N_CONTACTS | number of contacts, ONE_SETTLES if one decides |
-"""
 ONE_SETTLES = -1
 
 DETAIL = -1
@@ -76,6 +81,9 @@ def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> No
         if kinds[item] >= CORNER:
             kind, may_cut, common = contact.VERTEX_VERTEX, 0, kinds[item] - CORNER
             s.descent.signs[contact.FLUSH] = 1 << common // 3 | 8 << common % 3
+        elif kinds[item] == COMMON_AREA:
+            kind, may_cut = contact.FACE_FACE, contact.BOTH
+            s.descent.signs[contact.FLUSH] = 63
         else:
             kind, may_cut = kind_of_pair(s, i, j)
         kinds[item] = DECIDED | s.descent.signs[contact.FLUSH]
@@ -120,28 +128,22 @@ def classify_in_detail(s: dual.Search, n: int) -> None:
             return
 
 
-@merged
-def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
-    """Return what `classify_contact` gives for faces i and j: the kind of contact, and bits of the open faces that may
-    be cut; UNSETTLED and BOTH if one has no area."""
-    t, u, axis, their_axis = dual.exact_faces(s, i, j)
-    if axis < 0 or their_axis < 0:
-        s.descent.signs[contact.FLUSH] = 0
-        return UNSETTLED, contact.BOTH
-    return contact.classify_contact(s.descent.poses, t, axis, u, their_axis, dual.exact_error(s), s.descent.signs)
+@inline
+def _rank_of(kind: int) -> int:
+    return 0 if kind == COMMON_AREA else (1 if kind == COPLANAR else 2)
 
 
 @inline
 def sort_named_first(faces: IntArray, their_faces: IntArray, pairs: IntArray, kinds: Int8Array, n: int) -> None:
-    """Move the first N_NAMED of n pairs of faces, with their classes, to the front, sorted: COPLANAR pairs first, then
-    by the caller's face numbers (`faces`, `their_faces`), then by index."""
+    """Move the first N_NAMED of n pairs of faces, with their classes, to the front, sorted: COMMON_AREA first, then
+    COPLANAR, then the others; each by the caller's face numbers (`faces`, `their_faces`), then by index."""
     for item in range(1, n):
         i, j, kind = pairs[item, 0], pairs[item, 1], kinds[item]
-        key, place = (kind != COPLANAR, faces[i], their_faces[j], i, j), item
+        key, place = (_rank_of(kind), faces[i], their_faces[j], i, j), item
         while place > 0:
             before = min(place, contact.N_NAMED) - 1
             p, q, other = pairs[before, 0], pairs[before, 1], kinds[before]
-            if key > (other != COPLANAR, faces[p], their_faces[q], p, q):
+            if key > (_rank_of(other), faces[p], their_faces[q], p, q):
                 break
             pairs[place, 0], pairs[place, 1], kinds[place] = p, q, other
             place = before
@@ -160,18 +162,44 @@ def relate_poses(
     contacts than fit, or without proof, are UNSETTLED. The contacts of the last pose stay there. n_known: number of
     contacts of one pose that `contacts` holds already, so that no search runs; 0: search. Stops early when the flag is
     set."""
+    are_few = first.faces.shape[0] * second.faces.shape[0] <= FEW and len(contacts.met) == 0
+    are_few = are_few and n_named >= 0 and seek != dual.SEEK_CONTACT
     for item in range(rows.shape[0]):
         row = rows[item]
         row[RELATION] = row[KIND] = row[FIRST_FACE] = row[SECOND_FACE] = UNSETTLED
         place, is_apart = dual.place_bodies(first, still, 0, second, poses, item, descent)
         s = dual.Search(first, second, place, descent, seek, contacts, flag)
-        how, n_pairs = (dual.DONE, n_known) if is_apart or n_known > 0 else dual.search(s)
+        how, n_pairs, is_first, is_parted = dual.DONE, n_known, are_few, False
+        while n_known == 0 and not is_apart:  # bound: twice
+            goal = dual.SEEK_CONTACT if is_first else seek
+            how, n_pairs = dual.search(dual.Search(first, second, place, descent, goal, contacts, flag))
+            if not is_first or how != dual.SETTLED or dual.is_decisive(
+                s, contacts.kinds[0], contacts.pairs[0, 0], contacts.pairs[0, 1]
+            ):  # fmt: skip
+                break
+            is_first, is_parted = False, contacts.kinds[0] != CROSSING and touches_in_planes(s, n_named > 0, row)
+            if is_parted:
+                break
         row[N_CONTACTS] = n_pairs
         if how == dual.INTERRUPTED:
             return
+        if is_parted:
+            continue
+        if (
+            how == dual.FULL
+            and n_named >= 0
+            and len(contacts.met) == 0
+            and are_separated(s, min(N_FACES, len(contacts.kinds)))
+        ):
+            n_pairs = len(contacts.kinds)
         if how == dual.SETTLED:
-            row[RELATION], row[N_CONTACTS] = OVERLAPPING if seek == dual.SEEK_OVERLAP else TOUCHING, ONE_SETTLES
-            i, j = contacts.pairs[0, 0], contacts.pairs[0, 1]
+            i, j, is_overlap = (
+                contacts.pairs[0, 0],
+                contacts.pairs[0, 1],
+                seek in (dual.SEEK_OVERLAP, dual.SEEK_CROSSING),
+            )
+            row[RELATION] = OVERLAPPING if is_overlap else TOUCHING
+            row[N_CONTACTS] = 1 if is_overlap and contacts.kinds[0] != CROSSING else ONE_SETTLES
             if n_named > 0:
                 row[KIND], _ = kind_of_pair(s, i, j)
                 row[FIRST_FACE], row[SECOND_FACE] = first.faces[i], second.faces[j]
@@ -185,3 +213,5 @@ def relate_poses(
                 classify_in_detail(s, n_pairs)
             else:
                 write_contact_row(s, n_pairs, n_named, row)
+                if how == dual.FULL and row[RELATION] != UNSETTLED and (n_named == 0 or row[KIND] != UNSETTLED):
+                    row[N_CONTACTS] = n_pairs

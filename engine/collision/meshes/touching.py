@@ -19,16 +19,15 @@ inside. One that is inside proves that the interiors intersect, if its own body 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from engine.bounding.bvh import STACK
 from engine.collision.codes import OVERLAPPING, TOUCHING, UNSETTLED
 from engine.collision.meshes import parity
-from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces
+from engine.collision.meshes.dual_traversal import Search, exact_error, exact_faces, pose_number, relation_of_flush
 from engine.collision.meshes.mesh_arrays import STATE_STACKED, MeshArrays, in_tree, triangle_of
-from engine.collision.meshes.placement import Placement, defect_of, placed
+from engine.collision.meshes.placement import Placement, defect_of
+from engine.collision.meshes.separating_planes import Vertices, separates
 from engine.collision.meshes.triangle_triangle import (
     CORNER,
     Facet,
@@ -39,73 +38,24 @@ from engine.collision.meshes.triangle_triangle import (
     passes_within,
     separation,
     sides_of,
-    sign_of_four,
 )
 from engine.compiling.jit import allocating, called, inline
 from engine.predicates.posed import UNPOSED, PosedPoint3
 from engine.predicates.vectors import as_point3, largest_of, minus
 from engine.types import UNDECIDED, BoolArray, FloatArray, IntArray
 
-N_FIRST = 2
 N_FACES = 32
-"""Number of contacts whose face planes are tried as separating planes; N_FIRST of them are tried first."""
-_SAMPLED = 16
-
-
-class Vertices(NamedTuple):
-    """Vertices of a body as input of exact signs: points (n, 3) before the pose, its placement, and its pose number
-    (UNPOSED where placing rounds nothing)."""
-
-    points: Any
-    place: Placement
-    pose: int
-
-
-@inline
-def vertex_at(v: Vertices, vertex: int) -> PosedPoint3:
-    """Return a vertex as input of exact signs: placed if that is exact, else before its pose, with the pose number."""
-    p = as_point3(v.points, vertex)
-    if v.pose == UNPOSED:
-        p = placed(p, v.place)
-    return PosedPoint3(p.x, p.y, p.z, v.pose)
+"""Number of contacts whose face planes are tried as separating planes."""
 
 
 @called
-def side_of_all(poses: FloatArray, plane: Facet, v: Vertices, error: float, n_samples: int) -> int:
-    """Return on which side of the plane through the corners of `plane` a body lies, by about n_samples of its vertices,
-    evenly spread (at least that many): 1 or -1 (closed sides), 0 if all lie in the plane, UNDECIDED if they are on both
-    sides or a sign is undecided."""
-    common_side, n = 0, v.points.shape[0]
-    for vertex in range(0, n, max(1, n // n_samples)):
-        side = sign_of_four(poses, plane.p, plane.q, plane.r, vertex_at(v, vertex), error)
-        if side == UNDECIDED or side * common_side < 0:
-            return UNDECIDED
-        common_side = side if common_side == 0 else common_side
-    return common_side
-
-
-@called
-def separates(poses: FloatArray, plane: Facet, u: Vertices, v: Vertices, error: float) -> bool:
-    """Return whether the plane through the corners of `plane` is proven to separate two bodies, by all vertices; both
-    may touch it, but not both lie in it."""
-    for n_samples in (_SAMPLED, max(len(u.points), len(v.points))):  # most planes cut the bodies in the middle
-        side = side_of_all(poses, plane, u, error, n_samples)
-        if side == UNDECIDED:
-            return False
-        their_side = side_of_all(poses, plane, v, error, n_samples)
-        if their_side == UNDECIDED or side * their_side > 0:
-            return False
-    return side != their_side
-
-
-@called
-def are_separated(s: Search, first: int, n_faces: int) -> bool:
-    """Return whether the plane of either face of one of the contacts ``first`` .. n_faces - 1 is proven to separate the
-    two bodies."""
-    poses, error, is_exact = s.descent.poses, exact_error(s), s.place.error == 0.0
-    u = Vertices(s.first.vertices, s.place.a, UNPOSED if is_exact or not s.place.a.is_posed else 0)
-    v = Vertices(s.second.vertices, s.place.b, UNPOSED if is_exact or not s.place.b.is_posed else 1)
-    for item in range(first, n_faces):
+def are_separated(s: Search, n_faces: int) -> bool:
+    """Return whether the plane of either face of one of the first n_faces contacts is proven to separate the two
+    bodies."""
+    poses, error = s.descent.poses, exact_error(s)
+    u = Vertices(s.first.vertices, s.place.a, pose_number(s, s.place.a, 0))
+    v = Vertices(s.second.vertices, s.place.b, pose_number(s, s.place.b, 1))
+    for item in range(n_faces):
         t, w, _, _ = exact_faces(s, s.contacts.pairs[item, 0], s.contacts.pairs[item, 1])
         if separates(poses, t, u, v, error) or separates(poses, w, u, v, error):
             return True
@@ -137,15 +87,11 @@ def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPo
     """Return (relation, shares) of coplanar faces i and j with corners t and u. OVERLAPPING: they share an area and
     both bodies lie on the same side; TOUCHING: not so; UNSETTLED: undecided. shares: whether they share an area. axis:
     along it t has an area; off: a point off the plane."""
-    poses, error = s.descent.poses, exact_error(s)
-    how = separation(poses, t, u, axis, error)
+    how = separation(s.descent.poses, t, u, axis, exact_error(s))
     if how == UNDECIDED or how >= 0:
         return (UNSETTLED if how == UNDECIDED else TOUCHING), False
-    by_t, by_u = sign_of_four(poses, t.p, t.q, t.r, off, error), sign_of_four(poses, u.p, u.q, u.r, off, error)
-    inner, theirs = parity.inner_side(s.first, i, poses), parity.inner_side(s.second, j, poses)
-    if by_t == UNDECIDED or by_u == UNDECIDED or inner == parity.SIDE_UNKNOWN or theirs == parity.SIDE_UNKNOWN:
-        return UNSETTLED, False
-    return (OVERLAPPING if inner * by_t == theirs * by_u else TOUCHING), True
+    how = relation_of_flush(s, i, j)
+    return how, how != UNSETTLED
 
 
 @called
@@ -224,13 +170,9 @@ def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> 
         relation = relate_by_locations(s, n, np.empty(0, np.bool_))
         if relation != UNSETTLED:
             return relation
-    if are_separated(s, 0, min(N_FIRST, n)):
+    if are_separated(s, min(N_FACES, n)):
         return TOUCHING
-    if both and not is_free and not has_crossing:
-        relation = relate_clean(s, n)
-        if relation != UNSETTLED:
-            return relation
-    return TOUCHING if are_separated(s, N_FIRST, min(N_FACES, n)) else UNSETTLED
+    return relate_clean(s, n) if both and not is_free and not has_crossing else UNSETTLED
 
 
 DECIDED = 64

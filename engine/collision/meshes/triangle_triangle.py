@@ -30,6 +30,7 @@ APART = 0
 CROSSING = 1
 CONTACT = 3
 COPLANAR = 4
+COMMON_AREA = 5
 CORNER = 8
 """| class of a pair | meaning |
 |---|---|
@@ -37,7 +38,8 @@ CORNER = 8
 | CROSSING | strict crossing |
 | UNDECIDED (2) | |
 | CONTACT | weaker contact |
-| COPLANAR | contact in one plane |
+| COPLANAR | contact in one plane, of their borders |
+| COMMON_AREA | in one plane, and their interiors meet |
 | CORNER + 3 k + m | corner k of the first is corner m of the second, the only common point |
 """
 
@@ -207,8 +209,8 @@ def sides_of(poses: FloatArray, t: Facet, u: Facet, error: float) -> Signs:
 
 @called
 def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -> int:
-    """Return the class of two triangles with area by exact signs: APART, CROSSING, CONTACT or COPLANAR; UNDECIDED only
-    if exponents are out of range. poses (n, 12): R by rows, then t. error: the largest `posed_error` of the corners.
+    """Return the class of two triangles with area by exact signs; UNDECIDED only if exponents are out of range. poses
+    (n, 12): R by rows, then t. error: the largest `posed_error` of the corners.
     axis: along it the projection of t1, before its pose, has an area."""
     p2, q2, r2 = sides_of(poses, t1, t2, error)
     if is_one_side(p2, q2, r2):
@@ -222,7 +224,7 @@ def classify(poses: FloatArray, t1: Facet, t2: Facet, axis: int, error: float) -
         return UNDECIDED
     if p2 == 0 and q2 == 0 and r2 == 0:
         how = separation(poses, t1, t2, axis, error)
-        return UNDECIDED if how == UNDECIDED else (APART if how == 1 else COPLANAR)
+        return UNDECIDED if how == UNDECIDED else (APART if how == 1 else (COPLANAR if how == 0 else COMMON_AREA))
     a, b = lone_first(t1, t2, (p1, q1, r1), (p2, q2, r2))
     first = sign_of_four(poses, a.q, b.p, a.p, b.q, error)
     if first == 1:

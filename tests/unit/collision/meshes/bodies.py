@@ -26,5 +26,14 @@ def brick(n: int, at: tuple[float, float, float] = (0, 0, 0)) -> Polyhedron:
     return Polyhedron(corners + np.array(at, float), np.concatenate([q[:, :3], q[:, [0, 2, 3]]]))
 
 
+def with_far_shell(body: Polyhedron, at: tuple[float, float, float] = (50, 50, 50)) -> Polyhedron:
+    """The body and a box far away, so that no plane of a contact separates it from another body."""
+    far = brick(1, at)
+    return Polyhedron(
+        np.concatenate([body.vertices, far.vertices]),
+        np.concatenate([body.triangles, far.triangles + len(body.vertices)]),
+    )
+
+
 def mesh(n: int, at: tuple[float, float, float] = (0, 0, 0)) -> MeshBody:
     return mesh_body_of(brick(n, at))

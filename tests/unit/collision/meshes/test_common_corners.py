@@ -14,6 +14,7 @@ from engine.collision.meshes.mesh_pair import N_CONTACTS, SPACE, relate
 from engine.collision.meshes.triangle_triangle import Facet, with_pose
 from engine.collision.result import Work
 from engine.types import Point3
+from tests.unit.collision.meshes.bodies import with_far_shell
 
 
 def test_a_common_corner_is_all() -> None:
@@ -53,8 +54,10 @@ def test_many_faces_at_one_point(pose: Pose | None) -> None:
     assert collide(up, Surface(down.vertices, down.triangles), second_pose=pose).relation == Relation.TOUCHING
 
 
-def test_few_pairs_say_all() -> None:
-    a, b = mesh_body_of(fan(30, 1, 0.5)), mesh_body_of(fan(25, -1, 0.75))
+def test_few_pairs_say_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SPACE, "contacts", new_contacts(256))
+    a = mesh_body_of(with_far_shell(fan(30, 1, 0.5), (0, 0, -200)))
+    b = mesh_body_of(fan(25, -1, 0.75))
     row, found = relate(a, b, (STILL, STILL), SEEK_OVERLAP, Work(witness=False))
     assert row[N_CONTACTS] <= 32 + 30 + 25
     assert len(np.unique(found.pairs[: row[N_CONTACTS], 0])) == 30

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from engine import Pose, Surface
-from engine.collision.codes import UNSETTLED
+from engine.collision.codes import KIND, UNSETTLED
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.dual_traversal import SEEK_CONTACT, SEEK_OVERLAP, Contacts
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import STILL, mesh_body_of
 from engine.collision.meshes.mesh_pair import relate
-from engine.collision.meshes.pose_batch import DETAIL, KIND, NO_SHARED_AREA
+from engine.collision.meshes.pose_batch import DETAIL, NO_SHARED_AREA
 from engine.collision.meshes.triangle_triangle import APART, CONTACT
 from engine.collision.result import Work
 from tests.unit.collision.meshes.bodies import TURN

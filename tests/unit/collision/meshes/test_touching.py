@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from engine import Aabb, Polyhedron, Pose, Relation, collide
-from engine.collision.codes import UNSETTLED
+from engine.collision.codes import RELATION, UNSETTLED
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_pair import relate, search_goal
-from engine.collision.meshes.pose_batch import RELATION
 from engine.collision.result import Collision, Witness, Work
 from engine.solids.base import Solid
 from tests.reference.collision import relation

@@ -10,7 +10,16 @@ import pytest
 
 from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.exact_body import classify_exact, kind_of_contact
-from engine.collision.meshes.triangle_triangle import APART, CONTACT, COPLANAR, CROSSING, Facet, classify, with_pose
+from engine.collision.meshes.triangle_triangle import (
+    APART,
+    COMMON_AREA,
+    CONTACT,
+    COPLANAR,
+    CROSSING,
+    Facet,
+    classify,
+    with_pose,
+)
 from engine.collision.triangles import relate_triangles_3d
 from engine.compiling.jit import allocating_kernel, kernel
 from engine.predicates.posed import orient3d_rounded
@@ -101,7 +110,7 @@ BASE = ((0, 0, 0), (4, 0, 0), (0, 4, 0))
         (((2, -1, -1), (2, 1, 1), (2, -9, 1)), CONTACT, "edge_edge"),
         (((2, 0, -1), (2, 0, 1), (2, -9, 1)), CONTACT, "edge_edge"),
         (((1, 1, 0), (2, 1, 0), (1, 1, 1)), CONTACT, "edge_face"),
-        (((1, 1, 0), (2, 1, 0), (1, 2, 0)), COPLANAR, "face_face"),
+        (((1, 1, 0), (2, 1, 0), (1, 2, 0)), COMMON_AREA, "face_face"),
         (((0, 0, 0), (4, 0, 0), (0, -4, 0)), COPLANAR, "edge_edge"),
         (((1, 1, 0), (1, 1, 0), (1, 1, 0)), CONTACT, "vertex_face"),
         (((1, 1, -1), (1, 1, 0), (1, 1, 1)), CONTACT, "edge_face"),
