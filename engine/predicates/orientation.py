@@ -4,8 +4,8 @@ Four stages. A float filter, whose bound is proven below. Equal points, and all 
 determinant in pairs of doubles, with a bound. Then as an expansion, exact, without allocation, with the coordinates of
 an axis scaled by a power of two where that widens the range (the sign does not change). Where even that leaves the
 range in which expansions are exact, UNDECIDED: the caller settles the item with `rational.py`. A whole scene at 1e300
-or 1e-300 is decided here; undecided are only sets of points with coordinates of one axis more than 2^636 (2D: 2^985)
-apart, which the filter did not settle either.
+or 1e-300 is decided here, and 4.0 beside 5e-324; undecided are only points whose coordinates, from the lowest bit to
+the highest, span more than 2^SPREAD on all axes together, and which the filter did not settle either.
 
 **The filter.** Let u = 2^-53, h = 2^-1075 (half the smallest subnormal), and * a rounded product:
 |x * y - x y| <= u |x y| + h. Differences of doubles carry a relative error u only. So in 2D, with l and r the products,
@@ -70,6 +70,7 @@ TOP_3D = 330  # differences < 2^331, 6 products below 2^993
 BOTTOM_3D = -306  # 3 (-306 - 52) = -1074
 SMALLEST_EXACT = 2.0**-300  # 3 (-300 - 52) > -1074: of differences whose products keep all their bits
 OUT_OF_RANGE = 1 << 20  # no power of two brings this axis into the range
+SPREAD = 2000  # bits of a product of coordinates, one an axis, from 2^-1020 to 2^980
 
 
 @inline
@@ -148,11 +149,32 @@ def smaller_nonzero(smallest: float, value: float) -> float:
 
 
 @inline
-def _shift_of(a: float, b: float, c: float, d: float, bottom: int, top: int) -> int:
-    """Return the `axis_shift` for the four coordinates of one axis: an exponent of two that takes them into [2^bottom,
-    2^top], or OUT_OF_RANGE."""
-    smallest = smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(float("inf"), a), b), c), d)
-    return axis_shift(smallest, max(abs(a), abs(b), abs(c), abs(d)), bottom, top)
+def _span_of(a: float, b: float, c: float, d: float) -> tuple[int, int]:
+    """Return (high, low) of four coordinates: magnitudes are below 2^high and multiples of 2^low; (0, 0) of zeros."""
+    largest = max(abs(a), abs(b), abs(c), abs(d))
+    smallest = smaller_nonzero(smaller_nonzero(smaller_nonzero(smaller_nonzero(largest, a), b), c), d)
+    return (frexp(largest)[1], max(frexp(smallest)[1] - 53, -1074)) if largest > 0.0 else (0, 0)
+
+
+@called
+def _shifts_of(
+    x: tuple[int, int], y: tuple[int, int], z: tuple[int, int], top: int, bottom: int
+) -> tuple[int, int, int]:
+    """Return exponents of two by which the axes are scaled so that products of differences, one an axis, are exact: 0
+    if all spans (`_span_of`) lie between `bottom` and `top`; the first is OUT_OF_RANGE if there are none.
+
+    The axis of the widest span takes the highest place, the others become integers: none above 2^1000, because two
+    spans are at most SPREAD together, and no product below the lowest bit of the widest, 980 - SPREAD."""
+    if max(x[0], y[0], z[0]) <= top and min(x[1], y[1], z[1]) >= bottom:
+        return 0, 0, 0
+    spread = x[0] - x[1] + y[0] - y[1] + z[0] - z[1]
+    widest = max(x[0] - x[1], y[0] - y[1], z[0] - z[1])
+    if spread > SPREAD:
+        return OUT_OF_RANGE, 0, 0
+    rest = 980 - (spread - widest)
+    if x[0] - x[1] == widest:
+        return rest - x[0], -y[1], -z[1]
+    return (-x[1], rest - y[0], -z[1]) if y[0] - y[1] == widest else (-x[1], -y[1], rest - z[0])
 
 
 @called
@@ -170,9 +192,9 @@ def orient2d_exact(a: Point2, b: Point2, c: Point2) -> int:
     side = compare_in_pairs(ax, ax_tail, by, by_tail, ay, ay_tail, bx, bx_tail)
     if side != UNDECIDED:
         return side
-    shift_x = _shift_of(a.x, b.x, c.x, c.x, BOTTOM_2D, TOP_2D)
-    shift_y = _shift_of(a.y, b.y, c.y, c.y, BOTTOM_2D, TOP_2D)
-    if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE:
+    x, y = _span_of(a.x, b.x, c.x, c.x), _span_of(a.y, b.y, c.y, c.y)
+    shift_x, shift_y, _ = _shifts_of(x, y, (0, 0), TOP_2D, BOTTOM_2D - 52)
+    if shift_x == OUT_OF_RANGE:
         return UNDECIDED
     if shift_x != 0 or shift_y != 0:
         a = Point2(ldexp(a.x, shift_x), ldexp(a.y, shift_y))
@@ -198,10 +220,9 @@ def orient3d_exact(a: Point3, b: Point3, c: Point3, d: Point3) -> int:
     side = _orient3d_in_pairs(a, b, c, d)
     if side != UNDECIDED:
         return side
-    shift_x = _shift_of(a.x, b.x, c.x, d.x, BOTTOM_3D, TOP_3D)
-    shift_y = _shift_of(a.y, b.y, c.y, d.y, BOTTOM_3D, TOP_3D)
-    shift_z = _shift_of(a.z, b.z, c.z, d.z, BOTTOM_3D, TOP_3D)
-    if shift_x == OUT_OF_RANGE or shift_y == OUT_OF_RANGE or shift_z == OUT_OF_RANGE:
+    x, y, z = _span_of(a.x, b.x, c.x, d.x), _span_of(a.y, b.y, c.y, d.y), _span_of(a.z, b.z, c.z, d.z)
+    shift_x, shift_y, shift_z = _shifts_of(x, y, z, TOP_3D, BOTTOM_3D - 52)
+    if shift_x == OUT_OF_RANGE:
         return UNDECIDED
     if shift_x != 0 or shift_y != 0 or shift_z != 0:
         a = Point3(ldexp(a.x, shift_x), ldexp(a.y, shift_y), ldexp(a.z, shift_z))

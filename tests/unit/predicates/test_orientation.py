@@ -158,3 +158,18 @@ def test_equal_points_are_coplanar_at_any_exponent() -> None:
         equal = [point.copy() for point in points]
         equal[second] = equal[first]
         assert (run(orient3d_batch, *equal) == 0).all()
+
+
+@pytest.mark.parametrize(
+    "exponents", [(-1022, 0, 0), (0, -1022, 3), (900, -600, 10), (-1022, -300, -300), (971, 0, 300)]
+)
+def test_coordinates_far_apart_on_an_axis_are_decided(exponents: tuple[int, int, int]) -> None:
+    """4.0 beside 5e-324: lattice points, some moved by a few steps of a lattice that is finer by far."""
+    draw = np.random.default_rng(8)
+    coarse, fine = draw.integers(-2, 3, (4, 1500, 3)), draw.integers(-2, 3, (4, 1500, 3))
+    steps = np.ldexp(1.0, np.array(exponents) - 52)
+    is_fine = draw.integers(0, 4, (4, 1500, 3)) == 0
+    points = list(np.where(is_fine, fine * steps, coarse.astype(float)))
+    flat = [np.ascontiguousarray(p[:, :2]) for p in points[:3]]
+    assert (run(orient3d_batch, *points) == exact(orient3d_rational, *points)).all()
+    assert (run(orient2d_batch, *flat) == exact(orient2d_rational, *flat)).all()
