@@ -289,20 +289,21 @@ def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int],
 
 @inline
 def _write_offset_point(
-    view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, error: float,
-    point: FloatArray,
+    view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, move: FloatArray,
+    error: float, point: FloatArray,
 ) -> bool:  # fmt: skip
     """Write p + start, moved by radius along n, to point (d,), divided by the unit; return whether it is correctly
-    rounded. known: the vertices of the feature that p lies on, -1 for none. error: bound on p."""
+    rounded. known: the vertices of the feature that p lies on, -1 for none. move: the translation of the body. error:
+    bound on p."""
     size, is_proven, v = root(dot3(n, n)), True, view.mesh.vertices
     bound = error + 4.0 * radius * (error / size.h + 2.0**-98)
-    is_given = radius == 0.0 and not view.place.is_posed
-    for k, at, way in ((0, p.x, n.x), (1, p.y, n.y), (2, p.z, n.z)):
+    for k, at, way, row in ((0, p.x, n.x, view.place.x), (1, p.y, n.y, view.place.y), (2, p.z, n.z, view.place.z)):
         if k >= point.shape[0]:
             continue
         x, y, z = v[known[0], k], v[max(known[1], 0), k], v[max(known[2], 0), k]
-        if is_given and (known[1] < 0 or x == y) and (known[2] < 0 or x == z):
-            point[k] = x  # of the whole feature
+        is_turned = row.x != (k == 0) or row.y != (k == 1) or row.z != (k == 2)
+        if radius == 0.0 and not is_turned and (known[1] < 0 or x == y) and (known[2] < 0 or x == z):
+            point[k] = x + move[k]  # of the whole feature; a sum of two doubles is rounded to the nearest
             continue
         end = plus(plus(at, times(over(way, size), Wide(radius, 0.0))), Wide(start[k] * view.unit, 0.0))
         point[k] = end.h / view.unit
@@ -340,5 +341,5 @@ def certify(
         return False
     if not _are_strictly_beyond(s.b, pairs[0, 1], there, u, back, q, slack):
         return False
-    is_proven = _write_offset_point(s.a, here, p, way, radii[0], start, error, points[0])
-    return _write_offset_point(s.b, there, q, back, radii[1], start, error, points[1]) and is_proven
+    is_proven = _write_offset_point(s.a, here, p, way, radii[0], start, start, error, points[0])
+    return _write_offset_point(s.b, there, q, back, radii[1], start, other, error, points[1]) and is_proven
