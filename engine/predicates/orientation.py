@@ -160,21 +160,22 @@ def _span_of(a: float, b: float, c: float, d: float) -> tuple[int, int]:
 def _shifts_of(
     x: tuple[int, int], y: tuple[int, int], z: tuple[int, int], top: int, bottom: int
 ) -> tuple[int, int, int]:
-    """Return exponents of two by which the axes are scaled so that products of differences, one an axis, are exact: 0
-    if all spans (`_span_of`) lie between `bottom` and `top`; the first is OUT_OF_RANGE if there are none.
+    """Return exponents of two by which the axes are scaled so that products of differences, one an axis, are exact, x y
+    first: 0 if all spans (`_span_of`) lie between `bottom` and `top`; the first is OUT_OF_RANGE if there are none.
 
-    The axis of the widest span takes the highest place, the others become integers: none above 2^1000, because two
-    spans are at most SPREAD together, and no product below the lowest bit of the widest, 980 - SPREAD."""
+    One axis takes the highest place that its products with the others leave, the rest become integers below 2^1000:
+    z if its span is wider than that, so that the spans of x and y together are not; else the wider of x and y. No
+    product of x and y, and none with z, exceeds 2^980, or has bits below 2^(980 - SPREAD)."""
     if max(x[0], y[0], z[0]) <= top and min(x[1], y[1], z[1]) >= bottom:
         return 0, 0, 0
-    spread = x[0] - x[1] + y[0] - y[1] + z[0] - z[1]
-    widest = max(x[0] - x[1], y[0] - y[1], z[0] - z[1])
-    if spread > SPREAD:
+    x_span, y_span, z_span = x[0] - x[1], y[0] - y[1], z[0] - z[1]
+    if x_span + y_span + z_span > SPREAD:
         return OUT_OF_RANGE, 0, 0
-    rest = 980 - (spread - widest)
-    if x[0] - x[1] == widest:
-        return rest - x[0], -y[1], -z[1]
-    return (-x[1], rest - y[0], -z[1]) if y[0] - y[1] == widest else (-x[1], -y[1], rest - z[0])
+    if z_span > 1000:
+        return -x[1], -y[1], 980 - x_span - y_span - z[0]
+    if x_span >= y_span:
+        return 980 - y_span - z_span - x[0], -y[1], -z[1]
+    return -x[1], 980 - x_span - z_span - y[0], -z[1]
 
 
 @called

@@ -160,9 +160,12 @@ def test_equal_points_are_coplanar_at_any_exponent() -> None:
         assert (run(orient3d_batch, *equal) == 0).all()
 
 
-@pytest.mark.parametrize(
-    "exponents", [(-1022, 0, 0), (0, -1022, 3), (900, -600, 10), (-1022, -300, -300), (971, 0, 300)]
-)
+FAR_APART = [(-1022, 0, 0), (0, -1022, 3), (900, -600, 10), (-1022, -300, -300), (971, 0, 300), (600, 600, 600)]
+FAR_APART += [(-550, -550, -550), (600, -600, 600), (600, 600, -600), (0, 971, 700), (700, 971, 0), (971, 700, 0)]
+FAR_APART += [(3, 0, 971), (0, 700, 971), (700, 0, 971), (0, 0, -1022)]
+
+
+@pytest.mark.parametrize("exponents", FAR_APART)
 def test_coordinates_far_apart_on_an_axis_are_decided(exponents: tuple[int, int, int]) -> None:
     """4.0 beside 5e-324: lattice points, some moved by a few steps of a lattice that is finer by far."""
     draw = np.random.default_rng(8)
