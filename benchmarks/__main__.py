@@ -10,7 +10,19 @@ from pathlib import Path
 from benchmarks import table
 from benchmarks.fields import FIELDS
 
-NAMES = (*FIELDS, "answers", "checkouts", "cold_start", "cores", "filed", "hard_cases", "report", "soak", "wire")
+NAMES = (
+    *FIELDS,
+    "answers",
+    "checkouts",
+    "cliffs",
+    "cold_start",
+    "cores",
+    "filed",
+    "hard_cases",
+    "report",
+    "soak",
+    "wire",
+)
 
 
 def about(name: str) -> str:
