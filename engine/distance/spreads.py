@@ -32,7 +32,8 @@ from engine.collision.result import Clearance, Feature, Poses
 from engine.compiling.jit import entry_of
 from engine.distance.exact import Gap, ScaledGap, Wall, is_beyond, nearest_of_triangles, walls
 from engine.distance.refined import Room, new_room
-from engine.distance.traversal import ANSWERED, BEYOND, DONE, Query, find_nearest
+from engine.distance.ties import in_order, nearest_between_walls
+from engine.distance.traversal import ANSWERED, BEYOND, DONE, FULL, Query, find_nearest
 from engine.running.budget import Budget
 from engine.solids.base import Solid
 from engine.solids.mesh import Mesh
@@ -114,15 +115,32 @@ class SpreadPair:
                 every = product(range(len(a.faces)), range(len(b.faces)), (0,), (0,))  # never in memory together
                 yield how, start, every
             else:
-                self._room = new_room(2 * len(self._room.candidates.bounds))
+                row = self._nearest_between_walls(start, n) if how == FULL and n > 0 and query.most == np.inf else None
+                if row is not None:
+                    yield DONE, start, [row]
+                else:
+                    self._room = new_room(2 * len(self._room.candidates.bounds))
+
+    def _nearest_between_walls(self, item: int, n: int) -> list[int] | None:
+        """Return the row of the nearest pair under pose `item` if one of the first n candidates of a search that ran
+        full proves it."""
+        bodies = exact_pair(*self.meshes, self._placed(item), lattice_shift(np.array(self._radii)))
+        nearest = self._room.candidates.bounds[:n].argmin()
+        pairs = self._room.candidates.pairs[nearest : nearest + 1]
+        row = nearest_between_walls(bodies, pairs, self.budget)
+        return None if row is None else row.tolist()
+
+    def _placed(self, item: int) -> Poses:
+        """Return both poses of pose number `item`."""
+        own, poses = self.poses
+        return _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
 
     def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the smallest gap of the candidates of pose number `item`, ties by the lowest faces, and its two
         triangles; exact. pairs: rows of two triangles and a feature code of each."""
         self.n_exact += 1
-        (a, b), (own, poses) = self.meshes, self.poses
-        placed = _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
-        exact = _ExactPair(a, b, placed, self._radii)
+        a, b = self.meshes
+        exact = _ExactPair(a, b, self._placed(item), self._radii)
 
         def rank(i: int, j: int) -> tuple[Any, ...]:
             """Return the key of ties: faces, then corners, independent of the order of the tree."""
@@ -131,12 +149,13 @@ class SpreadPair:
 
         best: ScaledGap | None = None
         best_pair = (-1, -1)
+        is_sorted = isinstance(pairs, list)
         if isinstance(pairs, list) and len(pairs) > 1:
-            pairs.sort(key=lambda row: rank(row[0], row[1]))  # ties fall to the first
+            pairs = in_order(self.meshes, np.array(pairs)).tolist()  # ties fall to the first
         for count, (i, j, first, second) in enumerate(pairs):
             if count % 16 == 0:
                 self.budget.check()
-            is_later = best is not None and rank(i, j) >= rank(*best_pair)
+            is_later = best is not None and (is_sorted or rank(i, j) >= rank(*best_pair))
             if is_later and exact.are_beyond(i, j):
                 continue
             candidate = exact.gap(i, j, first, second)

@@ -108,7 +108,7 @@ def measure_blocks(s: Search, i: int, j: int, n_candidates: int, limits: FloatAr
             if n_candidates == len(candidates.bounds):
                 n_candidates = retain_below(candidates, n_candidates, limits[0])
                 if 2 * n_candidates > len(candidates.bounds):
-                    return FULL, 0
+                    return FULL, n_candidates
             candidates.bounds[n_candidates] = low
             candidates.pairs[n_candidates, 0], candidates.pairs[n_candidates, 1] = -1 - own, -1 - their
             candidates.pairs[n_candidates, 2], candidates.pairs[n_candidates, 3] = features
@@ -205,14 +205,14 @@ def _search(s: Search, limits: FloatArray, flag: FlagArray) -> tuple[int, int]:
         if flag[0] != 0:
             return INTERRUPTED, 0
         if n + LANES > len(s.room.heap.bounds):
-            return FULL, 0
+            return FULL, n_candidates
         node = 0 if i == ROOT else int(first[i >> 3, i & 7])
         their_node = 0 if j == ROOT else int(second[j >> 3, j & 7])
         i_block, j_block = first[node, 0] < 0, second[their_node, 0] < 0
         if i_block and j_block:
             how, n_candidates = measure_blocks(s, node, their_node, n_candidates, limits)
             if how != DONE:
-                return how, 0
+                return how, n_candidates
             continue
         is_first = not i_block and (j_block or _half_of(s.a, i) * sizes[0] >= _half_of(s.b, j) * sizes[1])
         n = _expand(s, n, (node if is_first else their_node, j if is_first else i, is_first), limits[0])

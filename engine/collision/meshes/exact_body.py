@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -80,6 +81,18 @@ class ExactBody:
                 point = tuple(dot(row, q) + t for row, t in zip(self._rotation, self._translation))
             self._vertices[index] = point
         return point
+
+    def vertices(self) -> Any:
+        """Return all vertices under the pose, in units of the lattice: an array (n, 3) of Python's integers."""
+        shift = self.shift if self._rotation is None else self.shift - self._r_shift
+        points = self.mesh.arrays.vertices
+        if self.mesh.arrays.extent.reach < math.ldexp(1.0, 1000 - shift):
+            whole = np.frompyfunc(int, 1, 1)(np.ldexp(points, shift))
+        else:
+            whole = np.array([[on_lattice(x, shift) for x in point] for point in points.tolist()], object)
+        if self._rotation is None:
+            return whole
+        return whole @ np.array(self._rotation, object).T + np.array(self._translation, object)
 
     def corners(self, face: int) -> Corners:
         """Return the three corners of a triangle under the pose, in units of the lattice."""
