@@ -51,6 +51,8 @@ MULTIPART: Final = "multipart/form-data"
 _BOUNDARY: Final = re.compile(r"""boundary=(?:"([^"]{1,70})"|([^\s;"]{1,70}))""", re.IGNORECASE)
 _FIELD: Final = re.compile(rb"""[;\s](name|filename)=(?:"([^"]*)"|([^\s;"]+))""", re.IGNORECASE)
 _MOST_PARTS: Final = 16
+_LONGEST_HEAD: Final = 2**13
+"""Bytes of the headers of a part, from the boundary before them."""
 
 
 def media_type_of(headers: dict[bytes, bytes]) -> str:
@@ -71,8 +73,9 @@ def fields_of(form: Body, content_type: str) -> dict[str, tuple[str, bytes]]:
         start = at + len(mark)
         if bytes(form[start : start + 2]) == b"--":
             return fields
-        end, head = form.find(b"\r\n" + mark, start), form.find(b"\r\n\r\n", start)
-        if not 0 <= head <= end:
+        head = form.find(b"\r\n\r\n", start, start + _LONGEST_HEAD)
+        end = form.find(b"\r\n" + mark, head + 2) if head >= 0 else -1
+        if end < 0:
             break
         named = {each[1].lower(): each[2] or each[3] or b"" for each in _FIELD.finditer(bytes(form[start:head]))}
         name = named.get(b"name", b"").decode("utf-8", "replace")

@@ -117,7 +117,7 @@ def faults_of(error: Exception) -> list[Fault]:
     """Return the faults of any error, with their paths; at least one."""
     if isinstance(error, EngineError):
         code = error.code if error.code in ENGINE_STATUS else EngineError.code
-        return [Fault(error.where, code, error.message)]
+        return [Fault(error.where, code, error.message.replace("None (NoneType)", "null"))]
     if isinstance(error, ServiceError):
         return [Fault(error.where, error.code, error.detail)]
     if isinstance(error, MemoryError):

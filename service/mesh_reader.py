@@ -57,6 +57,7 @@ def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -
             call.remaining()
             if starting.done():
                 starting.result()  # raises what kept the child from starting, which nothing would answer for
+                theirs.close()  # so that the end of the child ends the pipe
         theirs.close()
         try:
             received = mine.recv()
@@ -66,10 +67,11 @@ def read(octets: bytes | bytearray | memoryview, kind: str | None, call: Call) -
             ) from None
     except engine.EngineError:  # a deadline is an OSError too (TimeoutError)
         raise
-    except OSError as error:
+    except (OSError, EOFError) as error:  # EOFError: of the server that starts children
         raise ServiceError(
             "out_of_memory",
-            f"the process that reads the file did not start or was lost ({error}); try again later, or send the solid",
+            f"the process that reads the file did not start or was lost ({error!s:.100}); try again later, or send the "
+            "solid",
         ) from None
     finally:
         starting.add_done_callback(lambda _: _end(child, mine, theirs))
@@ -97,6 +99,8 @@ def _child(answer: Connection, octets: bytes, kind: str | None, room: int, secon
         answer.send(error.message)
     except MemoryError:
         answer.send(f"to read it takes more than {room} bytes; simplify the mesh, or send it as vertices and faces")
+    except Exception as error:  # a fault of ours; this process has no log
+        answer.send(f"the file cannot be read: {type(error).__name__}")
 
 
 def _limit(room: int, seconds: float) -> None:

@@ -29,7 +29,7 @@ from engine.collision.outline_batch import outline_pool, relate_outline_pairs
 from engine.collision.simple.form_relations import relate_box_pairs
 from engine.compiling.jit import entry_of
 from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
-from engine.running.budget import Budget
+from engine.running.budget import Budget, polled
 from engine.running.parallel import run_chunks
 from engine.solids.base import Solid, named
 from engine.solids.pose import Pose, motions_of
@@ -222,7 +222,7 @@ def scene_bodies(solids: Any, poses: Any) -> SceneBodies:
         raise InvalidArrayError(f"poses must be as many as solids, {len(bodies)}, got {len(given)}", ("poses",))
     kinds = check_collidable(bodies)
     if set(map(type, given)) - {Pose, type(None)}:
-        given = [posed(each, bodies[index], "poses", index) for index, each in enumerate(given)]
+        given = [posed(each, bodies[index], "poses", index) for index, each in enumerate(polled(given))]
     return bodies_of(bodies, given, *kinds)
 
 

@@ -28,7 +28,7 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.running.budget import Budget, Cancel
+from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options
 from engine.solids.accepted import PoseLike, SolidLike
 from engine.solids.base import Solid, named
@@ -256,7 +256,9 @@ def collide(
     'TPP'
     """
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        first, second = as_solid(first, "first"), as_solid(second, "second")
+        with reading(deadline, cancel) as reader:
+            first, second = as_solid(first, "first"), as_solid(second, "second")
+        deadline = reader.left()
     if first_pose is not None or second_pose is not None:
         pair_function(first, second)
         first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")

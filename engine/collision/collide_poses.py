@@ -31,7 +31,7 @@ from engine.collision.result import (
 from engine.collision.simple.against_ball import centers_in_frame, named, relate_balls
 from engine.collision.simple.closed_forms import relation_closed_form
 from engine.compiling.jit import entry_of
-from engine.running.budget import Budget, Cancel
+from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.accepted import PosesLike, SolidLike
 from engine.solids.base import Solid
@@ -151,10 +151,14 @@ def collide_poses(
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        first, second = as_solid(first, "first"), as_solid(second, "second")
+        with reading(deadline, cancel) as reader:
+            first, second = as_solid(first, "first"), as_solid(second, "second")
+        deadline = reader.left()
     one_pair.pair_function(first, second)
     if detail:
         one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)
+    if translations is None:
+        rotations, translations, deadline = read_poses(rotations, first.dimension, deadline, cancel)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
     n_poses = len(poses.rotations)
     if n_poses == 1 and deadline is None and cancel is None and progress is None and not (detail or report):
@@ -205,6 +209,15 @@ def _collide_pose(first: Solid, second: Solid, poses: PoseArrays, work: Work) ->
             return answer
     pose = Pose.of_checked(poses.rotations[0], poses.translations[0])
     return one_pair.collide_pair(first, second, (None, pose), work)
+
+
+def read_poses(poses: object, dimension: int, deadline: float | None, cancel: Cancel | None) -> tuple[Any, Any, Any]:
+    """Return rotations and translations of poses in any form, None for those of `Poses`, and the seconds left."""
+    if type(poses) is Poses:
+        return poses, None, deadline
+    with reading(deadline, cancel) as reader:
+        turns, moves = as_pose_arrays(poses, dimension)
+    return turns, moves, reader.left()
 
 
 def as_poses(

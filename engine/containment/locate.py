@@ -19,7 +19,7 @@ from engine.containment.methods.filters import NOT_FINITE
 from engine.containment.methods.rational_locate import is_located
 from engine.containment.policy import Choice, choose_for_mesh, choose_for_rings
 from engine.errors import NotFiniteError
-from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.budget import UNLIMITED, Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, run_chunks
 from engine.solids.accepted import PointsLike, SolidLike
 from engine.solids.base import Solid
@@ -203,10 +203,11 @@ def locate(
         if batch is not None:
             return (batch[0], Accuracy("exact", None, len(batch[0]), *batch[1:])) if report else batch[0]
     check_options(workers, progress, report=report)
-    solid = as_solid(solid, "solid")
-    choice = locator_of(solid)
-    array = as_points(points, solid.dimension, must_be_finite=False)
-    locations = np.empty(len(array), np.int8)
+    with reading(deadline, cancel) as reader:
+        solid = as_solid(solid, "solid")
+        choice = locator_of(solid)
+        array = as_points(points, solid.dimension, must_be_finite=False)
+    deadline, locations = reader.left(), np.empty(len(array), np.int8)
     beyond, rational = [], []
     with Budget(deadline, cancel) as budget:
         budget.check()

@@ -9,14 +9,14 @@ import numpy as np
 
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
 from engine.collision.collide import Answers, collide_pair, pair_function, posed
-from engine.collision.collide_poses import as_poses, batch_of
+from engine.collision.collide_poses import as_poses, batch_of, read_poses
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.result import Clearance, Poses, Work
 from engine.distance import forms
 from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
-from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.budget import UNLIMITED, Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid
@@ -122,7 +122,9 @@ def clearance(
     True
     """
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        first, second = as_solid(first, "first"), as_solid(second, "second")
+        with reading(deadline, cancel) as reader:
+            first, second = as_solid(first, "first"), as_solid(second, "second")
+        deadline = reader.left()
     pair_function(first, second, "distance")
     if first_pose is not None or second_pose is not None:
         first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")
@@ -248,9 +250,13 @@ def clearance_poses(
     """
     check_options(workers, progress, report=report)
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        first, second = as_solid(first, "first"), as_solid(second, "second")
+        with reading(deadline, cancel) as reader:
+            first, second = as_solid(first, "first"), as_solid(second, "second")
+        deadline = reader.left()
     pair_function(first, second, "distance")
     least = None if at_least is None else checked_distance(at_least)
+    if translations is None:
+        rotations, translations, deadline = read_poses(rotations, first.dimension, deadline, cancel)
     poses = PoseArrays(*as_poses(rotations, translations, first.dimension, workers), True)
     n_poses = len(poses.rotations)
     answers = np.full(n_poses, np.nan if least != 0.0 else np.inf)

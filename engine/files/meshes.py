@@ -7,14 +7,22 @@ import logging
 import re
 from collections.abc import Callable
 from importlib import import_module
+from itertools import chain
 from typing import IO, Any, Final, NamedTuple, TypeVar, overload
 
 import numpy as np
 
-from engine.errors import EmptyGeometryError, FaceNotSimpleError, IndexOutOfRangeError, InvalidInputError
+from engine.errors import (
+    EmptyGeometryError,
+    EngineError,
+    FaceNotSimpleError,
+    IndexOutOfRangeError,
+    InvalidInputError,
+    RingTooShortError,
+)
 from engine.files.octets import File, read_octets
 from engine.files.ply import read_ply
-from engine.running.budget import UNLIMITED
+from engine.running.budget import UNLIMITED, polled
 from engine.solids.checks import as_points, frozen, shown
 from engine.solids.ear_cutting import cut_faces
 from engine.solids.mesh import Mesh, Polyhedron, first_equal
@@ -32,6 +40,11 @@ _STL_END: Final = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 M = TypeVar("M", bound=Mesh)
 _ELEMENT: Final = re.compile(rb"^[ \t]*([vf])(?=\s|\Z)([^\n#]*)", re.MULTILINE)
 """The lines of an OBJ file that define vertices and faces."""
+_OFF: Final = re.compile(rb"(?:\xef\xbb\xbf)?\s*(?:ST)?C?N?OFF\b")
+"""The first word of an OFF file, whose rows of vertices may go on with textures, colours and normals."""
+_HEAD: Final = 1 << 16
+"""Bytes in which an OFF file has its first word, after comments."""
+_BEYOND: Final = (-(2**63), 2**63 - 1)
 _TEXTURE_AND_NORMAL: Final = re.compile(rb"/\S*")
 """The texture and normal numbers after that of a vertex."""
 
@@ -104,8 +117,8 @@ def read_mesh(file: File, file_format: str | None = None) -> MeshOfFile:
         Another format, a file that is not there or cannot be read, or trimesh is not installed.
     EmptyGeometryError
         A file without faces.
-    IndexOutOfRangeError
-        A face names a vertex that does not exist.
+    IndexOutOfRangeError, RingTooShortError
+        A face names a vertex that does not exist, or fewer than three.
     FaceNotSimpleError, NotFiniteError
         A polygon that cannot be cut into triangles.
 
@@ -157,7 +170,7 @@ def read_mesh(file: File, file_format: str | None = None) -> MeshOfFile:
                 )
                 mesh = scene.to_mesh()
                 vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-    except MemoryError:
+    except (MemoryError, EngineError):  # the deadline of `inspect`
         raise
     except Exception as error:  # the parsers raise whatever the bytes lead them to
         raise InvalidInputError(
@@ -172,11 +185,13 @@ def _format_of(octets: bytes) -> str:
     """Return the format that the first bytes of a file tell, obj for a text that is none of the others."""
     octets = octets.removeprefix(b"\xef\xbb\xbf")
     head = octets[:512].lstrip()
+    if octets[:2] == b"\x1f\x8b":
+        raise InvalidInputError("the file is compressed (gzip); unpack it first", ("file",))
     if octets[:4] == b"glTF":
         return "glb"
     if head[:3] == b"ply":
         return "ply"
-    if re.match(rb"(\s*#[^\n]*\n)*\s*C?OFF\b", octets):
+    if _OFF.match(re.sub(rb"#[^\r\n]*", b"", octets[:_HEAD])):
         return "off"
     is_text = b"\0" not in octets[:512]
     return "stl" if head[:5].lower() == b"solid" or not is_text else "obj"
@@ -193,13 +208,13 @@ def _read_stl(file: IO[bytes]) -> tuple[FloatArray, IntArray]:
         vertices = np.frombuffer(octets, _STL_TRIANGLE, n, _STL_HEAD)["corners"].reshape(-1, 3).astype(np.float64)
     else:
         octets = octets.removeprefix(b"\xef\xbb\xbf")
-        if not octets.lstrip()[:5].lower() == b"solid":
+        if octets.lstrip()[:5].lower() != b"solid" or b"\0" in octets[:_STL_HEAD]:
             raise ValueError(f"a binary file of {n} triangles has {_STL_HEAD + 50 * n} bytes, this one {len(octets)}")
         *facets, rest = _STL_END.split(_STL_NAME.sub(b"", re.sub(rb"\r\n?", b"\n", octets)))
-        corners = [_STL_VERTEX.findall(facet) for facet in facets]
+        corners = [_STL_VERTEX.findall(facet) for facet in polled(facets)]
         if rest.strip() or any(len(three) != 3 for three in corners):
             raise ValueError("a facet has three corners `vertex x y z` and ends with `endfacet`")
-        vertices = np.array([[[*map(float, row)] for row in three] for three in corners]).reshape(-1, 3)
+        vertices = np.array([[[*map(float, row)] for row in three] for three in polled(corners)]).reshape(-1, 3)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
@@ -207,7 +222,10 @@ def _read_obj(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
     """Return vertices and faces of an OBJ file, negative indices counted from the last vertex before the face."""
     vertices, faces = list[list[bytes]](), list[list[int]]()
     text = re.sub(rb"\r\n?", b"\n", file.read()).removeprefix(b"\xef\xbb\xbf").replace(b"\\\n", b" ")
-    for kind, fields in _ELEMENT.findall(text):
+    for element in polled(_ELEMENT.finditer(text)):
+        kind, fields = element.groups()
+        if b"_" in fields:
+            raise ValueError(f"{fields[:40]!r} are no numbers")
         if kind == b"v":
             vertices.append(fields.split()[:3])
             continue
@@ -225,17 +243,25 @@ def _read_obj(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
         faces.append(corners)
     if not all(len(row) == 3 for row in vertices):
         raise ValueError("a vertex has fewer than three coordinates")
-    return np.array(vertices, np.bytes_).astype(np.float64), [[number - 1 for number in face] for face in faces]
+    numbers = np.fromiter(map(float, polled(chain.from_iterable(vertices))), np.float64)
+    return numbers.reshape(-1, 3), [[number - 1 for number in face] for face in polled(faces)]
 
 
 def _read_off(file: IO[bytes]) -> tuple[FloatArray, list[list[int]]]:
     """Return vertices and faces of an OFF file."""
-    _, _, text = re.split(rb"(C?OFF)", re.sub(rb"#[^\r\n]*", b"", file.read()), maxsplit=1)
-    (n_vertices, n_faces, *_), *rows = [[*row.split()] for row in text.splitlines() if row.strip()]
-    vertices = np.array([row[:3] for row in rows[: int(n_vertices)]], np.float64).reshape(int(n_vertices), 3)
-    faces = [[*map(int, row)] for row in rows[int(n_vertices) : int(n_vertices) + int(n_faces)]]
-    if len(faces) < int(n_faces) or not all(2 < row[0] < len(row) for row in faces):
-        raise ValueError(f"expected {int(n_faces)} faces, each the number of its corners, 3 or more, and these")
+    text = re.sub(rb"#[^\r\n]*", b"", file.read())
+    head = _OFF.match(text)
+    if head is None or b"_" in text:
+        raise ValueError("it begins with OFF, perhaps after ST, C or N, and has numbers alone")
+    text = text[head.end() :]
+    (n_vertices, n_faces, *_), *rows = [[*row.split()] for row in polled(text.splitlines()) if row.strip()]
+    n, m = int(n_vertices), int(n_faces)
+    if n < 0 or m < 0:
+        raise ValueError(f"it says that it has {n} vertices and {m} faces")
+    vertices = np.array([row[:3] for row in rows[:n]], np.float64).reshape(n, 3)
+    faces = [[*map(int, row)] for row in polled(rows[n : n + m])]
+    if len(faces) < m or not all(2 < row[0] < len(row) for row in faces):
+        raise ValueError(f"expected {m} faces, each the number of its corners, 3 or more, and these")
     return vertices, [row[1 : row[0] + 1] for row in faces]
 
 
@@ -250,12 +276,18 @@ _READERS: Final[dict[str, Callable[[IO[bytes]], tuple[FloatArray, Any]]]] = {
 
 def _triangulate(vertices: FloatArray, faces: Any) -> tuple[IntArray, IntArray]:
     """Return the triangles of faces, cut like in the constructors (ear_cutting.py), and the face of each."""
-    counts, numbers = np.fromiter(map(len, faces), np.int64), np.arange(len(faces))
-    indices = (
-        np.asarray(faces, np.int64).ravel()
-        if counts.min() == counts.max()
-        else np.concatenate([np.asarray(face, np.int64) for face in faces])
-    )
+    if isinstance(faces, np.ndarray):
+        counts, numbers, indices = np.full(len(faces), faces.shape[1]), np.arange(len(faces)), faces.ravel()
+    else:
+        counts, numbers = np.fromiter(map(len, polled(faces)), np.int64), np.arange(len(faces))
+        try:
+            indices = np.fromiter(chain.from_iterable(polled(faces)), np.int64)
+        except OverflowError:
+            low, high = _BEYOND
+            indices = np.fromiter((max(low, min(index, high)) for face in faces for index in face), np.int64)
+    if counts.min() < 3:
+        face = int(np.argmax(counts < 3))
+        raise RingTooShortError(f"face {face} of the file has {counts[face]} corners; a face needs 3", ("file",))
     if len(beyond := np.flatnonzero((indices < 0) | (indices >= len(vertices)))):
         face = int(np.searchsorted(np.cumsum(counts), beyond[0], "right"))
         raise IndexOutOfRangeError(

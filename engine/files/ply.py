@@ -8,6 +8,7 @@ from typing import IO, Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.running.budget import polled
 from engine.types import FloatArray
 
 _TYPES: Final = {
@@ -39,11 +40,15 @@ def read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
         if line[:1] == ["element"]:
             elements.append((line[1], int(line[2]), []))
         elif line[:2] == ["property", "list"]:
+            if _TYPES[line[2]][0] == "f":
+                raise ValueError(f"the number of items of {line[4]} must be of a type of whole numbers")
             elements[-1][2].append(_Property(line[4], _TYPES[line[3]], _TYPES[line[2]]))
         elif line[:1] == ["property"]:
             elements[-1][2].append(_Property(line[2], _TYPES[line[1]], ""))
     body, at = octets[head.end() :], 0
     lines = body.split(b"\n") if order == "" else []
+    if order == "" and b"_" in body:
+        raise ValueError("its text has more than numbers")
     elements_by_name: dict[str, dict[str, Any]] = {}
     for name, n, properties in elements:
         if n < 0 or n > len(body) or order is None:
@@ -53,23 +58,29 @@ def read_ply(file: IO[bytes]) -> tuple[FloatArray, Any]:
             at += n
         else:
             elements_by_name[name], at = _from_octets(body, at, n, properties, order)
-    vertices, faces = elements_by_name["vertex"], elements_by_name.get("face", {})
-    corners = next((faces[name] for name in _LISTS if name in faces), None)
-    if corners is None:
-        corners = next((rows for rows in faces.values() if getattr(rows, "ndim", 2) == 2 or isinstance(rows, list)), [])
-    return np.column_stack([vertices[axis] for axis in "xyz"]).astype(np.float64), corners
+    vertices, faces = elements_by_name.get("vertex", {}), elements_by_name.get("face", {})
+    if not {*"xyz"} <= vertices.keys():
+        raise ValueError("it has no element vertex with the properties x, y and z")
+    lists = {
+        each.name: each for name, _, properties in elements if name == "face" for each in properties if each.length
+    }
+    corners = next((lists[name] for name in (*_LISTS, *lists) if name in lists), None)
+    if corners is not None and corners.kind[0] == "f":
+        raise ValueError(f"the corners of faces, {corners.name}, must be of a type of whole numbers")
+    made = [] if corners is None else faces[corners.name]
+    return np.column_stack([vertices[axis] for axis in "xyz"]).astype(np.float64), made
 
 
 def _from_text(lines: list[bytes], n: int, properties: list[_Property]) -> dict[str, Any]:
     """Return the properties of the items of an element, one a line."""
-    rows = [line.split() for line in lines]
+    rows = [line.split() for line in polled(lines)]
     if len(rows) < n:
         raise ValueError(f"{n} items announced, {len(rows)} there")
     if not any(each.length for each in properties):
         table = np.array([row[: len(properties)] for row in rows], np.bytes_).reshape(n, len(properties))
         return {each.name: table[:, k].astype(np.float64) for k, each in enumerate(properties)}
     made: dict[str, Any] = {each.name: [] for each in properties}
-    for row in rows:
+    for row in polled(rows):
         at = 0
         for each in properties:
             size = int(row[at]) if each.length else 1
@@ -106,7 +117,7 @@ def _from_octets(body: bytes, at: int, n: int, properties: list[_Property], orde
             )
     codes = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
     lists: dict[str, list[Any]] = {each.name: [] for each in properties}
-    for _ in range(n):
+    for _ in polled(range(n)):
         for each in properties:
             size = 1
             if each.length:

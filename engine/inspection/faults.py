@@ -9,20 +9,24 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
 from engine.collision.codes import DISJOINT, TOUCHING
+from engine.collision.collide import collide
 from engine.collision.triangles import collide_triangles
 from engine.containment.locate import locate
 from engine.errors import EngineError
 from engine.polygon_clipping.planes import orientations
 from engine.predicates.rational import cross, scaled_integers
-from engine.running.budget import Budget
+from engine.running.budget import Budget, polled
 from engine.solids.mesh import Polyhedron
-from engine.types import FloatArray, IntArray
+from engine.types import FloatArray, IntArray, Rcc8
+
+_POLLED: Final = 1 << 10
+"""Turns of a loop in Python between two checks of the deadline."""
 
 
 class Edges(NamedTuple):
@@ -68,7 +72,6 @@ def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
     vertices = np.unique(ends)
     corners = np.concatenate([points[ends], points[vertices][:, None].repeat(2, axis=1)])
     n = len(ends)
-    on_edges: list[IntArray] = []
     pairs = all_pairs_of_boxes(corners.min(axis=1), corners.max(axis=1), budget) if len(ends) else np.zeros((0, 2), int)
     pairs = pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)]
     edge, vertex = ends[pairs[:, 0]], vertices[pairs[:, 1] - n]
@@ -76,11 +79,11 @@ def junctions(points: FloatArray, ends: IntArray, budget: Budget) -> IntArray:
     edge, vertex = edge[free], vertex[free]
     segments, spots = points[np.column_stack([edge, edge[:, 1]])], points[np.column_stack([vertex] * 3)]
     met = np.asarray(collide_triangles(segments, spots, deadline=budget.left(), cancel=budget.cancel)) != DISJOINT
-    for (low, high), at in zip(edge[met], vertex[met]):
-        on_edges.append(np.array([low, high, at]))
-    rows = np.array(on_edges, np.int64).reshape(-1, 3)
-    across = np.abs(points[rows[:, 2]] - points[rows[:, 0]]).max(axis=1)  # on one line this grows along it
-    return rows[np.lexsort((across, rows[:, 1], rows[:, 0]))]
+    rows = np.column_stack([edge[met], vertex[met]])
+    start, end, at = points[rows].transpose(1, 0, 2)
+    axis = np.argmax(start != end, axis=1)[:, None]  # on one line a coordinate that differs is different everywhere
+    start, end, at = (np.take_along_axis(each, axis, axis=1)[:, 0] for each in (start, end, at))
+    return rows[np.lexsort((np.where(start < end, at, -at), rows[:, 1], rows[:, 0]))]
 
 
 def shells_of(edges: Edges, budget: Budget) -> list[IntArray]:
@@ -109,7 +112,7 @@ def nesting(
     for shell in shells:
         budget.check()
         try:
-            closed.append((shell, Polyhedron(points, faces[shell])))
+            closed.append((shell, Polyhedron(points, faces[shell], deadline=budget.left(), cancel=budget.cancel)))
         except EngineError:
             budget.check()
     used = [np.unique(faces[shell]) for shell, _ in closed]
@@ -123,14 +126,19 @@ def nesting(
         depth = 0
         for other in inside[number]:
             budget.check()
-            places = locate(points[used[number]], closed[other][1], deadline=budget.left(), cancel=budget.cancel)
+            limits: Any = {"deadline": budget.left(), "cancel": budget.cancel}
+            places = locate(points[used[number]], closed[other][1], **limits)
             strict = places[places != 0]
-            depth += bool(len(strict) and strict[0] > 0)
-        volume = _sign_of_volume(points, faces[shell])
+            if len(strict):
+                depth += bool(strict[0] > 0)
+            else:  # all its corners are on the other's faces
+                lies = collide(closed[number][1], closed[other][1], detail=True, **limits).detail
+                depth += lies in (Rcc8.TPP, Rcc8.NTPP)
+        volume = _sign_of_volume(points, faces[shell], budget)
         yield shell, volume != 0 and (volume > 0) is (depth % 2 == 1)
 
 
-def _sign_of_volume(points: FloatArray, faces: IntArray) -> int:
+def _sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
     """Return the sign of the volume that triangles run around, exactly."""
     corners = points[faces] - points[faces[0, 0]]
     with np.errstate(all="ignore"):
@@ -143,7 +151,9 @@ def _sign_of_volume(points: FloatArray, faces: IntArray) -> int:
     numbers = scaled_integers(points[used].ravel().tolist())
     places = [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
     exact = 0
-    for i, j, k in rows.reshape(-1, 3).tolist():
+    for number, (i, j, k) in enumerate(rows.reshape(-1, 3).tolist()):
+        if number % _POLLED == 0:
+            budget.check()
         exact += sum(x * y for x, y in zip(places[i], cross(places[j], places[k])))
     return (exact > 0) - (exact < 0)
 
@@ -186,11 +196,11 @@ def _common_first(rows: IntArray, is_common: Any) -> IntArray:
 def _pairs_at(faces: IntArray, at_edges: IntArray) -> set[tuple[int, int]]:
     """Return the pairs of a face at the edge of a T-junction and one at its vertex."""
     at: dict[int, list[int]] = defaultdict(list)
-    for number, face in enumerate(faces.tolist() if len(at_edges) else ()):
+    for number, face in enumerate(polled(faces.tolist() if len(at_edges) else ())):
         for vertex in face:
             at[vertex].append(number)
     pairs = set()
-    for low, high, vertex in at_edges.tolist():
+    for low, high, vertex in polled(at_edges.tolist()):
         for one in set(at[low]) & set(at[high]):
             pairs |= {(min(one, other), max(one, other)) for other in at[vertex]}
     return pairs

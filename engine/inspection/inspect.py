@@ -28,7 +28,8 @@ _MENDS: Final = {
     "turned_edges": "turn the faces that run the wrong way; orient=True does it where the mesh is closed",
     "t_junctions": "split the edge at the vertex: fill_t_junctions=True does it",
     "duplicate_faces": "leave one of the two out",
-    "flat_faces": "leave them out, or weld their corners: faces without area are taken, and bound nothing",
+    "flat_faces": "those that name a vertex twice are refused: weld=0.0 leaves them out; others are taken, and bound "
+    "nothing",
     "inverted_shells": "turn all faces of the shell: orient=True does it",
     "self_crossings": "the solid is taken, even-odd; a Boolean union in the program that made the mesh removes them",
 }
@@ -86,8 +87,9 @@ class Inspection(ByValue):
 
     @property
     def is_closed(self) -> bool:
-        """Whether `Polyhedron` takes the mesh: no open and no turned edges."""
-        return not len(self.open_edges) and not len(self.turned_edges)
+        """Whether `Polyhedron` takes the mesh: it has faces, none names a vertex twice, no edge is open or turned."""
+        is_sound = len(self.faces) > 0 and not (self.faces == np.roll(self.faces, 1, axis=1)).any()
+        return is_sound and not len(self.open_edges) and not len(self.turned_edges)
 
     @property
     def advice(self) -> dict[str, str]:

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from engine.bounding.box_grid import all_pairs_of_boxes
+from engine.bounding.box_grid import pairs_of_boxes
 from engine.inspection.faults import edges_of, junctions, nesting, shells_of
-from engine.running.budget import Budget
+from engine.running.budget import Budget, polled
 from engine.types import FloatArray, IntArray
 
 
@@ -19,18 +19,14 @@ def welded(
     """Return the mesh with vertices that are at most so far apart made one, each group the first of its members."""
     used = np.unique(faces)
     spots = points[used]
-    root = np.arange(len(points))
-    half = distance / 2
-    for i, j in all_pairs_of_boxes(spots - half, spots + half, budget).tolist():
-        one, other = used[i], used[j]
-        if float(np.linalg.norm(points[one] - points[other])) <= distance:
-            while root[one] != one:
-                one = root[one]
-            while root[other] != other:
-                other = root[other]
-            root[max(one, other)] = min(one, other)
-    while (root[root] != root).any():
-        root = root[root]
+    with np.errstate(over="ignore"):  # boxes and distances beyond the largest double
+        low, high = (np.nextafter(spots + sign * distance / 2, sign * np.inf) for sign in (-1, 1))
+        root = np.arange(len(points))
+        for block in pairs_of_boxes(low, high, budget.flag):
+            budget.check()
+            first, second = used[block].T
+            is_near = np.sqrt(np.square(points[first] - points[second]).sum(axis=1)) <= distance
+            _join(root, first[is_near], second[is_near], budget)
     moved = root != np.arange(len(points))
     made = root[faces]
     remaining = (made != np.roll(made, 1, axis=1)).all(axis=1)
@@ -42,16 +38,31 @@ def welded(
     return points, made[remaining]
 
 
+def _join(root: IntArray, first: IntArray, second: IntArray, budget: Budget) -> None:
+    """Make pairs of vertices one, whatever they are one with already: root (n,) has the smallest of each group."""
+    while len(first):  # bound: a group loses its root each turn
+        budget.check()
+        one, other = root[first], root[second]
+        np.minimum.at(root, np.maximum(one, other), np.minimum(one, other))
+        while (root[root] != root).any():
+            root[:] = root[root]
+        apart = root[first] != root[second]
+        first, second = first[apart], second[apart]
+
+
 def filled(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str]) -> IntArray:
     """Return the triangles with open edges split at the vertices on them."""
     edges = edges_of(faces)
     is_open = edges.uses % 2 == 1
     on: dict[tuple[int, int], list[int]] = defaultdict(list)
-    for low, high, vertex in junctions(points, edges.ends[is_open], budget).tolist():
+    for low, high, vertex in polled(junctions(points, edges.ends[is_open], budget).tolist()):
         on[low, high].append(vertex)
     made: list[list[int]] = []
-    n_split = 0
-    for face in faces.tolist():
+    n_split = n_flat = 0
+    for face in polled(faces.tolist()):
+        if len(set(face)) < 3 or _is_on_itself(face, on):
+            n_flat += 1
+            continue
         waiting = [face]
         for k in range(3):
             a, b = face[k], face[(k + 1) % 3]
@@ -64,15 +75,22 @@ def filled(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str
                 (apex,) = set(whole) - {a, b}
                 waiting += [[start, end, apex] for start, end in pairwise(path)]
         made += waiting
-    mended.append(f"fill_t_junctions: {n_split} sides of faces are split at the vertices on them")
+    flat = f"; {n_flat} faces without area, which that leaves nothing of, are left out" if n_flat else ""
+    mended.append(f"fill_t_junctions: {n_split} sides of faces are split at the vertices on them{flat}")
     return np.array(made, np.int64).reshape(-1, 3)
+
+
+def _is_on_itself(face: list[int], on: dict[tuple[int, int], list[int]]) -> bool:
+    """Return whether a corner of a face is on the side opposite to it. on: the vertices on an edge."""
+    sides = zip(face, [*face[1:], face[0]], [*face[2:], *face[:2]])
+    return any(apex in on.get((min(a, b), max(a, b)), ()) for a, b, apex in sides)
 
 
 def oriented(points: FloatArray, faces: IntArray, budget: Budget, mended: list[str]) -> IntArray:
     """Return the triangles turned so that neighbours run alike, and closed shells as nesting has them."""
     edges = edges_of(faces)
     users: dict[int, list[int]] = defaultdict(list)
-    for face, own in enumerate(edges.of.tolist()):
+    for face, own in enumerate(polled(edges.of.tolist())):
         for edge in own:
             users[edge].append(face)
     ups = np.roll(faces, -1, axis=1) > faces

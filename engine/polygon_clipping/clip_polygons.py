@@ -20,7 +20,7 @@ from engine.polygon_clipping.planes import KernelScene, Plan, kernel_scene, plan
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import largest_of, scaled_back
-from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.budget import UNLIMITED, Budget, Cancel, polled, reading
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
@@ -189,14 +189,17 @@ def clip_polygons(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     if not is_free or report is not False:
         check_options(workers, progress, report=report)
-    region = region if isinstance(region, Solid) else as_solid(region, "region")
+    if not isinstance(region, Solid):
+        with reading(deadline, cancel) as reader:
+            region = as_solid(region, "region")
+        deadline = reader.left()
     plan = region.cached("clipping_plan")
     if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
         few = _clip_array(polygons, plan, region.dimension)
         if few is not None:
             return few
-    contours = None if plan is None else as_contours(polygons, region.dimension)
-    if plan is not None and contours is not None and is_free and len(contours.vertices) <= _FEW:
+    contours = as_contours(polygons, region.dimension) if plan is not None and is_free else None
+    if plan is not None and contours is not None and len(contours.vertices) <= _FEW:
         clipped, n_beyond, n_rational = _clip(contours, plan, UNLIMITED, workers, None)
     else:
         with Budget(deadline, cancel) as budget:
@@ -279,7 +282,7 @@ def as_contours(polygons: Any, dimension: int) -> Contours:
         polygons = as_solids(polygons, "polygons")
     rings: list[FloatArray] = []
     counts: list[int] = []
-    for i, polygon in enumerate(polygons):
+    for i, polygon in enumerate(polled(polygons)):
         if not isinstance(polygon, Polygon) and geometry_of(polygon) is not None:  # pieces of overlays are tuples
             polygon = as_solid(polygon, "polygons", i)
         if isinstance(polygon, Polygon):

@@ -34,7 +34,7 @@ from engine.polygon_overlay.pair_arrays import (
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.rounds import ValidPairs, make_pairs_valid
 from engine.polygon_overlay.run import SELECTED_ARRAYS, Operation, as_overlay, rebuild_from_rounded_rings, run_kernel
-from engine.running.budget import Budget, Cancel
+from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options, run_chunks
 from engine.solids.accepted import SolidsLike
 from engine.solids.base import Solid
@@ -257,7 +257,9 @@ def overlay_batch(
     """
     check_operation(operation)
     check_options(workers, progress, report=report)
-    subjects, clips = _polygons_in(subjects, "subjects"), _polygons_in(clips, "clips")
+    with reading(deadline, cancel) as reader:
+        subjects, clips = _polygons_in(subjects, "subjects"), _polygons_in(clips, "clips")
+    deadline = reader.left()
     if len(subjects) != len(clips):
         raise InvalidArrayError(
             f"subjects and clips must be of equal length, got {len(subjects)} and {len(clips)}", ("clips",)

@@ -40,7 +40,7 @@ from engine.polygon_overlay.run import (
     overlay_few,
     rebuild_from_rounded_rings,
 )
-from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options, is_unlimited
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
@@ -151,9 +151,9 @@ def overlay(
             if few is not None:
                 return few
     check_operation(operation)
-    first, second = (rings_of(as_solid(each, name), name) for each, name in ((subject, "subject"), (clip, "clip")))
     check_options(workers, progress, report=report)
-    with UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel) as budget:
+    with reading(deadline, cancel) as budget:
+        first, second = (rings_of(as_solid(each, name), name) for each, name in ((subject, "subject"), (clip, "clip")))
         result, n_exact, n_rational = overlay_rings(first, second, operation, budget, UNNAMED, grid)
     if progress is not None:
         progress(1)

@@ -162,6 +162,16 @@ def poll() -> None:
         budget = budget.around
 
 
+def current() -> Budget:
+    """Return the budget under which this thread works, `UNLIMITED` without one."""
+    return getattr(_here, "budget", None) or UNLIMITED
+
+
+def reading(deadline: float | None, cancel: Cancel | None) -> Budget:
+    """Return the budget under which the arguments of a call are read; `left` is what remains for the rest of it."""
+    return UNLIMITED if deadline is None and cancel is None else Budget(deadline, cancel)
+
+
 def note(text: str) -> None:
     """Pass a remark on an argument to the switch of the call under which this thread works; without one, warn."""
     budget: Budget | None = getattr(_here, "budget", None)

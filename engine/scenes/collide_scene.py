@@ -178,9 +178,9 @@ def collide_scene(
     ([0], [1], ['touching'])
     """
     check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
-    batches = SceneBatches(scene_bodies(solids, poses))
     query = PairQuery(skip, only, gap, witnesses, boolean, detail)
     with Budget(deadline, cancel) as budget:
+        batches = SceneBatches(scene_bodies(solids, poses))
         pairs = collide_bodies(batches, query, budget, workers, progress)
     return pairs if report else pairs[0]
 

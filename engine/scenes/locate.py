@@ -68,6 +68,11 @@ class SceneLocations(Ragged):
     def __len__(self) -> int:
         return len(self.offsets) - 1
 
+    def _by_row(self) -> dict[str, Any]:
+        """Return the columns of a table with a row for each point and body that contains it."""
+        points = np.repeat(np.arange(len(self)), np.diff(self.offsets))
+        return {"point": points, "body": self.indices, "on_boundary": self.on_boundary}
+
     def __getitem__(self, point: int) -> IntArray:
         """Return the bodies that contain one point, ascending."""
         start, stop = self.offsets[point : point + 2] if point >= 0 else self.offsets[len(self) + point :][:2]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Unpack, overload
 
-from engine.running.budget import Cancel
+from engine.running.budget import Cancel, reading
 from engine.running.parallel import Options, Progress
 from engine.scenes.locate import SceneLocations
 from engine.scenes.scene import Scene
@@ -91,5 +91,7 @@ def locate_scene(
     >>> held.offsets.tolist(), held.indices.tolist(), held.on_boundary.tolist()
     ([0, 1, 3, 3], [0, 0, 1], [False, True, True])
     """
-    options = {"workers": workers, "deadline": deadline, "cancel": cancel, "progress": progress}
-    return Scene(solids, poses).locate(points, report=report, **options)  # type: ignore[arg-type]
+    with reading(deadline, cancel) as reader:
+        scene = Scene(solids, poses)
+    options = {"workers": workers, "deadline": reader.left(), "cancel": cancel, "progress": progress}
+    return scene.locate(points, report=report, **options)  # type: ignore[arg-type]

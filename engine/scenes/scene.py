@@ -18,7 +18,7 @@ from engine.errors import (
     InvalidOperationError,
     WrongDimensionError,
 )
-from engine.running.budget import Budget, Cancel
+from engine.running.budget import Budget, Cancel, polled
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, meets_any
@@ -383,7 +383,7 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
     if not isinstance(solids, (list, tuple)):
         raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
     solids = list(solids)
-    for index, solid in enumerate(solids):
+    for index, solid in enumerate(polled(solids)):
         if not isinstance(solid, Solid):
             solid = solids[index] = as_solid(solid, "solids", index)
         if solid.dimension != solids[0].dimension:
@@ -401,7 +401,7 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
     is_plain = not set(map(type, poses)) - {Pose, type(None)}
     if is_plain and all(each is None or len(each.translation) == solids[0].dimension for each in poses):
         return solids, tuple(poses)
-    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(zip(poses, solids)))
+    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(polled(zip(poses, solids))))
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, Unpack, overload
 import numpy as np
 
 from engine.predicates.rational import balanced_rows
-from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.budget import UNLIMITED, Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.ball_cut import decide_on_sphere, fill_on_sphere
 from engine.segment_clipping.cohen_sutherland import decide_on_boxes
@@ -146,9 +146,11 @@ def clip_segments(
     array: Any = segments
     solid: Any = region  # with a plan, one of ours
     if plan is None or not is_ready(array, 2, solid.dimension):
-        region = as_solid(region, "region")
-        plan = plan_for(region)
-        array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks at it
+        with reading(deadline, cancel) as reader:
+            region = as_solid(region, "region")
+            plan = plan_for(region)
+            array = as_point_groups(array, 2, region.dimension, ("segments",), must_be_finite=False)  # `cut` looks
+        deadline = reader.left()
     if is_free and len(array) <= plan.few:
         clipped, n_beyond, n_rational = plan.cut(array, region, plan, UNLIMITED, workers, None)
     else:

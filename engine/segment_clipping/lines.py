@@ -15,7 +15,7 @@ import numpy as np
 
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.errors import EngineError, InvalidInputError
-from engine.running.budget import UNLIMITED, Budget, Cancel
+from engine.running.budget import UNLIMITED, Budget, Cancel, polled, reading
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.segment_clipping.clip_segments import plan_for
 from engine.segment_clipping.on_boundary.contacts import are_same
@@ -25,6 +25,7 @@ from engine.solids.accepted import LinesLike, SolidLike
 from engine.solids.checks import as_points, shown
 from engine.solids.geometries import lines_in, note_altitude
 from engine.solids.pictures import Pictured
+from engine.solids.poses import axes_of
 from engine.solids.ragged import Ragged, as_lines
 from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FlagArray, FloatArray, IntArray, read_only
@@ -167,17 +168,18 @@ def clip_lines(
     if not isinstance(keep, str) or keep not in ("inside", "outside"):
         raise InvalidInputError(f"keep must be inside or outside, got {shown(keep)}", ("keep",))
     is_free = is_unlimited(workers, deadline, cancel, progress)
-    region = as_solid(region, "region")
-    plan = plan_for(region)
-    try:
-        listed = lines_in(lines)
-    except EngineError as error:
-        raise error.at("lines") from None
-    if listed and region.dimension == 2 and isinstance(listed[0], (list, tuple, np.ndarray)) and len(listed[0]):
-        if len(listed[0][0]) == 3:  # positions of other lengths beside it are refused below
-            note_altitude("lines")
-            listed = [as_points(line, 3, ("lines", k))[:, :2] for k, line in enumerate(listed)]
-    vertices, offsets = as_lines(lines if listed is None else listed, region.dimension)
+    with reading(deadline, cancel) as reader:
+        region = as_solid(region, "region")
+        plan = plan_for(region)
+        try:
+            listed = lines_in(lines)
+        except EngineError as error:
+            raise error.at("lines") from None
+        if listed and region.dimension == 2 and axes_of(listed) == 3 and len(listed[0]) and len(listed[0][0]) == 3:
+            note_altitude("lines")  # positions of other lengths beside it are refused
+            listed = [as_points(line, 3, ("lines", k))[:, :2] for k, line in enumerate(polled(listed))]
+        vertices, offsets = as_lines(lines if listed is None else listed, region.dimension)
+    deadline = reader.left()
     firsts = np.arange(len(vertices) - 1) if len(offsets) == 2 else _firsts_of(offsets, len(vertices))
     segments = np.empty((len(firsts), 2, region.dimension))
     segments[:, 0], segments[:, 1] = vertices[firsts], vertices[firsts + 1]

@@ -14,6 +14,8 @@ _PLAIN: Final = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygo
 MEMBERS: Final = {"GeometryCollection": "geometries", "Feature": "geometry", "FeatureCollection": "features"}
 """Where collections have what they are made of."""
 _DEEPEST: Final = 32
+_MOST_REPEATED: Final = 1 << 20
+"""Members that are walked of lists that were walked before: a few shared lists within each other have 2^31 of them."""
 _NEVER: Final = frozenset({list, tuple, float, int, str, np.ndarray})
 
 
@@ -37,34 +39,47 @@ def geometry_of(value: Any) -> Mapping[str, Any] | None:
 Path = tuple[str | int, ...]
 
 
-def geometries_in(
-    value: Mapping[str, Any], where: Path = (), depth: int = _DEEPEST, seen: set[int] | None = None
-) -> Iterator[tuple[Path, Any]]:
+def geometries_in(value: Mapping[str, Any], where: Path = (), once: bool = False) -> Iterator[tuple[Path, Any]]:
     """Yield the plain geometries of a GeoJSON object with their paths, those within collections and features too, and
-    None for each that is null. seen: collections that were walked, each by its id, not to be walked again."""
+    None for each that is null. once: what is there several times is walked only once."""
+    return _walked(value, where, _DEEPEST, dict[int, Any](), once)
+
+
+def _walked(
+    value: Mapping[str, Any], where: Path, depth: int, walked: dict[int, Any], once: bool
+) -> Iterator[tuple[Path, Any]]:
+    """Do so. walked: lists of members by id, and at 0 the number of members of those that were there again."""
     kind = value.get("type")
     if isinstance(kind, str) and kind in _PLAIN:
         yield where, value
         return
     if depth == 0 or not isinstance(kind, str) or kind not in MEMBERS:
-        what = repr(kind[:60]) if isinstance(kind, str) else f"a {type(kind).__name__}"
+        what = repr(kind[:60]) if isinstance(kind, str) else "no text"
         raise InvalidInputError(f"type is {what}: no geometry of GeoJSON that is taken here", (*where, "type"))
-    if seen is not None:
-        if id(value) in seen:
-            return
-        seen.add(id(value))
     member = MEMBERS[kind]
     inner: Any = value.get(member)
     if kind != "Feature" and not isinstance(inner, (list, tuple)):
         raise InvalidInputError(
             f"{member} of a {kind} must be GeoJSON, a list, got {type(inner).__name__}", (*where, member)
         )
+    if kind != "Feature":
+        if id(inner) in walked:
+            walked[0] = walked.get(0, 0) + 1 + len(inner)
+            if once:
+                return
+            if walked[0] > _MOST_REPEATED:
+                raise InvalidInputError(
+                    f"collections that are there several times have more than {_MOST_REPEATED} members together; "
+                    "give each geometry once",
+                    where,
+                )
+        walked[id(inner)] = inner
     for number, each in enumerate(polled([inner] if kind == "Feature" else inner)):
         place = (*where, member) if kind == "Feature" else (*where, member, number)
         if each is None:
             yield place, None
         elif isinstance(each, Mapping):
-            yield from geometries_in(each, place, depth - 1, seen)
+            yield from _walked(each, place, depth - 1, walked, once)
         else:
             raise InvalidInputError(f"{member} of a {kind} must be GeoJSON, got {type(each).__name__}", place)
 
@@ -77,7 +92,8 @@ def coordinates_of(geometry: Mapping[str, Any], where: Path = ()) -> Any:
 def as_list(value: Any, where: Path) -> Any:
     """Return a list, tuple or array of one axis or more. Raises: InvalidArrayError for anything else."""
     if not isinstance(value, (list, tuple)) and not (isinstance(value, np.ndarray) and value.ndim):
-        raise InvalidArrayError(f"coordinates must be nested lists of positions, got {type(value).__name__}", where)
+        got = "null" if value is None else f"a value of type {type(value).__name__}"
+        raise InvalidArrayError(f"coordinates must be nested lists of positions, got {got}", where)
     return value
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.solids.geometries import geometries_in
 from engine.types import FloatArray
 
-_SIZE: Final = 240
-"""Pixels of a view's longer side."""
+_INNER: Final = 224
+_EDGE: Final = 8
+_SIZE: Final = _INNER + 2 * _EDGE
+"""Pixels of a view's longer side, and of its edge."""
 _MOST: Final = 20_000
 """Positions, or edges of a mesh, that are drawn; of more only some, evenly."""
 _LINE: Final = 'fill="none" stroke="#2f4b6e" vector-effect="non-scaling-stroke"'
@@ -43,14 +45,16 @@ class Pictured:
 
 def svg_of(geometry: Any) -> str:
     """Return a GeoJSON geometry as SVG, y upward."""
-    paths = [(np.asarray(line, np.float64)[:, :2], is_area) for line, is_area in _lines_in(geometry)]
+    paths = [(np.asarray(line, np.float64)[:, :2], is_area) for line, is_area in _lines_in(geometry) if len(line)]
+    paths = paths[:: 1 + len(paths) // _MOST]
     n_positions = sum(len(line) for line, _ in paths)
     every = 1 + n_positions // _MOST
-    drawn = [(line[::every] if len(line) > 8 * every else line, is_area) for line, is_area in paths]
-    areas = " ".join(_path(line) + "Z" for line, is_area in drawn if is_area)
-    lines = " ".join(_path(line) for line, is_area in drawn if not is_area)
+    view = _view_of([line for line, _ in paths])
+    drawn = [(view.path(line[::every] if len(line) > 8 * every else line), is_area) for line, is_area in paths]
+    areas = " ".join(line + "Z" for line, is_area in drawn if is_area)
+    lines = " ".join(line for line, is_area in drawn if not is_area)
     marks = f'<path d="{areas}" {_AREA}/>' * bool(areas) + f'<path d="{lines}" {_LINE}/>' * bool(lines)
-    return _svg([(marks, _box(drawn))])
+    return _svg([(marks, view)])
 
 
 def svg_of_mesh(vertices: FloatArray, triangles: Any) -> str:
@@ -60,8 +64,8 @@ def svg_of_mesh(vertices: FloatArray, triangles: Any) -> str:
     views = []
     for x, y in ((0, 1), (0, 2), (1, 2)):
         ends = vertices[some][:, :, [x, y]]
-        d = "".join(map(_path, ends))
-        views.append((f'<path d="{d}" {_LINE}/>', _box([(ends.reshape(-1, 2), False)])))
+        view = _view_of([*ends])
+        views.append((f'<path d="{"".join(map(view.path, ends))}" {_LINE}/>', view))
     return _svg(views)
 
 
@@ -77,29 +81,35 @@ def _lines_in(geometry: Any) -> Iterator[tuple[Any, bool]]:
             yield from (([point, point], False) for point in ([at] if kind == "Point" else at))
 
 
-def _path(line: FloatArray) -> str:
-    return "M" + "L".join(f"{x:.6g},{-y:.6g}" for x, y in line.tolist())
+class _View(NamedTuple):
+    """What of the plane is drawn: pixels are (position - low) * scale, computed with halves, which do not overflow."""
+
+    low: FloatArray
+    scale: float
+    size: FloatArray
+    """Pixels, without the edge."""
+
+    def path(self, line: FloatArray) -> str:
+        across = (line / 2 - self.low / 2) * self.scale
+        return "M" + "L".join(f"{x:.6g},{self.size[1] - y:.6g}" for x, y in across.tolist())
 
 
-def _box(paths: list[tuple[FloatArray, bool]]) -> FloatArray:
-    """Return low and high of what is drawn."""
-    points = np.concatenate([line for line, _ in paths] or [np.zeros((1, 2))])
-    return np.array([points.min(axis=0), points.max(axis=0)])
+def _view_of(lines: list[FloatArray]) -> _View:
+    """Return the view of lines that shows all."""
+    points = np.concatenate(lines or [np.zeros((1, 2))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = high / 2 - low / 2
+    extent = max(float(half.max()), 1e-300)
+    scale = _INNER / extent
+    return _View(low, scale, half * scale)
 
 
-def _svg(views: list[tuple[str, FloatArray]]) -> str:
+def _svg(views: list[tuple[str, _View]]) -> str:
     """Return views side by side, each its marks and what of the plane it shows."""
     parts, x = [], 0.0
-    for marks, (low, high) in views:
-        with np.errstate(over="ignore"):
-            size = np.maximum(high - low, np.abs(high).max() * 1e-9)
-        size = np.where((size > 0) & np.isfinite(size), size, 1.0)
-        edge = 0.04 * size.max()
-        wide, tall = (size + 2 * edge).tolist()
-        scale = _SIZE / max(wide, tall)
-        box = f"{low[0] - edge:.6g} {-high[1] - edge:.6g} {wide:.6g} {tall:.6g}"
-        parts.append(
-            f'<svg x="{x:.6g}" width="{wide * scale:.6g}" height="{tall * scale:.6g}" viewBox="{box}">{marks}</svg>'
-        )
-        x += wide * scale + 8
+    for marks, view in views:
+        wide, tall = (view.size + 2 * _EDGE).tolist()
+        box = f"{-_EDGE} {-_EDGE} {wide:.6g} {tall:.6g}"
+        parts.append(f'<svg x="{x:.6g}" width="{wide:.6g}" height="{tall:.6g}" viewBox="{box}">{marks}</svg>')
+        x += wide + 8
     return f'<svg xmlns="http://www.w3.org/2000/svg" width="{x:.6g}" height="{_SIZE}">{"".join(parts)}</svg>'

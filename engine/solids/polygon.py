@@ -12,7 +12,7 @@ from engine.errors import EngineError, InvalidArrayError, RingTooShortError
 from engine.running.budget import Budget, Cancel
 from engine.solids.base import Solid, T
 from engine.solids.checks import as_nested_offsets, as_points, check_finite, check_not_empty, frozen, is_ready
-from engine.solids.geometries import lines_in
+from engine.solids.geometries import geometry_of, lines_in
 from engine.solids.pictures import Pictured, svg_of
 from engine.types import FloatArray, IntArray
 
@@ -67,7 +67,7 @@ class Polygon(Pictured, Solid):
     """The function from any GeoJSON to a polygon, None for what is none; set by `engine.solids.shapes`."""
 
     def __init__(self, rings: object, *, deadline: float | None = None, cancel: Cancel | None = None) -> None:
-        if isinstance(rings, dict) or hasattr(rings, "__geo_interface__"):
+        if not isinstance(rings, (list, tuple, np.ndarray)) and geometry_of(rings) is not None:
             with Budget(deadline, cancel) as budget:
                 budget.check()
                 read = Polygon._from_geojson(rings, budget)

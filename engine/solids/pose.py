@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from engine.errors import InvalidArrayError, NotRigidError, WrongDimensionError
+from engine.errors import EngineError, InvalidArrayError, NotRigidError, WrongDimensionError
 from engine.predicates.rational import scaled_integers
 from engine.solids.base import Immutable
 from engine.solids.checks import (
@@ -246,7 +246,11 @@ class Pose(Immutable):
                 f"matrix[{n - 1}] = {digits(rows[-1])} must be 0 ... 0 1; transpose a matrix whose last column is that",
                 ("matrix", n - 1),
             )
-        return cls(rows[:-1, :-1], rows[:-1, -1], tolerance=tolerance, rounded=rounded)
+        try:
+            return cls(rows[:-1, :-1], rows[:-1, -1], tolerance=tolerance, rounded=rounded)
+        except EngineError as error:
+            error.where = ("matrix",) if error.where[:1] == ("rotation",) else error.where
+            raise
 
     @classmethod
     def of_checked(cls, rotation: FloatArray, translation: FloatArray) -> Pose:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, ClassVar, overload
 
 import numpy as np
 
 from engine.errors import EngineError, InvalidArrayError, WrongDimensionError
+from engine.running.budget import polled
 from engine.solids.base import Immutable
 from engine.solids.checks import as_floats, check_dimension, frozen, shown, spell
 from engine.solids.pose import Pose, checked_tolerance, rounded_tolerance
@@ -57,7 +59,7 @@ class Poses(Immutable):
         self, rotations: Any, translations: object = None, *, tolerance: float = 1e-12, rounded: bool = False
     ) -> None:
         if translations is None:
-            if isinstance(rotations, np.ndarray) and rotations.ndim == 3:
+            if isinstance(rotations, np.ndarray) and rotations.ndim == 3 and rotations.shape[1] > 2:
                 turns, moves = as_pose_arrays(rotations, rotations.shape[1] - 1)
             else:
                 turns, moves = as_pose_arrays(rotations, None)
@@ -77,7 +79,7 @@ class Poses(Immutable):
             raise InvalidArrayError(
                 f"{name} and translations must be equally many, got {len(items)} and {len(moves)}", ("translations",)
             )
-        for number, item in enumerate(items):
+        for number, item in enumerate(polled(items)):
             try:
                 made.append(make(item) if moves is None else make(item, moves[number]))
             except EngineError as error:
@@ -173,7 +175,8 @@ class Poses(Immutable):
     def __getitem__(self, index: slice) -> Poses: ...
     def __getitem__(self, index: int | slice) -> Pose | Poses:
         if not isinstance(index, slice):
-            return Pose.of_checked(self.rotations[index], self.translations[index])
+            k = operator.index(index)
+            return Pose.of_checked(self.rotations[k], self.translations[k])
         some = object.__new__(Poses)
         object.__setattr__(some, "rotations", frozen(self.rotations[index]))
         object.__setattr__(some, "translations", frozen(self.translations[index]))
@@ -243,7 +246,7 @@ def as_pose_arrays(poses: Any, dimension: int | None) -> tuple[FloatArray, Float
         raise InvalidArrayError(
             f"poses cannot be listed: {type(error).__name__}: {error!s:.100}", ("poses",)
         ) from error
-    made = [as_pose(each, dimension, "poses", number) for number, each in enumerate(items)]
+    made = [as_pose(each, dimension, "poses", number) for number, each in enumerate(polled(items))]
     size = dimension or (made[0].dimension if made else 3)
     for number, each in enumerate(made):
         if each.dimension != size:
@@ -260,7 +263,7 @@ def check_pose_arrays(
 ) -> tuple[FloatArray, FloatArray]:
     """Return rotations (n, d, d) and translations (n, d) of finite doubles after all other checks, those farther from
     a rotation than 1e-12 replaced by the nearest ones. dimension: None for that of the rotations."""
-    size = dimension or (turns.shape[1] if len(turns) else 3)
+    size = dimension or (turns.shape[1] if len(turns) or turns.shape[1:] == (2, 2) else 3)
     if dimension is None:
         check_dimension(size, None, ("rotations",))
     if len(turns) and turns.shape[1:] != (size, size):
@@ -273,7 +276,7 @@ def check_pose_arrays(
         )
     if tolerance != 1e-12:
         made = []
-        for number, turn in enumerate(turns):
+        for number, turn in enumerate(polled(turns)):
             try:
                 made.append(Pose(turn, tolerance=tolerance).rotation)
             except EngineError as error:

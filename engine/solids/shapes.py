@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.errors import EngineError, InvalidArrayError, InvalidInputError, UnsupportedSolidError
-from engine.running.budget import UNLIMITED, Budget
+from engine.running.budget import Budget, current, polled
 from engine.solids.base import Solid
 from engine.solids.checks import Where, as_points, shown, spell
 from engine.solids.geometries import MEMBERS, as_list, coordinates_of, geometries_in, geometry_of, note_altitude
@@ -44,7 +44,7 @@ def as_solid(value: object, *where: str | int) -> Solid:
     if isinstance(value, Solid):
         return value
     try:
-        solid = _from_geojson(value, UNLIMITED) or _from_mesh(value) or _from_arrays(value)
+        solid = _from_geojson(value, current()) or _from_mesh(value) or _from_arrays(value)
     except EngineError as error:
         raise error.at(*where) from None
     except (MemoryError, KeyboardInterrupt, Warning):
@@ -75,7 +75,7 @@ def as_solids(values: Any, *where: str | int) -> Sequence[Any]:
         values = [Polygon([]) if each is None else each for each in members]  # a null geometry of a Feature: the same
     if all(issubclass(kind, Solid) for kind in set(map(type, values))):
         return values
-    return [as_solid(each, *where, number) for number, each in enumerate(values)]
+    return [as_solid(each, *where, number) for number, each in enumerate(polled(values))]
 
 
 def _from_geojson(value: Any, budget: Budget) -> Polygon | None:
@@ -85,7 +85,7 @@ def _from_geojson(value: Any, budget: Budget) -> Polygon | None:
         return None
     plane: list[Any] = []
     has_altitude = False
-    for place, each in geometries_in(geometry, seen=set()):  # a part that is there twice adds nothing
+    for place, each in geometries_in(geometry, once=True):  # a part that is there twice adds nothing
         if each is None:
             continue
         kind = each["type"]

@@ -31,6 +31,14 @@ def to_solid(model: solids.Solid, call: Call, where: Where) -> Solid:
         return _Builder(call).build(model, where, 1)
 
 
+def to_solids(models: Any, call: Call, name: str) -> list[Solid]:
+    """Return the solids of a list, or of the members of GeoJSON in its place. name: of the field."""
+    where: Where = (name,)
+    if isinstance(models, FromGeoJson):
+        models, where = models.value, (name, models.name)
+    return [to_solid(model, call, (*where, k)) for k, model in enumerate(models)]
+
+
 class _Builder:
     """Builds one solid and counts the members of its CSG tree."""
 
@@ -205,14 +213,25 @@ def _rewrite_error_paths(error: EngineError, name: str, parts: dict[str, str]) -
 def existing(question: Any, where: Where) -> Where:
     """Return `where` as far as the request has it: an engine's error may lead into a stored solid."""
     value, path = question, []
-    for part in where:
+    for number, part in enumerate(where):
         value = value.root if isinstance(value, RootModel) else value
+        if isinstance(value, FromGeoJson):
+            return (*path, *_within_geojson(value, where[number:]))
         try:
             value = getattr(value, str(part)) if isinstance(value, BaseModel) else value[part]
         except (AttributeError, IndexError, KeyError, TypeError):
             break
         path.append(part)
     return tuple(path)
+
+
+def _within_geojson(value: FromGeoJson, where: Where) -> Where:
+    """Return a path below GeoJSON, of which a number means one of the items that were made of it."""
+    if isinstance(where[0], str):
+        return where
+    if value.name in ("points", "lines"):
+        return ()
+    return (value.name, where[0]) if value.name else value.value[where[0]][0]
 
 
 def is_light(question: Any) -> bool:

@@ -167,10 +167,8 @@ def overlay(question: OverlayRequest, call: CallOf) -> OverlayResponse:
 @router.post("/v1/overlay/batch", operation_id="overlay_batch", tags=["clipping"])
 def overlay_batch(question: OverlayBatchRequest, call: CallOf) -> OverlayBatchResponse:
     """Combine pairs of polygons, each subject with the clip in its place."""
-    subjects, clips = (
-        [questions.to_solid(model, call, (name, k)) for k, model in enumerate(models)]
-        for name, models in (("subjects", question.subjects), ("clips", question.clips))
-    )
+    subjects = questions.to_solids(question.subjects, call, "subjects")
+    clips = questions.to_solids(question.clips, call, "clips")
     result = call.compute(engine.overlay_batch, subjects, clips, question.operation)
     return areas.from_overlays(*result)
 

@@ -36,6 +36,15 @@ KNOWN: Final[dict[int | str, dict[str, Any]]] = {
     304: {"description": "The client has it: one of the tags in If-None-Match is the id."}
 }
 
+_LEFT_OUT: Final[Any] = None
+WeldQuery = Annotated[
+    float,
+    Query(
+        description="For a file: first make one of vertices that are at most so far apart.",
+        json_schema_extra={"format": "double"},
+    ),
+]
+MendQuery = Annotated[bool, Query(description="For a file: as the field of this name in JSON.")]
 Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/solids`.")]
 
 
@@ -79,21 +88,35 @@ def put(value: Stored, call: Call) -> str:
     responses=responses(501),
     openapi_extra={"requestBody": {"content": octets.FILES_IN}},
 )
-def inspect_solid(question: InspectRequest, call: CallOf) -> InspectResponse:
+def inspect_solid(
+    question: InspectRequest,
+    call: CallOf,
+    weld: WeldQuery = _LEFT_OUT,
+    orient: MendQuery = False,
+    fill_t_junctions: MendQuery = False,
+) -> InspectResponse:
     """Tell what keeps a mesh from being a closed solid: open edges, T-junctions, crossings and more, each with its
-    places and what would mend it. A file is inspected as it is."""
-    names = ("weld", "orient", "fill_t_junctions")
-    options = {name: getattr(question, name) for name in names if getattr(question, name)}
+    places and what would mend it. A file is inspected as it is, or after the mends of the query."""
+    options = _mends(weld, orient, fill_t_junctions)
+    options |= _mends(question.weld, question.orient, question.fill_t_junctions)
     report = call.compute(_inspected, (question.vertices, question.faces), **options)
     return answers.from_inspection(*report, bool(options))
 
 
-def inspect_file(question: Any, content_type: str, call: Call) -> InspectResponse:
+def inspect_file(question: Any, content_type: str, call: Call, **mends: Any) -> InspectResponse:
     """Inspect a mesh that came as a file, or in a form, in place of JSON."""
     file, kind, _ = octets.file_in(question, content_type, call)
     with call.phase("decode"):
         mesh = mesh_reader.read(file, kind, call)
-    return answers.from_inspection(*call.compute(_inspected, mesh), True)
+    return answers.from_inspection(*call.compute(_inspected, mesh, **_mends(**mends)), True)
+
+
+def _mends(
+    weld: float | None = None, orient: bool | None = None, fill_t_junctions: bool | None = None
+) -> dict[str, Any]:
+    """Return the options of `engine.inspect` that are asked for; a distance of 0 is one."""
+    given = {"weld": weld, "orient": orient or None, "fill_t_junctions": fill_t_junctions or None}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 inspect_solid.upload = inspect_file  # type: ignore[attr-defined]

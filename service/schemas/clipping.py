@@ -8,7 +8,7 @@ from pydantic import Field, WithJsonSchema
 
 from service.schemas.arrays import DIMENSION, PAIR, POINTS, Array, Axis, Numbers
 from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
-from service.schemas.geojson import OrGeoJson
+from service.schemas.geojson import OrGeoJson, OrMembers
 from service.schemas.solids import Indices, Number, Position, Segments, Solid
 
 
@@ -173,8 +173,12 @@ class OverlayBatchRequest(Schema):
         }
     )
 
-    subjects: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="Polygons.")
-    clips: Annotated[list[Solid], AtMost("max_polygons")] = Field(description="As many polygons, each for one subject.")
+    subjects: Annotated[list[Solid], AtMost("max_polygons"), OrMembers()] = Field(
+        description="Polygons. Or GeoJSON: a FeatureCollection or GeometryCollection, a polygon each member."
+    )
+    clips: Annotated[list[Solid], AtMost("max_polygons"), OrMembers()] = Field(
+        description="As many polygons, each for one subject."
+    )
     operation: Operation = Field(
         description="How the two of each pair are combined; difference is the subject without the clip."
     )

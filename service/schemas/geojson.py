@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final, Literal, NamedTuple
 from pydantic import ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, WithJsonSchema
 from pydantic_core import PydanticCustomError, core_schema
 
+from service.errors import faults_of_validation
 from service.schemas.arrays import Fault, Path, limit_sentence
 from service.schemas.base import Schema, optional, with_example
 
@@ -108,6 +109,26 @@ def _geometries(value: dict[str, Any], where: Path, depth: int) -> Iterator[tupl
         yield from _geometries(each, place, depth - 1)
 
 
+class OrMembers:
+    """Annotation of a list of solids that a FeatureCollection or GeometryCollection may stand for."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.with_info_wrap_validator_function(self._read, handler(source))
+
+    def _read(
+        self, value: Any, handler: core_schema.ValidatorFunctionWrapHandler, info: core_schema.ValidationInfo
+    ) -> Any:
+        if not isinstance(value, dict):
+            return handler(value)
+        member = _MEMBERS.get(str(value.get("type")), "")
+        if not isinstance(value.get(member), list):
+            raise _fault((), "expected a list of polygons, or a FeatureCollection or GeometryCollection of GeoJSON")
+        try:
+            return FromGeoJson(handler(value[member]), member)
+        except ValidationError as error:
+            raise _at(error, value[member], (member,)) from None
+
+
 def _read_polygons(
     value: Any, handler: core_schema.ValidatorFunctionWrapHandler, info: core_schema.ValidationInfo
 ) -> Any:
@@ -126,9 +147,21 @@ def _read_polygons(
     limit = len(items) if info.context is None else info.context.settings.max_polygons
     if len(items) > limit:
         raise _fault((), limit_sentence("max_polygons", limit, len(items)), "limit_exceeded")
-    return FromGeoJson([
-        ((*path, number), each if isinstance(each, dict) else handler([each])[0]) for number, each in enumerate(items)
-    ])  # fmt: skip
+    made = []
+    for number, each in enumerate(items):
+        place = (*path, number)
+        try:
+            made.append((place, each if isinstance(each, dict) else handler([each])[0]))
+        except ValidationError as error:
+            raise _at(error, [each], place, n_left_out=1) from None
+    return FromGeoJson(made)
+
+
+def _at(error: ValidationError, value: Any, place: Path, n_left_out: int = 0) -> PydanticCustomError:
+    """Return the error of a part of the request, with the part's place. value: what was checked; n_left_out: parts of
+    its paths, the first ones, that the place stands for."""
+    faults = [fault._replace(path=(*place, *fault.path[n_left_out:])) for fault in faults_of_validation(error, value)]
+    return PydanticCustomError("numbers", "{detail}", {"detail": faults[0].detail, "faults": faults})
 
 
 def _fault(path: Path, detail: str, code: str = "invalid_array") -> PydanticCustomError:

@@ -119,3 +119,11 @@ def test_the_repr_of_an_overlay_is_short() -> None:
     hole = Polygon([[(1, 1), (2, 1), (2, 2), (1, 2)]])
     assert repr(engine.overlay(SQUARE, hole, "difference")) == "<Overlay: 1 piece, 1 hole, 8 vertices>"
     assert np.isfinite(engine.overlay(SQUARE, hole).area)
+
+
+def test_locations_in_a_scene_are_rows_of_point_and_body() -> None:
+    box = engine.Aabb((0, 0), (1, 1))
+    table = engine.locate_scene([(0.5, 0.5), (9, 9), (1, 0.5)], [box, box]).to_pandas()
+    assert table.to_dict("list") == {
+        "point": [0, 0, 2, 2], "body": [0, 1, 0, 1], "on_boundary": [False, False, True, True],
+    }  # fmt: skip

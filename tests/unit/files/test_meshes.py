@@ -250,3 +250,29 @@ SHORT = ("3 1 0\n{}2 0 1\n", "3 1 0\n{}3 0 1\n", "3 2 0\n{}3 0 1 2\n", "3 1 0\n0
 def test_off_files_that_say_too_little_are_refused(text: str) -> None:
     with pytest.raises(engine.InvalidInputError, match="cannot be read as off"):
         engine.read_mesh(b"OFF " + text.format("0 0 0\n1 0 0\n0 1 0\n").encode(), "off")
+
+
+FLAT = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+SPOTS = b"0 0 0\n1 0 0\n0 1 0\n"
+
+
+@pytest.mark.parametrize(("octets", "file_format", "words"), [
+    (FLAT + b"f 1 2 99999999999999999999\n", None, "names vertex 9223372036854775807"),
+    (FLAT + b"f 1 2 1_3\n", None, "no numbers"),
+    (FLAT.replace(b"1", b"1_0", 1) + b"f 1 2 3\n", None, "no numbers"),
+    (b"OFF\n3 1 0\n" + SPOTS.replace(b"1", b"1_0", 1) + b"3 0 1 2\n", None, "numbers alone"),
+    (b"OFF\n-1 1 0\n" + SPOTS + b"3 0 1 2\n", None, "-1 vertices"),
+    (b"OFF\n3 -1 0\n" + SPOTS + b"3 0 1 2\n", None, "-1 faces"),
+    (b"4OFF\n3 1 0\n0 0 0 2\n1 0 0 2\n0 1 0 2\n3 0 1 2\n", "off", "begins with OFF"),  # of homogeneous coordinates
+    (b"solid of bytes".ljust(80) + b"\1\0\0\0" + bytes(52), None, "a binary file of 1 triangles has 134 bytes"),
+    (b"\x1f\x8b\b\0" + bytes(200), None, "compressed"),
+])  # fmt: skip
+def test_what_readers_would_take_wrongly_is_refused(octets: bytes, file_format: str | None, words: str) -> None:
+    with pytest.raises(engine.InvalidInputError, match=words):
+        engine.read_mesh(octets, file_format)
+
+
+def test_off_with_normals_and_colours() -> None:
+    for head, row in ((b"NOFF", b" 0 0 1"), (b"# made by\nCOFF", b" 255 0 0 255"), (b"STOFF", b" 0 1")):
+        octets = head + b"\n3 1 0\n" + SPOTS.replace(b"\n", row + b"\n") + b"3 0 1 2\n"
+        assert engine.read_mesh(octets).vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]

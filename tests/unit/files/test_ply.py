@@ -89,3 +89,25 @@ def test_points_alone_are_no_mesh() -> None:
     octets = header("ascii", 4, 0) + b"\n".join(b"0 0 %d 1" % k for k in range(4)) + b"\n7\n"
     with pytest.raises(engine.EmptyGeometryError, match="holds no faces"):
         engine.read_mesh(octets)
+
+
+def text_ply(corners: str, rows: str, axes: str = "xyz") -> bytes:
+    properties = "".join(f"property float {axis}\n" for axis in axes)
+    head = (
+        f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\nproperty list {corners} vertex_indices"
+    )
+    return f"{head}\nend_header\n0 0 0\n1 0 0\n0 1 0\n{rows}\n".encode()
+
+
+@pytest.mark.parametrize(("octets", "words"), [
+    (text_ply("uchar float", "3 0 1.5 2"), "a type of whole numbers"),
+    (text_ply("float int", "3 0 1 2"), "number of items of vertex_indices"),
+    (text_ply("uchar int", "0"), "face 0 of the file has 0 corners"),
+    (text_ply("uchar int", "2 0 1"), "face 0 of the file has 2 corners"),
+    (text_ply("uchar int", "3 0 1 99999999999999999999"), "names vertex 9223372036854775807"),
+    (text_ply("uchar int", "3 0 1 1_0"), "more than numbers"),
+    (text_ply("uchar int", "3 0 1 2", "xyw"), "properties x, y and z"),
+])  # fmt: skip
+def test_what_would_be_taken_wrongly_is_refused(octets: bytes, words: str) -> None:
+    with pytest.raises(engine.InvalidInputError, match=words):
+        engine.read_mesh(octets)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import engine
+from engine.files.meshes import read_mesh
 
 CORNERS = [(float(x), float(y), float(z)) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
 QUADS = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
@@ -197,3 +198,86 @@ def test_files_and_what_is_no_mesh(tmp_path: Path) -> None:
         engine.inspect((CORNERS, CUBE), orient="yes")  # type: ignore[arg-type]
     with pytest.raises(engine.DeadlineExceededError):
         engine.inspect((CORNERS, CUBE), deadline=0.0)
+
+
+def test_a_mesh_is_closed_only_if_a_polyhedron_is_made_of_it() -> None:
+    for faces in ([*CUBE, (0, 0, 1)], [(0, 0, 1)]):
+        report = engine.inspect((CORNERS, faces))
+        assert not report.is_closed
+        assert "weld=0.0" in report.advice["flat_faces"]
+    assert engine.inspect((CORNERS, [*CUBE, (0, 0, 1)]), weld=0.0).is_closed
+    gone = engine.inspect((CORNERS, CUBE), weld=9.0)
+    assert (len(gone.faces), gone.is_closed) == (0, False)
+
+
+def test_faces_without_area_are_left_out_where_filling_leaves_nothing_of_them() -> None:
+    corners = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)]
+    for flat in ((0, 0, 1), (0, 1, 2)):
+        faces = [(0, 1, 3), flat, *([(1, 0, 4)] if flat[1] else []), (2, 4, 3)]
+        report = engine.inspect((corners, faces), fill_t_junctions=True)
+        assert report.faces.tolist()[:2] == [[0, 2, 3], [2, 1, 3]]
+        assert "1 faces without area" in report.mended[0]
+        assert not any(len(set(face)) < 3 for face in report.faces.tolist())
+
+
+def test_vertices_on_an_edge_are_in_order_however_near_they_are() -> None:
+    """Beside 1 the two places differ by less than a rounding."""
+    corners = [(1.0, 0, 0), (-1.0, 0, 0), (0, 1, 0), (2e-17, 0, 0), (1e-17, 0, 0), (0, -1, 0), (0, -1, 1), (1, -1, 1)]
+    faces = [(0, 1, 2), (3, 5, 6), (4, 6, 7)]
+    report = engine.inspect((corners, faces))
+    assert report.t_junctions.tolist() == [[0, 1, 3], [0, 1, 4]]
+    assert engine.inspect((corners, faces), fill_t_junctions=True).faces.tolist()[:3] == [
+        [0, 3, 2],
+        [3, 4, 2],
+        [4, 1, 2],
+    ]
+
+
+def test_a_shell_whose_corners_are_all_on_another_lies_within_it() -> None:
+    inner = [(0.5, 0.5, 0.0), (0.5, 0.5, 1.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5)]
+    outward = [(a + 8, b + 8, c + 8) for a, b, c in [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]]
+    (volume,) = {np.sign(np.linalg.det([np.subtract(inner[k], inner[0]) for k in (1, 2, 3)]))}
+    inward = outward if volume > 0 else [face[::-1] for face in outward]
+    both = [[*CUBE, *each] for each in (inward, [face[::-1] for face in inward])]
+    found = [[shell.tolist() for shell in engine.inspect(([*CORNERS, *inner], each)).inverted_shells] for each in both]
+    assert sorted(map(len, found)) == [0, 1]
+    cavity = engine.inspect(([*CORNERS, *inner], both[found.index([])]))
+    assert engine.locate([(0.4, 0.4, 0.5)], cavity.solid()).tolist() == [-1]
+    tetrahedron = cavity.faces[12:] - 8
+    assert engine.inspect((inner, tetrahedron)).inverted_shells  # by itself it is inside out
+
+
+def test_weld_takes_pairs_at_the_distance_itself_and_many_at_once() -> None:
+    draw = np.random.default_rng(5)
+    for _ in range(20):
+        a, distance = draw.random(3) * draw.choice([1.0, 1e3]), float(draw.random())
+        b = a + np.array([distance, 0, 0])
+        exact = float(np.sqrt(np.square(a - b).sum()))
+        report = engine.inspect(([a, b, (9e9, 0, 0), (0, 9e9, 0)], [(0, 2, 3), (1, 2, 3)]), weld=exact)
+        assert report.faces.tolist() == [[0, 2, 3], [0, 2, 3]], (a, b)
+    spots = draw.random((400, 3))
+    faces = np.arange(399 // 3 * 3).reshape(-1, 3)
+    report = engine.inspect((spots, faces), weld=1e308)
+    assert len(report.faces) == 0
+    assert report.mended[0].startswith("weld: 398 vertices are made one with another")
+
+
+def test_files_and_mends_end_when_they_are_cancelled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readers of files, and every loop over faces, ask whether to go on."""
+    n = 3000
+    spots = "".join(f"{k} {k * k % 7} {k % 5}\n" for k in range(n))
+    rows = "".join(f"3 {k} {k + 1} {k + 2}\n" for k in range(n - 2))
+    files = [
+        f"OFF\n{n} {n - 2} 0\n{spots}{rows}",
+        "".join(f"v {row}\n" for row in spots.splitlines()) + "f 1 2 3\n" * n,
+        "solid\n" + "facet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendfacet\n" * n,
+        f"ply\nformat ascii 1.0\nelement vertex {n}\nproperty float x\nproperty float y\nproperty float z\n"
+        f"element face {n - 2}\nproperty list uchar int vertex_indices\nend_header\n{spots}{rows}",
+    ]
+    for text in files:
+        cancel = engine.Cancel()
+        monkeypatch.setattr(
+            "engine.inspection.inspect.read_mesh", lambda file, own=cancel: (own.set(), read_mesh(file))
+        )
+        with pytest.raises(engine.CancelledError):
+            engine.inspect(text.encode(), cancel=cancel)

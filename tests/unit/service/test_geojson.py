@@ -185,3 +185,72 @@ async def test_poses_that_are_none_are_refused_by_name(
     problem = check_problem(answer, 422, code)
     assert words in problem["detail"]
     assert problem["errors"][0]["pointer"].startswith("/poses/0")
+
+
+@pytest.mark.parametrize(("polygons", "code", "pointer"), [
+    ([POLYGON, [[[0, 0], [1, "a"], [1, 1]]]], "invalid_array", "/polygons/1/0/1/1"),
+    ([[SQUARE], POLYGON, [SQUARE, []]], "empty_geometry", "/polygons/2/1"),
+    ([POLYGON, 7], "invalid_request", "/polygons/1"),
+    ({"type": "GeometryCollection", "geometries": [POLYGON, [[[0, 0], [1, None], [1, 1]]]]}, "invalid_array",
+     "/polygons/geometries/1/0/1/1"),
+    (collection(POLYGON, {"type": "Polygon", "coordinates": [[[0, 0], [1, "a"], [1, 1]]]}), "invalid_array",
+     "/polygons/features/1/geometry/coordinates/0/1/1"),
+    (collection(POLYGON, None), "empty_geometry", "/polygons/features/1"),
+])  # fmt: skip
+async def test_pointers_into_a_list_of_polygons(
+    client: httpx.AsyncClient, polygons: Any, code: str, pointer: str
+) -> None:
+    half = {"type": "half_space", "normal": [-1, 0], "offset": 1}
+    problem = check_problem(
+        await client.post("/v1/clip/polygons", json={"region": half, "polygons": polygons}), 422, code
+    )
+    assert problem["errors"][0]["pointer"] == pointer, problem
+
+
+async def test_collections_in_place_of_subjects_and_clips(client: httpx.AsyncClient) -> None:
+    """As `overlay_batch` takes them: a member a polygon, an empty one where a feature has no geometry."""
+    beside = {"type": "Polygon", "coordinates": [BESIDE]}
+    many = {"type": "GeometryCollection", "geometries": [beside, POLYGON, beside]}
+    body = {"subjects": collection(POLYGON, None, POLYGON), "clips": many, "operation": "intersection"}
+    answer = await client.post("/v1/overlay/batch", json=body)
+    assert [len(each["pieces"]) for each in answer.json()["overlays"]] == [1, 0, 1], answer.text
+    listed = {**body, "subjects": [POLYGON, {"type": "polygon", "rings": []}, POLYGON], "clips": many["geometries"]}
+    assert (await client.post("/v1/overlay/batch", json=listed)).json()["overlays"] == answer.json()["overlays"]
+
+
+BAD = {"type": "Polygon", "coordinates": [[[0, 0], [1, "a"], [1, 1]]]}
+
+
+@pytest.mark.parametrize(("subjects", "code", "pointer"), [
+    (collection(POLYGON, BAD), "invalid_array", "/subjects/features/1/geometry/coordinates/0/1/1"),
+    ({"type": "GeometryCollection", "geometries": [POLYGON, None]}, "invalid_request", "/subjects/geometries/1"),
+    ({"type": "GeometryCollection", "geometries": [POLYGON, {"type": "x"}]}, "unknown_type",
+     "/subjects/geometries/1"),
+    ({"type": "GeometryCollection", "geometries": [{"type": "Polygon", "coordinates": [SQUARE]}, {**POLYGON, "type":
+     "polygon"}]}, "missing_field", "/subjects/geometries/1/rings"),
+    ({"type": "GeometryCollection", "geometries": 7}, "invalid_array", "/subjects"),
+    (POLYGON, "invalid_array", "/subjects"),
+    ({"type": ["Feature"]}, "invalid_array", "/subjects"),
+    ({}, "invalid_array", "/subjects"),
+])  # fmt: skip
+async def test_pointers_into_collections_of_subjects(
+    client: httpx.AsyncClient, subjects: Any, code: str, pointer: str
+) -> None:
+    body = {"subjects": subjects, "clips": [POLYGON, POLYGON], "operation": "union"}
+    problem = check_problem(await client.post("/v1/overlay/batch", json=body), 422, code)
+    assert problem["errors"][0]["pointer"] == pointer, problem
+
+
+async def test_a_matrix_at_fault_is_named_as_a_matrix(client: httpx.AsyncClient) -> None:
+    poses = [{"matrix": [[2, 0, 0, 0], *UP[1:]]}]
+    problem = check_problem(
+        await client.post("/v1/collide", json={"first": CUBE, "second": CUBE, "poses": poses}), 422, "not_rigid"
+    )
+    assert problem["errors"][0]["pointer"] == "/poses/0/matrix"
+
+
+async def test_null_is_called_null(client: httpx.AsyncClient) -> None:
+    for coordinates in (None, [[None]]):
+        solid = {"type": "Polygon", "coordinates": coordinates}
+        answer = await client.post("/v1/contains", json={"solid": solid, "points": []})
+        assert "NoneType" not in check_problem(answer, 422, "invalid_array")["detail"]

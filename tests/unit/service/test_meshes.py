@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from pathlib import Path
@@ -112,3 +113,31 @@ def test_a_reader_that_is_late_is_no_lost_reader(monkeypatch: pytest.MonkeyPatch
     call = Call(Settings(deadline_seconds=0.1), Store(1), Memory(1 << 30))
     with pytest.raises(engine.DeadlineExceededError):
         mesh_reader.read(b"v 0 0 0\n", "obj", call)
+
+
+def end_at_once(*_: object) -> None:
+    """A reader that is killed, or meets a fault of the interpreter."""
+    os._exit(9)
+
+
+def test_a_reader_that_is_lost_ends_the_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing comes through its pipe: the call ends then, and not at its deadline."""
+    monkeypatch.setattr(mesh_reader, "_child", end_at_once)
+    call = Call(Settings(deadline_seconds=300), Store(1), Memory(1 << 30))
+    start = time.monotonic()
+    with pytest.raises(ServiceError, match="ended without an answer"):
+        mesh_reader.read(b"v 0 0 0\n", "obj", call)
+    assert time.monotonic() - start < 150
+
+
+def test_a_lost_server_of_readers_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: Any = mesh_reader.context()
+
+    def refuse(_: object) -> None:
+        raise EOFError("unexpected EOF")
+
+    monkeypatch.setattr(started.Process, "start", refuse)
+    call = Call(Settings(), Store(1), Memory(1 << 30))
+    with pytest.raises(ServiceError, match="did not start or was lost") as raised:
+        mesh_reader.read(b"solid", "stl", call)
+    assert raised.value.code == "out_of_memory"

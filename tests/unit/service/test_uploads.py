@@ -111,3 +111,60 @@ async def test_what_cannot_be_inspected_is_refused(client: httpx.AsyncClient) ->
     check_problem(await client.post("/v1/solids/inspect", json={**MESH, "weld": -1}), 422, "invalid_input")
     headers = {"content-type": "model/stl"}
     check_problem(await client.post("/v1/solids/inspect", content=b"x", headers=headers), 422, "invalid_mesh")
+
+
+MENDS = [
+    (OPEN, "", [], 3),
+    (OFF.replace("3 0 2 1", "3 0 1 2"), "orient=true", ["orient: 1 faces are turned"], 0),
+    (OFF, "orient=false", [], 0),
+    (OPEN, "fill_t_junctions=true", ["fill_t_junctions: 0 sides of faces are split at the vertices on them"], 3),
+    (
+        OFF,
+        "weld=0",
+        ["weld: 0 vertices are made one with another, moved by 0.0 at most on an axis; 0 faces collapsed"],
+        0,
+    ),
+    (OFF, "weld=2&orient=1", ["weld: 3 vertices", "orient: 0 faces"], 0),
+]
+
+
+@pytest.mark.parametrize(("text", "query", "mended", "n_open"), MENDS)
+async def test_a_file_is_inspected_after_the_mends_of_the_query(
+    client: httpx.AsyncClient, text: str, query: str, mended: list[str], n_open: int
+) -> None:
+    for question in ({"content": text, "headers": {"content-type": "model/off"}}, {"files": {"file": ("a.off", text)}}):
+        answer = await client.post(f"/v1/solids/inspect?{query}", **question)  # type: ignore[arg-type]
+        assert answer.status_code == 200, answer.text
+        assert len(answer.json()["open_edges"]) == n_open
+        said = answer.json()["mended"]
+        assert len(said) == len(mended)
+        assert all(sentence.startswith(begun) for sentence, begun in zip(said, mended, strict=True)), said
+
+
+@pytest.mark.parametrize("query", ["weld=-1", "weld=nan", "weld=x", "orient=perhaps", "weld="])
+async def test_mends_that_are_none_are_refused(client: httpx.AsyncClient, query: str) -> None:
+    answer = await client.post(f"/v1/solids/inspect?{query}", content=OFF, headers={"content-type": "model/off"})
+    assert check_problem(answer, 422, answer.json()["code"])["code"] in ("invalid_request", "invalid_input")
+
+
+async def test_a_distance_of_zero_is_one(client: httpx.AsyncClient) -> None:
+    """Faces that name a vertex twice are left out; a polyhedron is not taken with them."""
+    mesh = {**MESH, "faces": [*FACES, (0, 0, 1)]}
+    assert not (await client.post("/v1/solids/inspect", json=mesh)).json()["closed"]
+    answer = (await client.post("/v1/solids/inspect", json={**mesh, "weld": 0})).json()
+    assert (answer["closed"], len(answer["faces"])) == (True, 4)
+
+
+async def test_a_face_on_itself_is_filled(client: httpx.AsyncClient) -> None:
+    corners = [[1, 1, 1], [1, 0, 0], [0, 1, 1], [2, 1, 1]]
+    faces = [[2, 2, 3], [1, 2, 3], [0, 1, 2], [0, 2, 1], [3, 2, 0], [3, 2, 2], [2, 0, 1], [2, 3, 1], [0, 3, 3]]
+    answer = await client.post(
+        "/v1/solids/inspect", json={"vertices": corners, "faces": faces, "fill_t_junctions": True}
+    )
+    assert answer.status_code == 200, answer.text
+
+
+async def test_a_part_whose_headers_are_long_is_refused_at_once(client: httpx.AsyncClient) -> None:
+    form = b"--b\r\n" + b'; name="a"' * 90_000 + b"\r\n\r\nx\r\n--b--"
+    headers = {"content-type": "multipart/form-data; boundary=b"}
+    check_problem(await client.post("/v1/solids", content=form, headers=headers), 400, "bad_request")

@@ -103,3 +103,26 @@ def test_reprs_say_what_happened() -> None:
     assert repr(engine.clearance(CUBE, engine.Sphere((3, 0.5, 0.5), 1.0))) == "<Clearance: 1.0, face 1 to ball>"
     assert repr(engine.clearance(CUBE, CUBE)) == "<Clearance: 0.0>"
     assert repr(engine.collide(CUBE, engine.Aabb((1, 0, 0), (2, 1, 1)))) == "<Collision: touching, face_face 1 0>"
+
+
+@pytest.mark.parametrize("at", [(448262.0, 5411932.0), (1e15, -1e15), (0.0, 0.0), (-1.7e308, 1e308), (1e-320, 0.0)])
+def test_a_square_is_a_square_wherever_it_is(at: tuple[float, float]) -> None:
+    """Six digits of its coordinates would be all one."""
+    x, y = at
+    size = max(1.0, abs(x) * 2.0**-40) if x != 1e-320 else 1e-320
+    view = ElementTree.fromstring(
+        engine.Polygon([[(x, y), (x + size, y), (x + size, y + size), (x, y + size)]])._repr_svg_()
+    )[0]
+    drawn = [[float(z) for z in part.split(",")] for part in view[0].get("d", "").strip("MZ").split("L")]
+    sides = [np.subtract(q, p) for p, q in zip(drawn, drawn[1:] + drawn[:1], strict=True)]
+    if size > 1e-300:
+        assert np.allclose(sides, [(224, 0), (0, -224), (-224, 0), (0, 224)], atol=1.0 if abs(x) > 1e300 else 0.2)
+    assert np.isfinite(drawn).all()
+    assert all(
+        "inf" not in str(value) and "nan" not in str(value) for each in (view, *view) for value in each.attrib.values()
+    )
+
+
+def test_many_short_lines_are_thinned_too() -> None:
+    rings = np.random.default_rng(0).random((50_000, 3, 2))
+    assert len(engine.Polygon(list(rings))._repr_svg_()) < 2e6

@@ -98,3 +98,25 @@ def test_six_digits_are_taken_by_a_word() -> None:
 def test_what_are_no_poses_is_refused(make: Any, words: str) -> None:
     with pytest.raises(engine.EngineError, match=words):
         make()
+
+
+def test_no_poses_have_a_dimension_too() -> None:
+    none = engine.Poses([engine.Pose.identity(2)])[:0]
+    assert (none.dimension, pickle.loads(pickle.dumps(none)), engine.Poses([]).dimension) == (2, none, 3)
+    for size in (0, 1, 2):
+        with pytest.raises(engine.EngineError):
+            engine.Poses(np.zeros((1, size, size)))
+
+
+def test_an_index_is_a_whole_number() -> None:
+    poses = engine.Poses([np.eye(4)])
+    for index in (None, 0.0, [0], (0, 0)):
+        with pytest.raises(TypeError):
+            poses[index]  # type: ignore[index]
+
+
+def test_a_matrix_that_is_no_motion_is_named_as_a_matrix() -> None:
+    for matrix in (np.diag([2.0, 1, 1, 1]), np.diag([-1.0, 1, 1, 1])):
+        with pytest.raises(engine.NotRigidError) as raised:
+            engine.Pose.from_matrix(matrix)
+        assert raised.value.where == ("matrix",)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import UserDict
 from types import SimpleNamespace
 from typing import Any
 
@@ -296,3 +297,99 @@ def test_collections_that_share_their_members_are_walked_once() -> None:
     for _ in range(25):
         shared = {"type": "GeometryCollection", "geometries": [shared, shared]}
     assert area(shared) == 3.0
+
+
+class Cancelling(UserDict[str, Any]):
+    """GeoJSON, or a rotation of scipy, that has its call cancelled when it is read."""
+
+    def __init__(self, value: Any, cancel: engine.Cancel) -> None:
+        super().__init__(value)
+        self.cancel, self.n_read = cancel, 0
+
+    def get(self, key: str, default: Any = None) -> Any:
+        self.cancel.set()
+        self.n_read += 1
+        return super().get(key, default)
+
+    @property
+    def __geo_interface__(self) -> Any:
+        return self
+
+    def as_matrix(self) -> Any:
+        self.get("")
+        return np.eye(3)
+
+
+MANY = 5000
+SQUARE_BOX, CUBE_BOX = engine.Aabb((0, 0), (1, 1)), engine.Aabb((0, 0, 0), (1, 1, 1))
+ASKED: dict[str, Any] = {
+    "locate": lambda one, cancel: engine.locate([(0, 0)], within(one), cancel=cancel),
+    "locate points": lambda one, cancel: engine.locate(within(one), SQUARE_BOX, cancel=cancel),
+    "collide": lambda one, cancel: engine.collide(within(one), SQUARE_BOX, cancel=cancel),
+    "clearance": lambda one, cancel: engine.clearance(within(one), SQUARE_BOX, cancel=cancel),
+    "clip_lines": lambda one, cancel: engine.clip_lines(within(one), SQUARE_BOX, cancel=cancel),
+    "clip_segments": lambda one, cancel: engine.clip_segments(within(one), SQUARE_BOX, cancel=cancel),
+    "clip_polygons": lambda one, cancel: engine.clip_polygons([one] * MANY, SQUARE_BOX, cancel=cancel),
+    "overlay": lambda one, cancel: engine.overlay(within(one), within(one), cancel=cancel),
+    "overlay_batch": lambda one, cancel: engine.overlay_batch([one] * MANY, [one] * MANY, cancel=cancel),
+    "union_all": lambda one, cancel: engine.union_all([one] * MANY, cancel=cancel),
+    "bounds": lambda one, cancel: engine.bounds(within(one), cancel=cancel),
+    "collide_scene": lambda one, cancel: engine.collide_scene([one] * MANY, cancel=cancel),
+    "locate_scene": lambda one, cancel: engine.locate_scene([(0, 0)], [one] * MANY, cancel=cancel),
+    "collide_poses": lambda one, cancel: engine.collide_poses(CUBE_BOX, CUBE_BOX, [one] * MANY, cancel=cancel),
+    "clearance_poses": lambda one, cancel: engine.clearance_poses(CUBE_BOX, CUBE_BOX, [one] * MANY, cancel=cancel),
+    "poses of a scene": lambda one, cancel: engine.collide_scene([CUBE_BOX] * MANY, [one] * MANY, cancel=cancel),
+    "poses of bodies": lambda one, cancel: engine.locate_scene(
+        [(0, 0, 0)], [CUBE_BOX] * MANY, [one] * MANY, cancel=cancel
+    ),
+}  # fmt: skip
+
+
+def within(one: Any) -> Any:
+    return {"type": "GeometryCollection", "geometries": [one] * MANY}
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_arguments_are_read_within_the_deadline(name: str) -> None:
+    """A switch that is set while the first item is read ends the call before all are."""
+    kind = {"locate points": "Point", "clip_lines": "LineString", "clip_segments": "LineString"}.get(name, "Polygon")
+    coordinates = {"Point": [0, 0], "LineString": [[0, 0], [1, 1]]}.get(kind, [[[0, 0], [1, 0], [0, 1], [0, 0]]])
+    cancel = engine.Cancel()
+    one = Cancelling({"type": kind, "coordinates": coordinates}, cancel)
+    with pytest.raises(engine.CancelledError):
+        ASKED[name](one, cancel)
+    assert 0 < one.n_read < 4 * MANY / 2
+
+
+def test_collections_that_share_members_end() -> None:
+    """Each level has the one below twice: 2^30 geometries in a kilobyte."""
+    shared: Any = {"type": "Point", "coordinates": [1, 1]}
+    for _ in range(30):
+        shared = {"type": "GeometryCollection", "geometries": [shared, shared]}
+    with pytest.raises(engine.InvalidInputError, match="there several times"):
+        engine.locate(shared, SQUARE_BOX)
+    area: Any = {"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [0, 2], [0, 0]]]}
+    for _ in range(30):
+        area = {"type": "GeometryCollection", "geometries": [area, area]}
+    assert engine.locate([(0.5, 0.5), (3, 3)], area).tolist() == [1, -1]
+    few = {"type": "GeometryCollection", "geometries": [{"type": "MultiPoint", "coordinates": [[1, 1], [3, 3]]}] * 3}
+    assert engine.locate({"type": "GeometryCollection", "geometries": [few, few]}, SQUARE_BOX).tolist() == [0, -1] * 6
+
+
+@pytest.mark.parametrize("lines", [
+    {"type": "LineString", "coordinates": [0, 0]}, {"type": "LineString", "coordinates": np.zeros(3)},
+    {"type": "MultiLineString", "coordinates": [[[]]]}, {"type": "LineString", "coordinates": [[[0, 0]]]},
+])  # fmt: skip
+def test_lines_that_are_none_are_refused(lines: Any) -> None:
+    with pytest.raises(engine.InvalidInputError):
+        engine.clip_lines(lines, SQUARE_BOX)
+
+
+def test_a_property_that_raises_is_an_error_of_ours() -> None:
+    class Broken:
+        @property
+        def __geo_interface__(self) -> Any:
+            raise KeyError("gone")
+
+    with pytest.raises(engine.InvalidInputError, match="does not give its GeoJSON"):
+        engine.Polygon(Broken())
