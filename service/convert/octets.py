@@ -72,7 +72,8 @@ _FORM: Final = {
     "required": ["file"],
 }
 FILES_IN: Final = {**{kind: {"schema": _FILE} for kind in FILES}, MULTIPART: {"schema": _FORM}}
-"""The files that the OpenAPI document shows beside JSON."""
+"""The files that are taken in place of JSON. The OpenAPI document names them beside the body: with two media types of a
+body some generators make clients that do not run."""
 
 
 def file_in(octets: Any, content_type: str, call: Call) -> tuple[Any, Format | None, str]:

@@ -25,6 +25,7 @@ from service.schemas.bodies import (
     SceneSegmentsRequest,
     StoredSceneSummary,
 )
+from service.schemas.geojson import ALSO
 from service.schemas.points import ContainsSceneResponse
 from service.schemas.solids import InspectRequest, InspectResponse, Solid, StoredSolidSummary
 from service.store import Stored
@@ -54,7 +55,7 @@ Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/sol
     tags=["solids"],
     status_code=201,
     responses={200: {"description": "It was there already.", "model": StoredSolidSummary}, **responses(501, 507)},
-    openapi_extra={"requestBody": {"content": octets.FILES_IN}},
+    openapi_extra={"requestBody": {ALSO: octets.FILES_IN}},
 )
 def put_solid(question: Solid, call: CallOf) -> StoredSolidSummary:
     """Keep a solid, so that later requests can name it: `{"type": "stored", "id": ...}`. The same solid has the same
@@ -86,7 +87,7 @@ def put(value: Stored, call: Call) -> str:
     operation_id="inspect_solid",
     tags=["solids"],
     responses=responses(501),
-    openapi_extra={"requestBody": {"content": octets.FILES_IN}},
+    openapi_extra={"requestBody": {ALSO: octets.FILES_IN}},
 )
 def inspect_solid(
     question: InspectRequest,

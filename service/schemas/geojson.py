@@ -14,6 +14,8 @@ from service.schemas.base import Schema, optional, with_example
 
 _MEMBERS: Final = {"GeometryCollection": "geometries", "FeatureCollection": "features"}
 _DEEPEST: Final = 32
+ALSO: Final = "x-also-accepts"
+"""In a schema or a body: what may stand in its place."""
 _RING: Final = [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]
 
 
@@ -42,10 +44,17 @@ class GeoJsonSolid(Schema):
         return {name: value for name, value in self if value is not None}
 
 
+def _or_geojson(array: dict[str, Any], *own: str) -> dict[str, Any]:
+    """Return the schema of an array that has the schema of what may stand in its place. A union of the two would take
+    the array from clients that openapi-generator makes: in TypeScript an object alone is left."""
+    kinds = {"type": "string", "enum": [*own, *_MEMBERS, *(["Feature"] if own else [])]}
+    text = f"GeoJSON (RFC 7946): {' or '.join(own) or 'a collection with a polygon a member'}."
+    return {**array, ALSO: {"type": "object", "description": text, "properties": {"type": kinds}, "required": ["type"]}}
+
+
 class OrGeoJson:
     """Annotation of a field that GeoJSON of two types, or a collection of these, may stand for: Point and MultiPoint
-    for positions, and so on. In the schema the field stays an array: a union would change the type that generated
-    clients have for it."""
+    for positions, and so on."""
 
     def __init__(self, one: str) -> None:
         self._one = one
@@ -57,7 +66,9 @@ class OrGeoJson:
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return handler(schema)
+        if self._one == "Polygon":
+            return _or_geojson(handler(schema))
+        return _or_geojson(handler(schema), self._one, f"Multi{self._one}")
 
     def _read(
         self, value: Any, handler: core_schema.ValidatorFunctionWrapHandler, info: core_schema.ValidationInfo
@@ -114,6 +125,11 @@ class OrMembers:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
         return core_schema.with_info_wrap_validator_function(self._read, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return _or_geojson(handler(schema))
 
     def _read(
         self, value: Any, handler: core_schema.ValidatorFunctionWrapHandler, info: core_schema.ValidationInfo
