@@ -20,7 +20,7 @@ from engine.polygon_clipping.planes import KernelScene, Plan, kernel_scene, plan
 from engine.polygon_clipping.rings import CLIPPED, PlaneTables
 from engine.polygon_clipping.sutherland_hodgman import clip_rings
 from engine.predicates.rational import largest_of, scaled_back
-from engine.running.budget import UNLIMITED, Budget, Cancel, polled, reading
+from engine.running.budget import UNLIMITED, Budget, Cancel, polled
 from engine.running.parallel import Options, Progress, check_options, is_unlimited, join_columns, run_chunks
 from engine.solids.accepted import SolidLike, SolidsLike
 from engine.solids.base import Solid
@@ -189,10 +189,7 @@ def clip_polygons(
     is_free = is_unlimited(workers, deadline, cancel, progress)
     if not is_free or report is not False:
         check_options(workers, progress, report=report)
-    if not isinstance(region, Solid):
-        with reading(deadline, cancel) as reader:
-            region = as_solid(region, "region")
-        deadline = reader.left()
+    region = region if isinstance(region, Solid) else as_solid(region, "region")
     plan = region.cached("clipping_plan")
     if plan is not None and is_free and report is False and isinstance(polygons, np.ndarray):
         few = _clip_array(polygons, plan, region.dimension)
