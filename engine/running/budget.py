@@ -188,6 +188,13 @@ def polled(items: Iterable[Item]) -> Iterator[Item]:
 
     Raises: what `poll` raises.
     """
+    if type(items) is list and len(items) <= _POLL:
+        poll()
+        return iter(items)
+    return _polled(items)
+
+
+def _polled(items: Iterable[Item]) -> Iterator[Item]:
     for count, item in enumerate(items):
         if count & _POLL == 0:
             poll()

@@ -401,7 +401,7 @@ def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Po
     is_plain = not set(map(type, poses)) - {Pose, type(None)}
     if is_plain and all(each is None or len(each.translation) == solids[0].dimension for each in poses):
         return solids, tuple(poses)
-    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(polled(zip(poses, solids))))
+    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(zip(polled(poses), solids)))
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:

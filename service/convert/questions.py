@@ -212,7 +212,8 @@ def _rewrite_error_paths(error: EngineError, name: str, parts: dict[str, str]) -
 
 def existing(question: Any, where: Where) -> Where:
     """Return `where` as far as the request has it: an engine's error may lead into a stored solid."""
-    value, path = question, []
+    value: Any = question
+    path: list[str | int] = []
     for number, part in enumerate(where):
         value = value.root if isinstance(value, RootModel) else value
         if isinstance(value, FromGeoJson):
