@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
@@ -74,10 +74,14 @@ class ClippedPolygons(Pictured, Ragged):
     def __len__(self) -> int:
         return len(self.status)
 
+    def __iter__(self) -> Iterator[list[FloatArray]]:
+        """Yield the rings left of each polygon."""
+        return map(self.rings, range(len(self)))
+
     @property
     def __geo_interface__(self) -> dict[str, Any]:
         """What is left as a GeoJSON MultiPolygon, of each polygon its rings, closed; bridges stay."""
-        return rings_as_geojson(map(self.rings, range(len(self))))
+        return rings_as_geojson(self)
 
     def rings(self, polygon: int) -> list[FloatArray]:
         """Return the rings left of one polygon.
@@ -101,8 +105,8 @@ _AXES: Final = {2: (0, 1), 3: (0, 1, 2)}  # the `names` of `clip_rings`
 _FEW: Final = 3072
 """Number of coordinates that are clipped faster than a batch is planned."""
 _USUAL: Final = (2.0**-100, 2.0**120)
-"""Range of the sum of squares of few coordinates in which nothing is scaled. The largest coordinate lies between the
-root of the sum over their number, and of the sum. `numpy.vdot` does not warn on overflow, as `dot` does."""
+"""Range of the sum of squares of few coordinates, from which the largest follows, in which nothing is scaled.
+`numpy.vdot` does not warn on overflow, as `dot` does."""
 Polygons = Sequence[Polygon] | Sequence[Sequence[npt.ArrayLike]] | npt.NDArray[Any] | SolidsLike
 
 
@@ -154,24 +158,20 @@ def clip_polygons(
     Notes
     -----
     Each contour is cut by one plane after another: half_space 0; aabb xmin, xmax, ymin, ymax, zmin, zmax; convex in row
-    order; polyhedron in face order. The result is defined as the exact algorithm on the original input, however long
-    the cascade: a cut vertex stays exact until the end. It is connected: parts of a concave contour that fall apart
-    stay joined by bridge edges along a plane, harmless under the even-odd rule. For separate pieces of polygons in the
-    plane use `overlay`.
+    order; polyhedron in face order. The result is that of the exact algorithm, however long the cascade: a cut vertex
+    stays exact until the end. It is connected: parts of a concave contour that fall apart stay joined by bridge edges
+    along a plane, harmless under the even-odd rule. For separate pieces in the plane use `overlay`.
 
-    Boundary: counts as inside. A contour in a plane is kept, one that touches in an edge or a point leaves two vertices
-    or one.
+    Boundary: counts as inside. A contour in a plane is kept; one that touches leaves an edge's two vertices, or one.
 
-    Degenerate input: vertices that coincide exactly one after another, around the ring, are merged into the first of
-    them; vertices that merely round to the same doubles are not. Spikes, repeated and self-crossing contours are
-    clipped as they are.
+    Degenerate input: equal vertices one after another, around the ring, are merged into the first; such that merely
+    round alike are not. Spikes, repeated and self-crossing contours are clipped as they are.
 
-    Bridges: `may_have_bridges` is False only where no bridge is possible: nothing is left, or at each plane that
-    dropped a vertex all contours of the polygon together met the plane in at most two points (vertices on it, edges
-    through).
+    Bridges: `may_have_bridges` is False only where none is possible: nothing is left, or all contours of the polygon
+    together met each plane that dropped a vertex in at most two points.
 
-    Accuracy: decisions exact for every finite input; coordinates are the doubles nearest to the exact values, zero as
-    +0.0. Nothing overflows. An item too complex to finish is marked in `status` and spoils no other.
+    Accuracy: decisions exact for every finite input; coordinates are the nearest doubles, zero as +0.0. Nothing
+    overflows. An item too complex to finish is marked in `status` and spoils no other.
 
     Cost: O(vertices x planes) for each polygon.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import pairwise
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from engine.arrangement.nodes import nearest_quotient
 from engine.arrangement.rings import ExactRings
+from engine.errors import NotRepresentableError
 from engine.polygon_overlay.implicit_rings import ImplicitRings, edges_along
 from engine.running.budget import Budget
 from engine.running.parallel import Options
@@ -58,6 +60,10 @@ class OverlayPiece(NamedTuple):
         """The piece as a GeoJSON Polygon, its rings closed."""
         rings = [np.concatenate([ring, ring[:1]]).tolist() for ring in (self.shell, *self.holes)]
         return {"type": "Polygon", "coordinates": rings}
+
+
+_FEW_VERTICES = 10_000
+"""Number of vertices up to which the repr has the area: summing takes milliseconds at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -209,7 +215,11 @@ class Overlay(Pictured, ByValue):
         counts = (
             f"{self.n_pieces:,} piece{'s' * (self.n_pieces != 1)}, {self.n_holes:,} hole{'s' * (self.n_holes != 1)}"
         )
-        return f"<Overlay: {counts}, {len(self.vertices):,} vertices>"
+        size = f"{len(self.vertices):,} vertices"
+        if len(self.vertices) <= _FEW_VERTICES:
+            with suppress(NotRepresentableError):
+                size = f"area {self.area:.6g}"
+        return f"<Overlay: {counts}, {size}>"
 
     def __getattr__(self, name: str) -> Any:
         """Return a field that is computed on first access; only missing attributes come here."""

@@ -6,7 +6,7 @@ their order, or that they are equal (parameters.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cmp_to_key
 from itertools import pairwise
@@ -49,6 +49,10 @@ class ScenePieces(Columns):
     t: FloatArray
     faces: IntArray
     ranks: IntArray
+
+    def __iter__(self) -> Iterator[tuple[int, int, FloatArray, FloatArray]]:
+        """Yield of each piece its segment, the body that it lies in, its start and its end."""
+        return zip(self.source.tolist(), self.body.tolist(), self.start, self.end)
 
 
 class LoosePieces(NamedTuple):

@@ -7,7 +7,9 @@ does.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, ClassVar, Final, Literal
 
 import numpy as np
@@ -73,8 +75,14 @@ class SceneLocations(Ragged):
         points = np.repeat(np.arange(len(self)), np.diff(self.offsets))
         return {"point": points, "body": self.indices, "on_boundary": self.on_boundary}
 
+    def __iter__(self) -> Iterator[IntArray]:
+        """Yield the bodies that contain each point, ascending."""
+        return (self.indices[start:stop] for start, stop in pairwise(self.offsets.tolist()))
+
     def __getitem__(self, point: int) -> IntArray:
         """Return the bodies that contain one point, ascending."""
+        if not -len(self) <= point < len(self):
+            raise IndexError(f"there are {len(self)} points, got number {point}")
         start, stop = self.offsets[point : point + 2] if point >= 0 else self.offsets[len(self) + point :][:2]
         return self.indices[start:stop]
 

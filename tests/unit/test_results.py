@@ -117,8 +117,21 @@ def test_pieces_of_lines_are_geojson() -> None:
 
 def test_the_repr_of_an_overlay_is_short() -> None:
     hole = Polygon([[(1, 1), (2, 1), (2, 2), (1, 2)]])
-    assert repr(engine.overlay(SQUARE, hole, "difference")) == "<Overlay: 1 piece, 1 hole, 8 vertices>"
+    assert repr(engine.overlay(SQUARE, hole, "difference")) == "<Overlay: 1 piece, 1 hole, area 15>"
+    huge = Polygon([[(0, 0), (1e200, 0), (0, 1e200)]])
+    assert repr(engine.overlay(huge, huge)) == "<Overlay: 1 piece, 0 holes, 3 vertices>"
     assert np.isfinite(engine.overlay(SQUARE, hole).area)
+
+
+def test_results_of_many_items_are_iterated() -> None:
+    """What an item has, in their order; an index beyond them is an error, so that no loop runs on."""
+    assert [rings[0].tolist() for rings in results()["polygons"]] == [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]]
+    assert [bodies.tolist() for bodies in results()["points"]] == [[0], [0, 1], []]
+    assert [(source, body) for source, body, _, _ in results()["scene pieces"]] == [(0, 0), (0, 1), (1, 0)]
+    assert results()["points"][-2].tolist() == [0, 1]
+    for point in (3, -4):
+        with pytest.raises(IndexError, match="3 points"):
+            results()["points"][point]
 
 
 def test_locations_in_a_scene_are_rows_of_point_and_body() -> None:
