@@ -16,6 +16,7 @@ from engine.bounding.aabb import place_boxes
 from engine.collision.codes import UNSETTLED
 from engine.collision.collide import (
     TAKEN,
+    Witnesses,
     details_of_boxes,
     details_where_proven,
     instead_of,
@@ -25,6 +26,7 @@ from engine.collision.collide import (
 from engine.collision.convex_body import ConvexBody, convex_body_of, pool_bodies
 from engine.collision.convex_pair import relate_convex_pairs
 from engine.collision.meshes.placement import PoseArrays
+from engine.collision.outline import witness_of
 from engine.collision.outline_batch import outline_pool, relate_outline_pairs
 from engine.collision.simple.form_relations import relate_box_pairs
 from engine.compiling.jit import entry_of
@@ -32,6 +34,8 @@ from engine.errors import InvalidArrayError, UnsupportedPairError, UnsupportedSo
 from engine.running.budget import Budget, polled
 from engine.running.parallel import run_chunks
 from engine.solids.base import Solid, named
+from engine.solids.bounds import boxes_of_polygons
+from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose, motions_of
 from engine.solids.poses import Poses
 from engine.solids.primitives import Aabb
@@ -43,6 +47,8 @@ _LEAST_POSES: Final = 32
 """Smallest number of poses for which a batch saves more time than its preparation takes."""
 _FEW: Final = 64
 """Largest number of distinct solids that are all prepared for a query about some of them."""
+_SMALL: Final = 64
+"""Most vertices of a polygon whose box is computed together with those of others, and not cached with it."""
 
 
 class PairBatches:
@@ -64,20 +70,28 @@ class PairBatches:
 
     def task(
         self, kinds: IntArray, poses: PoseArrays, pairs: IntArray, relations: Int8Array, boolean: bool, detail: bool,
-        budget: Budget,
+        budget: Budget, witnesses: Witnesses | None = None,
     ) -> Callable[[int, int], None]:  # fmt: skip
         """Return a function (start, stop) that fills the UNSETTLED entries of relations[start:stop] with relation codes
         of pairs[start:stop]; they stay UNSETTLED where the kernel cannot decide. A row is a solid under a pose: kinds
         (n_rows,), its index in `distinct`; poses, one a row, row 0 the identity. pairs (n, 2): two rows each. boolean:
-        an overlap may be given where one body contains the other. detail: an overlap that is not proven to be PO stays
-        UNSETTLED."""
+        another relation may be given than that of two bodies that meet. detail: an overlap that is not proven to be PO
+        stays UNSETTLED. witnesses (n): in the plane, filled too."""
         (pool, places), flag = self.pool(budget), budget.flag
-        kernel = entry_of(relate_outline_pairs if self.is_planar else relate_convex_pairs)
-        bodies, options = places[kinds], (detail,) if self.is_planar else (boolean, not detail)
+        bodies = places[kinds]
+        contacts = np.full((len(pairs) if self.is_planar and witnesses is not None else 0, 3), -1, np.int32)
 
         def task(start: int, stop: int) -> None:
-            kernel(pool, bodies, poses, pairs[start:stop], *options, relations[start:stop], flag)
-            budget.check()
+            some, codes = pairs[start:stop], relations[start:stop]
+            if not self.is_planar:
+                entry_of(relate_convex_pairs)(pool, bodies, poses, some, boolean, not detail, codes, flag)
+                return budget.check()
+            met = contacts[start:stop]
+            entry_of(relate_outline_pairs)(pool, bodies, poses, some, boolean, detail, codes, met, flag)
+            if witnesses is not None:
+                named = zip(codes.tolist(), *met.T.tolist())
+                witnesses[start:stop] = [witness_of(*row) if row[3] >= 0 else None for row in named]
+            return budget.check()
 
         return task
 
@@ -112,15 +126,17 @@ class SceneBatches:
             return SceneBatches(scene_bodies([bodies.solids[body] for body in names.tolist()], poses))
         return SceneBatches(bodies.under(names, poses), self.pairs)
 
-    def relations(self, pairs: IntArray, boolean: bool, detail: bool, budget: Budget, workers: int | None) -> Int8Array:
-        """Return the relation codes (n,) of pairs (n, 2) of body indices, UNSETTLED where no kernel decides. boolean:
-        an overlap may be given where one body contains the other. detail: an overlap that is not proven to be PO stays
-        UNSETTLED."""
+    def relations(
+        self, pairs: IntArray, boolean: bool, detail: bool, budget: Budget, workers: int | None,
+        witnesses: Witnesses | None = None,
+    ) -> Int8Array:  # fmt: skip
+        """Return the relation codes (n,) of pairs (n, 2) of body indices, UNSETTLED where no kernel decides. boolean,
+        detail, witnesses: as in `PairBatches.task`."""
         result, bodies = np.full(len(pairs), UNSETTLED, np.int8), self.bodies
         relate_box_pairs(bodies.low, bodies.high, self._is_box, pairs, result)
         if (result == UNSETTLED).any():
             kinds, poses = np.append(np.int64(0), bodies.kinds), PoseArrays(bodies.rotations, bodies.translations, True)
-            task = self.pairs.task(kinds, poses, pairs + 1, result, boolean, detail, budget)
+            task = self.pairs.task(kinds, poses, pairs + 1, result, boolean, detail, budget, witnesses)
             run_chunks(task, len(pairs), budget=budget, workers=workers)
         return result
 
@@ -146,18 +162,19 @@ class SceneBatches:
 
 
 def posed_batch(
-    first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, boolean: bool, detail: bool, budget: Budget
-) -> Callable[[int, int], None] | None:
+    first: Solid, second: Solid, poses: PoseArrays, relations: Int8Array, boolean: bool, detail: bool, budget: Budget,
+    witnesses: Witnesses | None,
+) -> Callable[[int, int], None] | None:  # fmt: skip
     """Return a task that fills relations[start:stop] for these poses of the second solid, the first unposed; UNSETTLED
     where the kernel cannot decide. None if a batch would be no faster, or a solid of space is not provably convex.
-    boolean, detail: as in `PairBatches.task`."""
+    boolean, detail, witnesses: as in `PairBatches.task`."""
     n, table = len(relations), PairBatches([first, second])
     if n < _LEAST_POSES or (not table.is_planar and None in (convex_body_of(first), convex_body_of(second))):
         return None
     turn, move = motions_of([None], first.dimension)
     rows = PoseArrays(np.concatenate([turn, poses.rotations]), np.concatenate([move, poses.translations]), True)
     kinds, pairs = np.minimum(np.arange(n + 1), 1), np.column_stack([np.zeros(n, np.int64), np.arange(1, n + 1)])
-    return table.task(kinds, rows, pairs, relations, boolean, detail, budget)
+    return table.task(kinds, rows, pairs, relations, boolean, detail, budget, witnesses)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,10 +249,15 @@ def bodies_of(
 ) -> SceneBodies:  # fmt: skip
     """Return bodies of any type as arrays. solids, poses: of each body; distinct: each solid object once; kinds: index
     in `distinct` of each body's solid; check: called while another thread computes a box, may raise."""
-    own = [own_box(solid, check) for solid in distinct]
-    boxes = np.array([box[:2] for box in own]).reshape(-1, 2, distinct[0].dimension if distinct else 3)
-    radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
-    return _place_bodies(solids, poses, distinct, kinds, OwnBoxes(boxes, np.array([box[2] for box in own]), radii))
+    n = len(distinct)
+    own = OwnBoxes(np.empty((n, 2, distinct[0].dimension if n else 3)), np.empty(n), np.zeros(n))
+    small = [k for k, solid in enumerate(distinct) if type(solid) is Polygon and 0 < len(solid.vertices) <= _SMALL]
+    if small:
+        own.boxes[small], own.reaches[small] = boxes_of_polygons([distinct[k] for k in small])
+    for k in sorted({*range(n)}.difference(small)):
+        own.boxes[k, 0], own.boxes[k, 1], own.reaches[k] = own_box(distinct[k], check)
+        own.radii[k] = getattr(distinct[k], "radius", 0.0)
+    return _place_bodies(solids, poses, distinct, kinds, own)
 
 
 def _place_bodies(
@@ -261,7 +283,10 @@ def check_collidable(bodies: Sequence[Solid]) -> tuple[list[Solid], IntArray]:
     """Return the distinct solids, and by body the index of its solid among them. Raises unless `collide` accepts every
     solid and all have one dimension."""
     distinct, kinds = distinct_of(bodies)
+    of_kind: dict[tuple[str, int], Solid] = {}
     for body in distinct:
+        of_kind.setdefault((body.type, body.dimension), body)
+    for body in of_kind.values():
         try:
             pair_function(body, body)
         except UnsupportedPairError:

@@ -19,6 +19,7 @@ from engine.collision.codes import DISJOINT, UNSETTLED
 from engine.collision.meshes.mesh_arrays import mesh_body_of
 from engine.collision.meshes.mesh_mesh import mesh_mesh, mesh_parts
 from engine.collision.outline import collide_outlines, live_edges, outline_of, outline_parts
+from engine.collision.outline_batch import outline_arrays
 from engine.collision.simple import closed_forms as forms
 from engine.collision.simple.against_ball import body_sphere_parts, collide_body_sphere
 from engine.collision.simple.boundary import live_parts
@@ -417,6 +418,6 @@ def _has_interior(solid: Solid, budget: Budget) -> bool:
     if isinstance(solid, Aabb):
         return bool((solid.min < solid.max).all())
     if solid.dimension == 2:
-        return bool(live_edges(outline_of(solid, None, budget), budget))
+        return bool(outline_arrays(solid, budget)[2].any()) or bool(live_edges(outline_of(solid, None, budget), budget))
     mesh = mesh_body_of(solid)
     return mesh.has_inside and any(any(live_parts(mesh, face, budget)) for face in range(len(mesh.faces)))

@@ -252,7 +252,8 @@ def batch_of(
     budget, relations, witnesses = answers.budget, answers.relations, answers.witnesses
     is_named = witnesses is not None  # then a search for contacts follows, which decides all relations
     has_detail = answers.details is not None
-    batch = posed_batch(first, second, poses, relations, answers.boolean or is_named, has_detail, budget)
+    is_coarse = answers.boolean or (is_named and first.dimension == 3)
+    batch = posed_batch(first, second, poses, relations, is_coarse, has_detail, budget, witnesses)
     if first.dimension == 2 or not (has_faces(first) and has_faces(second)):
         return batch
     a, b = mesh_body_of(first), mesh_body_of(second)

@@ -21,8 +21,9 @@ from engine.arrangement.nodes import NodeTable, float_nodes, rational_nodes
 from engine.arrangement.subdivision import label_faces, subdivide
 from engine.collision import outline_batch as batch
 from engine.collision import result
-from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, UNSETTLED
+from engine.collision.codes import DISJOINT, OVERLAPPING, UNSETTLED
 from engine.collision.exact_images import image_point, rounded
+from engine.collision.placed_outline import APART, OUT_OF_FIRST, OUT_OF_SECOND
 from engine.compiling.jit import entry_of
 from engine.containment.methods.rational_locate import rational_location
 from engine.predicates.rational import orient2d_rational
@@ -156,42 +157,45 @@ def single_points(outline: Outline) -> list[int]:
     return vertices
 
 
-def _related(first: Solid, second: Solid, poses: result.Poses) -> tuple[int, int, int, int, int]:
-    """Return (relation, bits, edge, other edge, class) of two planar solids under poses, by the compiled kernel. bits:
-    IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST; edges: the first two that meet, -1 for none; class: of these two edges, APART
-    for none. The relation is UNSETTLED for large bodies, and for intersecting bodies with boundaries that are not
-    simple."""
-    one, other = batch.outline_arrays(first), batch.outline_arrays(second)
-    if max(len(one[1]), len(other[1])) > batch.MOST_EDGES:
-        return UNSETTLED, 0, -1, -1, batch.APART
+def _related(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> tuple[int, int, int, int, int]:
+    """Return what `relate_placed` does of two planar solids under poses."""
+    one, other = batch.outline_arrays(first, work.budget), batch.outline_arrays(second, work.budget)
     own, their = motion_of(poses[0], 2), motion_of(poses[1], 2)
-    answer: tuple[int, int, int, int, int] = entry_of(batch.relate_two)(*one, *own, *other, *their)
-    if answer[0] == DISJOINT or (
-        answer[0] != UNSETTLED and batch.is_simple_body(first) and batch.is_simple_body(second)
-    ):
-        return answer
-    return UNSETTLED, 0, -1, -1, batch.APART
+    answer: tuple[int, int, int, int, int] = entry_of(batch.relate_two)(
+        *one, *own, *other, *their, work.boolean, work.witness, work.budget.flag
+    )
+    work.budget.check()
+    return answer
 
 
 def collide_outlines(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Collision:
     """Return the relation of two planar bodies, by the kernel or, where that is undecided, by the exact arrangement."""
-    relation, _, i, j, kind = _related(first, second, poses)
+    relation, _, i, j, kind = _related(first, second, poses, work)
     if relation == UNSETTLED or (relation >= OVERLAPPING and work.witness and i < 0):
         return collide_outline_outline(first, second, poses, work)
     if relation == DISJOINT or not work.witness:
         return result.UNNAMED[relation]
+    return result.Collision(result.RELATIONS[relation], witness_of(relation, i, j, kind))
+
+
+def witness_of(relation: int, first: int, second: int, kind: int) -> result.Witness | None:
+    """Return the witness of a relation that the kernel decided, None if it gave none: of DISJOINT, and of an overlap
+    without edges that meet. first, second, kind: as of `relate_placed`."""
     if relation >= OVERLAPPING:
-        return result.Collision(result.RELATIONS[relation], result.Witness(batch.KINDS[kind], i, j))
-    return result.FIRST_WITHIN if relation == FIRST_INSIDE_SECOND else result.SECOND_WITHIN
+        return result.Witness(batch.KINDS[kind], first, second) if first >= 0 else None
+    return _WITHIN[relation]
+
+
+_WITHIN = (None, result.FIRST_WITHIN.witness, result.SECOND_WITHIN.witness)
 
 
 def outline_parts(first: Solid, second: Solid, poses: result.Poses, work: result.Work) -> result.Parts:
     """Return which of two overlapping planar bodies has a part outside the other, by the kernel or, where that is
     undecided, by the exact arrangement."""
-    relation, bits, _, _, kind = _related(first, second, poses)
+    relation, bits, _, _, kind = _related(first, second, poses, work)
     if relation == UNSETTLED:
         return parts_by_arrangement(first, second, poses, work)
-    return result.Parts(bits & batch.OUT_OF_SECOND != 0, bits & batch.OUT_OF_FIRST != 0, kind != batch.APART)
+    return result.Parts(bits & OUT_OF_SECOND != 0, bits & OUT_OF_FIRST != 0, kind != APART)
 
 
 FIRST, SECOND, BOTH = 1, 2, 3

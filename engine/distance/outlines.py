@@ -10,8 +10,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.arrangement.simple_rings import BLOCK, n_leaves
 from engine.collision.codes import DISJOINT, UNSETTLED
-from engine.collision.outline_batch import BLOCK, inside, n_blocks, relate_placed
+from engine.collision.placed_outline import PlacedOutline, inside, relate_placed, spot
 from engine.compiling.jit import allocating_kernel, called, inline
 from engine.distance.closed_forms import UNSURE, Wide, less, over, plus, times
 from engine.distance.vertex_edge import LARGEST, Placed, VertexEdge, Wide2, foot_of, measure, minus2, place, point
@@ -123,17 +124,19 @@ def look_for(a: Placed, b: Placed, near: Any) -> Look:
     """Write the candidate pairs of vertex and edge to `near`, nearest blocks first; return the state of the scan, with
     n above MOST_NEAR if they do not fit."""
     least, first, second = np.inf, 0, 0
-    for i in range(len(a.boxes)):
-        for j in range(len(b.boxes)):
-            gap = _gap(a.boxes, i, b.boxes, j)
+    boxes, others = a.boxes[len(a.boxes) // 2 :], b.boxes[len(b.boxes) // 2 :]
+    n, m = (len(a.following) + BLOCK - 1) // BLOCK, (len(b.following) + BLOCK - 1) // BLOCK
+    for i in range(n):
+        for j in range(m):
+            gap = _gap(boxes, i, others, j)
             if gap < least:
                 least, first, second = gap, i, j
     look = Look(0, np.inf, np.inf, 2.0**-44 * (a.reach + b.reach))
     look = _of_blocks(a, b, (first, second), True, near, look)
     look = _of_blocks(b, a, (second, first), False, near, look)
-    for i in range(len(a.boxes)):
-        for j in range(len(b.boxes)):
-            if _gap(a.boxes, i, b.boxes, j) <= look.most and (i != first or j != second):
+    for i in range(n):
+        for j in range(m):
+            if _gap(boxes, i, others, j) <= look.most and (i != first or j != second):
                 look = _of_blocks(a, b, (i, j), True, near, look)
                 look = _of_blocks(b, a, (j, i), False, near, look)
     if look.n <= MOST_NEAR:
@@ -265,16 +268,21 @@ def _has_separating_line(own: Placed, other: Placed, vertex: int, edge: int) -> 
     return low - high > 2.0**-50 * (abs(way.x) + abs(way.y)) * (own.reach + other.reach) + 2.0**-1000
 
 
+@inline
+def _outline(a: Placed) -> PlacedOutline:
+    """Return a placed body for signs, without sides and what rounding took."""
+    return PlacedOutline(a.points, a.points[:0], a.following, a.following[:0], a.boxes)
+
+
 @called
-def _related(a: Placed, b: Placed, error: float) -> int:
+def _related(a: Placed, b: Placed, error: float, stop: FlagArray) -> int:
     """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven. error: bound on a rounded coordinate."""
-    own, their, none = a.following, b.following, a.following[:0]
-    relation, _, _, _, _ = relate_placed(a.points, own, none, b.points, their, none, b.boxes, error)
+    relation, _, _, _, _ = relate_placed(_outline(a), _outline(b), error, True, stop)
     return -1 if relation == UNSETTLED else (1 if relation == DISJOINT else 0)
 
 
 @inline
-def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
+def _are_apart(a: Placed, b: Placed, near: Any, look: Look, stop: FlagArray) -> int:
     """Return 1 for disjoint bodies, 0 for bodies that meet, -1 if unproven or out of range. near, look: the candidates,
     whose nearest gives the line to try first."""
     error = 2.0**-51 * max(a.reach if a.error > 0.0 else 0.0, b.reach if b.error > 0.0 else 0.0)
@@ -289,9 +297,9 @@ def _are_apart(a: Placed, b: Placed, near: Any, look: Look) -> int:
             break
     if len(a.following) == 1 or len(b.following) == 1:
         ball, other = (a, b) if len(a.following) == 1 else (b, a)
-        where = inside(as_point2(ball.points, 0), other.points, other.following, error)
+        where = inside(spot(_outline(ball), 0), _outline(other), error)
         return 1 - where if where < 2 else -1
-    return _related(a, b, error)
+    return _related(a, b, error, stop)
 
 
 @inline
@@ -313,7 +321,9 @@ def _write_offset_point(
 
 
 @inline
-def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray) -> tuple[float, int, int]:
+def _nearest(
+    a: Placed, b: Placed, radius: float, their_radius: float, points: FloatArray, stop: FlagArray
+) -> tuple[float, int, int]:
     """Return (distance, feature, other feature) of two placed bodies with radii; fill points (2, 2) with nearest
     points.
 
@@ -321,7 +331,7 @@ def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: F
     the edge; the first is -1 if the points are unproven. A ball is one vertex and a radius."""
     near = workspace(ROOM)
     look = look_for(a, b, near)
-    are_apart = _are_apart(a, b, near, look)
+    are_apart = _are_apart(a, b, near, look, stop)
     if are_apart != 1 or look.n > MOST_NEAR:
         return 0.0 if are_apart == 0 else UNSURE, -1, -1
     best, nearer, is_proven = search(a, b, near, look.n)
@@ -349,7 +359,7 @@ def _nearest(a: Placed, b: Placed, radius: float, their_radius: float, points: F
 @inline
 def _n_rows(following: IntArray) -> int:
     """Return the number of rows that the points and the boxes of an outline take in the work space."""
-    return len(following) + n_blocks(len(following))
+    return len(following) + 2 * n_leaves(len(following))
 
 
 @allocating_kernel
@@ -374,7 +384,7 @@ def nearest_under_poses(
         their_error, their_reach = place(other, their_following, turn, move, their_at, their_boxes)
         a = Placed(at, following, boxes, error, reach)
         b = Placed(their_at, their_following, their_boxes, their_error, their_reach)
-        nearest = _nearest(a, b, radius, their_radius, points)
+        nearest = _nearest(a, b, radius, their_radius, points, flag)
         if len(distances) > 0:
             distances[item] = nearest[0]
     return nearest

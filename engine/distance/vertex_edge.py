@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.collision.outline_batch import box_blocks
+from engine.arrangement.simple_rings import fill_tree
 from engine.compiling.jit import called, inline
 from engine.distance.closed_forms import Wide, less, over, plus, product, root, times
 from engine.predicates.vectors import as_point2
@@ -42,7 +42,7 @@ Placed = namedtuple("Placed", "points following boxes error reach")
 |---|---|
 | points | (n, 4) both coordinates rounded, then their low parts |
 | following | the vertex at the end of each edge |
-| boxes | of the blocks of edges |
+| boxes | tree over the edges |
 | error | bound on the error of coordinates |
 | reach | largest coordinate, infinite out of the range of the bounds |
 """
@@ -62,7 +62,7 @@ VertexEdge = namedtuple("VertexEdge", "distance bound is_first first second face
 def place(
     vertices: FloatArray, following: IntArray, turn: FloatArray, move: FloatArray, points: FloatArray, boxes: FloatArray
 ) -> tuple[float, float]:
-    """Write the points (n, 4) and the boxes of blocks of edges of an outline under a pose; return `error` and `reach`
+    """Write the points (n, 4) and the tree over the edges of an outline under a pose; return `error` and `reach`
     of `Placed`. Each sum of three is off by 12 u^2 of its terms. Poses that map axes to axes: exact sums, doubles
     unchanged."""
     reach, is_given = 0.0, True
@@ -85,12 +85,11 @@ def place(
 
 @inline
 def _reach(points: FloatArray, following: IntArray, boxes: FloatArray, reach: float) -> float:
-    """Write the boxes of placed points; return `reach` of `Placed`, infinite if an edge is too short or a coordinate
+    """Write the tree over placed edges; return `reach` of `Placed`, infinite if an edge is too short or a coordinate
     too large for the bounds. reach: bound on the terms of coordinates."""
-    box_blocks(points, following, boxes)
-    for block in range(len(boxes)):
-        for k in range(4):
-            reach = max(reach, abs(boxes[block, k]))
+    fill_tree(points, following, boxes)
+    for k in range(4):
+        reach = max(reach, abs(boxes[1, k]))
     for edge in range(len(following)):
         p, q = as_point2(points, edge), as_point2(points, following[edge])
         if not max(abs(p.x - q.x), abs(p.y - q.y)) > _SHORTEST:

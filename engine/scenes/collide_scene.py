@@ -214,12 +214,13 @@ def collide_bodies(
     for pairs in _candidates(bodies, enlarged(bodies, gap), wanted, skipped, budget):
         budget.check()
         relations = np.full(len(pairs), UNSETTLED, np.int8)
+        named: list[Witness | None] | None = [None] * len(pairs) if witnesses else None
         if len(pairs) > _FEW_PAIRS:
-            relations = batches.relations(pairs, boolean, detail, budget, workers)
+            relations = batches.relations(pairs, boolean, detail, budget, workers, named)
         n_open += int((relations == UNSETTLED).sum())
         n_candidates += len(pairs)
         details = batches.details(pairs, relations) if detail else None
-        answers = Answers(budget, boolean, relations, [None] * len(pairs) if witnesses else None, details)
+        answers = Answers(budget, boolean, relations, named, details)
         _settle(bodies, pairs, answers, workers, progress)
         works += answers.works
         near = None if gap is None else _measure_gaps(batches, pairs, answers, gap, workers)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, Unpack, overload
+from typing import Any, Literal, TypeAlias, Unpack, overload
 
 import numpy as np
 
@@ -222,3 +222,15 @@ def _box_of_vertices(body: Mesh | Polygon | Triangle) -> tuple[FloatArray, Float
         aside = points - (0.5 * low + 0.5 * high)
         reach = float(np.sqrt((aside * aside).sum(axis=1).max())) * (1.0 + 2.0**-40) + 2.0**-500
     return low, high, reach
+
+
+def boxes_of_polygons(polygons: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
+    """Return the boxes (n, 2, 2) of polygons with vertices, and their reaches (n,), as `_box_of_vertices`."""
+    points = np.frombuffer(b"".join([polygon.vertices for polygon in polygons])).reshape(-1, 2)
+    counts = np.array([len(polygon.vertices) for polygon in polygons])
+    starts = np.cumsum(counts) - counts
+    low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    with np.errstate(all="ignore"):
+        aside = points - np.repeat(0.5 * low + 0.5 * high, counts, axis=0)
+        reaches = np.sqrt(np.maximum.reduceat((aside * aside).sum(axis=1), starts))
+    return np.stack([low, high], axis=1), reaches * (1.0 + 2.0**-40) + 2.0**-500

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import engine
 from engine import Aabb, Polygon, Pose, Solid, Triangle, collide
 from engine.collision import outline
 from engine.collision.batches import SceneBatches, scene_bodies
@@ -36,7 +37,8 @@ SQUARE = [[0, 0], [4, 0], [4, 4], [0, 4]]
 )
 def test_takes_rings_whose_edges_meet_only_in_their_vertices(rings: list[list[list[float]]], is_taken: bool) -> None:
     for turned in (rings, [ring[::-1] for ring in rings], [ring[1:] + ring[:1] for ring in rings]):
-        assert (outline_pool([Aabb([0, 0], [1, 1]), Polygon(turned)])[1] >= 0).tolist() == [True, is_taken]
+        pool, places = outline_pool([Aabb([0, 0], [1, 1]), Polygon(turned)])
+        assert (pool.sides[pool.firsts[places]] != 0).tolist() == [True, is_taken]
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0**400, 2.0**-400])
@@ -145,3 +147,100 @@ def test_contacts_beyond_the_range_of_signs_are_left_to_the_arrangement() -> Non
         assert collide_outlines(first, second, (None, None), work) == collide_outline_outline(
             first, second, (None, None), work
         )
+
+
+PIVOTS = [
+    [[[0, 0], [4, 1], [3, 3], [1, 4]]],
+    [[[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]]],
+    [[[-1, -2], [3, 1], [5, 7], [-4, 4]], [[0, 0], [1, 1], [0, 2]]],
+    [[[0, 0], [2, 0], [2, 2], [0, 2]], [[3, 0], [5, 0], [5, 2], [3, 2]]],
+    [[[-2, 0], [2, 0], [1, 3]]],  # the pivot is in the middle of a side
+]
+
+
+@pytest.mark.some(1)
+@pytest.mark.parametrize("unit", [1.0, 0.1, 1e-60, 1e70])
+def test_posed_contacts_are_decided_without_an_arrangement(unit: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One vertex of each lies exactly where a pose takes it, on a vertex or a side of the other; or nearly so."""
+    rng, relations = np.random.default_rng(12), []
+    for _ in range(300):
+        bodies = [Polygon([np.array(ring) * unit for ring in PIVOTS[k]]) for k in rng.integers(0, len(PIVOTS), 2)]
+        angles = rng.choice([0.0, 0.3, 1.0, 2.5, 4.0], 2)
+        steps = rng.choice([0.0, 0.1, 1.0, 3.0], (2, 2)) * unit
+        poses = [
+            Pose([[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]], step) if rng.integers(3) else None
+            for t, step in zip(angles, steps)
+        ]
+        first, second = bodies
+        work = Work(Budget(None, None))
+        answer = collide_outline_outline(first, second, (poses[0], poses[1]), work)
+        parts = parts_by_arrangement(first, second, (poses[0], poses[1]), work)
+        with monkeypatch.context() as patch:
+            if answer.relation != answer.relation.OVERLAPPING or answer.witness.kind != "containment":
+                patch.setattr(outline, "collide_outline_outline", None)
+            patch.setattr(outline, "parts_by_arrangement", None)
+            assert collide_outlines(first, second, (poses[0], poses[1]), work) == answer
+            assert outline_parts(first, second, (poses[0], poses[1]), work) == parts
+            for boolean in (False, True):
+                (how,) = SceneBatches(scene_bodies(bodies, poses)).relations(
+                    np.array([[0, 1]]), boolean, False, Budget(), None
+                )
+                assert (how != 0) == answer.collides
+                assert boolean or how == answer.relation
+        relations.append(answer.relation.label)
+    assert relations.count("touching") > 5
+    assert set(relations) >= {"touching", "overlapping", "disjoint"}
+
+
+def ring(n: int, radius: float = 1.0) -> np.ndarray:
+    t = np.arange(n) * 2 * np.pi / n
+    return np.stack([np.cos(t), np.sin(t)], 1) * radius
+
+
+@pytest.mark.parametrize("n", [40, 100])
+def test_many_edges_are_related_as_by_the_arrangement(n: int) -> None:
+    """A tree of several levels; rings of one coil, in each other's holes, equal, an ulp apart, beside each other."""
+    disc = Polygon([ring(n)])
+    frame = Polygon([ring(n, 2.0), ring(n, 1.0)])
+    bodies = [disc, frame, Polygon([ring(n, 0.5)]), Polygon([np.nextafter(ring(n), 5)]), Polygon([ring(n // 3, 2.0)])]
+    for radius, step in ((1.0, [2, 0]), (0.25, [0.5, 0]), (1.0, [1.5, 1.25])):
+        bodies.append(Polygon([ring(n, radius) + np.array(step)]))
+    seen = set()
+    for first in bodies:
+        for second in bodies:
+            work = Work(Budget(None, None))
+            answer = collide_outlines(first, second, (None, None), work)
+            assert answer == collide_outline_outline(first, second, (None, None), work)
+            meets = collide_outlines(first, second, (None, None), Work(Budget(None, None), witness=False, boolean=True))
+            assert meets.collides == answer.collides
+            seen.add(answer.relation.label)
+    assert seen == {"disjoint", "touching", "overlapping", "first_inside_second", "second_inside_first"}
+
+
+def test_witnesses_of_scenes_and_poses_are_those_of_pairs() -> None:
+    square, bow = np.array(SQUARE, float), np.array([[0, 0], [2, 2], [4, 0], [4, 4], [2, 2], [0, 4]], float)
+    solids: list[Solid] = [Polygon([square + np.array([4 * i, 3 * j])]) for i in range(3) for j in range(3)]
+    solids += [
+        Polygon([bow + np.array([2, 1])]),
+        Polygon([square / 4 + [1, 1]]),
+        Aabb([0, 0], [4, 4]),
+        Aabb([1, 1], [2, 2]),
+    ]
+    pairs = engine.collide_scene(solids, witnesses=True)
+    singles = [collide(solids[i], solids[j]) for i, j, _ in pairs]
+    assert pairs.relation.tolist() == [one.relation for one in singles]
+    assert list(pairs.witnesses or ()) == [one.witness for one in singles]
+    turns, moves = np.repeat(np.eye(2)[None], 81, 0), np.array([[x, y] for x in range(9) for y in range(9)], float) - 4
+    relations, witnesses = engine.collide_poses(solids[0], solids[1], turns, moves, witnesses=True)
+    for relation, witness, move in zip(relations.tolist(), witnesses, moves):
+        one = collide(solids[0], solids[1], second_pose=Pose(np.eye(2), move))
+        assert (relation, witness) == (one.relation, one.witness)
+
+
+def test_of_boundaries_that_are_not_simple_the_kernel_says_whether_they_meet() -> None:
+    bow = Polygon([[[0, 0], [2, 2], [4, 0], [4, 4], [2, 2], [0, 4]]])
+    for step, meets in (((4, 0), True), ((4.5, 0), False), ((1.5, 1), True), ((0.25, 2), True)):
+        other = Polygon([np.array(SQUARE) / 8 + step])
+        work = Work(Budget(None, None), witness=False, boolean=True)
+        assert collide_outlines(bow, other, (None, None), work).collides == meets
+        assert collide(bow, other).collides == meets
