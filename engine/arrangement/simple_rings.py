@@ -36,13 +36,14 @@ def n_leaves(n_edges: int) -> int:
 @inline
 def fill_tree(points: FloatArray, following: IntArray, boxes: FloatArray) -> None:
     """Fill boxes (2 n_leaves, 4): low x, low y, high x, high y of each node; inverted where it has no edges."""
-    leaves = len(boxes) // 2
-    for node in range(len(boxes)):
-        boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3] = np.inf, np.inf, -np.inf, -np.inf
-    for edge in range(len(following)):
-        a, b, leaf = as_point2(points, edge), as_point2(points, following[edge]), leaves + edge // BLOCK
-        boxes[leaf, 0], boxes[leaf, 1] = min(boxes[leaf, 0], a.x, b.x), min(boxes[leaf, 1], a.y, b.y)
-        boxes[leaf, 2], boxes[leaf, 3] = max(boxes[leaf, 2], a.x, b.x), max(boxes[leaf, 3], a.y, b.y)
+    leaves, n = len(boxes) // 2, len(following)
+    for leaf in range(leaves):
+        x, y, right, top = np.inf, np.inf, -np.inf, -np.inf
+        for edge in range(BLOCK * leaf, min(BLOCK * (leaf + 1), n)):
+            a, b = as_point2(points, edge), as_point2(points, following[edge])
+            x, y, right, top = min(x, a.x, b.x), min(y, a.y, b.y), max(right, a.x, b.x), max(top, a.y, b.y)
+        node = leaves + leaf
+        boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3] = x, y, right, top
     for node in range(leaves - 1, 0, -1):
         for k in range(2):
             boxes[node, k] = min(boxes[2 * node, k], boxes[2 * node + 1, k])

@@ -31,7 +31,7 @@ from engine.collision.placed_outline import (
     set_rests,
 )
 from engine.collision.result import Kind, has_faces
-from engine.compiling.jit import allocating_kernel, called, entry_of
+from engine.compiling.jit import allocating_kernel, entry_of, inline
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
 from engine.solids.polygon import Polygon
@@ -107,7 +107,7 @@ def _arrays(vertices: FloatArray, offsets: IntArray, budget: Budget) -> tuple[Fl
     return vertices, read_only(following), read_only(sides)
 
 
-@called
+@inline
 def _relate(
     own: Body, their: Body, room: Room, their_room: Room, is_boolean: bool, is_named: bool, stop: FlagArray
 ) -> tuple[int, int, int, int, int]:
@@ -117,10 +117,9 @@ def _relate(
     points, others = room.points[:n], their_room.points[:m]
     boxes, their_boxes = room.boxes[: 2 * n_leaves(n)], their_room.boxes[: 2 * n_leaves(m)]
     error = max(place(own, points), place(their, others))
-    fill_tree(points, own.following, boxes)
     fill_tree(others, their.following, their_boxes)
-    a = PlacedOutline(points, room.rests[:0], own.following, own.sides, boxes)
-    b = PlacedOutline(others, their_room.rests[:0], their.following, their.sides, their_boxes)
+    a = PlacedOutline(points, own.move, own.following, own.sides, boxes)
+    b = PlacedOutline(others, their.move, their.following, their.sides, their_boxes)
     answer = relate_placed(a, b, error, is_boolean, stop)
     is_open = answer[0] == UNSETTLED or (is_named and answer[4] != APART and answer[2] < 0)
     if not is_open or error == 0.0:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine.arrangement.simple_rings import BLOCK, after, next_leaf
+from engine.arrangement.simple_rings import BLOCK, after, fill_tree, next_leaf
 from engine.collision.codes import DISJOINT, FIRST_INSIDE_SECOND, OVERLAPPING, SECOND_INSIDE_FIRST, TOUCHING, UNSETTLED
 from engine.collision.meshes.placement import orient2d_near
 from engine.compiling.jit import called, inline
@@ -46,7 +46,7 @@ PlacedOutline = namedtuple("PlacedOutline", "points rests following sides boxes"
 | field | shape | meaning |
 |---|---|---|
 | points | (n, 2 or more) | vertices, rounded |
-| rests | (n, 4) | what rounding took, exactly: two more parts of x, then of y; (0, 4) if unknown |
+| rests | (n, 4) | what rounding took, exactly: two more parts of x, then of y; unknown if it has one dimension |
 | following, sides | (n,) | as in `OutlineArrays`; sides may be (0,): unknown |
 | boxes | (2 n_leaves, 4) | tree over the edges |
 """
@@ -55,7 +55,8 @@ Body = namedtuple("Body", "vertices following sides turn move")
 
 
 class Spot(NamedTuple):
-    """A placed vertex: x and y rounded, and two further parts of each; NaN if these are unknown."""
+    """A placed vertex: x and y rounded, and two further parts of each; a `Point2` is one without these, for which code
+    of its own is compiled."""
 
     x: float
     y: float
@@ -76,7 +77,7 @@ def _is_in_sector(by_start: int, by_end: int, turn: int, is_start: bool) -> bool
 
 
 @inline
-def _is_same_way(p: Spot, s: Spot, t: Spot, side: int, error: float) -> bool:
+def _is_same_way(p: Any, s: Any, t: Any, side: int, error: float) -> bool:
     """Return whether s and t lie in one direction from p. side: the sign of the turn from s to t."""
     if side != 0 or order(s, p, 0, error) != order(t, p, 0, error):
         return False
@@ -84,7 +85,7 @@ def _is_same_way(p: Spot, s: Spot, t: Spot, side: int, error: float) -> bool:
 
 
 @called
-def _sector_bits(p: Spot, before: Spot, later: Spot, side: int, c: Spot, d: Spot, their_side: int, error: float) -> int:
+def _sector_bits(p: Any, before: Any, later: Any, side: int, c: Any, d: Any, their_side: int, error: float) -> int:
     """Return the bits IN_BOTH, OUT_OF_SECOND, OUT_OF_FIRST that two boundaries through a point p prove near p. before,
     later: neighbours of p on one boundary; c, d: on the other. side, their_side: 1 if the interior is on the left, -1
     if on the right. The interiors are sectors from s counter-clockwise to e, and from t to f; two sectors intersect if
@@ -107,26 +108,32 @@ def _contact_bits(own: PlacedOutline, edge: int, their: PlacedOutline, other: in
     meets edge `other` of another, if these are vertices but not the start of either edge: there the edge before ends.
     """
     after_edge, after_other = own.following[edge], their.following[other]
-    a, b, c, d = spot(own, edge), spot(own, after_edge), spot(their, other), spot(their, after_other)
+    a, b, c, d = _spot(own, edge), _spot(own, after_edge), _spot(their, other), _spot(their, after_other)
     side, their_side, bits = own.sides[edge], their.sides[other], 0
     if not _are_same(b, c, error) and _is_in_box(b, c, d, error) and _side(c, d, b, error) == 0:
-        their_later = spot(their, their.following[after_other]) if _are_same(b, d, error) else d
-        later = spot(own, own.following[after_edge])
+        their_later = _spot(their, their.following[after_other]) if _are_same(b, d, error) else d
+        later = _spot(own, own.following[after_edge])
         bits = _sector_bits(b, a, later, side, c, their_later, their_side, error)
     is_inner = not _are_same(d, a, error) and not _are_same(d, b, error)
     if is_inner and _is_in_box(d, a, b, error) and _side(a, b, d, error) == 0:
-        their_later = spot(their, their.following[after_other])
+        their_later = _spot(their, their.following[after_other])
         bits |= _sector_bits(d, a, b, side, c, their_later, their_side, error)
     return bits
 
 
 @inline
-def spot(body: PlacedOutline, i: int) -> Spot:
+def spot_of(points: FloatArray, rests: FloatArray, i: int) -> Any:
+    """Return vertex i of a placed body as a `Spot`, or as a `Point2` if rests are unknown."""
+    if rests.ndim == 1:
+        return as_point2(points, i)
+    rest = rests[i]
+    return Spot(points[i, 0], points[i, 1], rest[0], rest[1], rest[2], rest[3])
+
+
+@inline
+def _spot(body: PlacedOutline, i: int) -> Any:
     """Return vertex i of a placed body."""
-    if len(body.rests) == 0:
-        return Spot(body.points[i, 0], body.points[i, 1], np.nan, np.nan, np.nan, np.nan)
-    rest = body.rests[i]
-    return Spot(body.points[i, 0], body.points[i, 1], rest[0], rest[1], rest[2], rest[3])
+    return spot_of(body.points, body.rests, i)
 
 
 @called
@@ -139,31 +146,29 @@ def _set_difference(e: Any, a: float, a1: float, a2: float, b: float, b1: float,
 
 
 @inline
-def order(p: Spot, q: Spot, axis: int, error: float) -> int:
+def order(p: Any, q: Any, axis: int, error: float) -> int:
     """Return the sign of a coordinate of p less that of q; UNDECIDED if rounding, of at most `error` a coordinate,
     leaves it open."""
-    a, a1, a2 = (p.x, p.x1, p.x2) if axis == 0 else (p.y, p.y1, p.y2)
-    b, b1, b2 = (q.x, q.x1, q.x2) if axis == 0 else (q.y, q.y1, q.y2)
-    gap = a - b
+    gap = p[axis] - q[axis]
     if error == 0.0 or abs(gap) > 2.0 * error:
         return int(gap > 0.0) - int(gap < 0.0)
-    if not (a1 == a1 and b1 == b1):  # NaN
+    return _order_exactly(p, q, axis)
+
+
+@called
+def _order_exactly(p: Any, q: Any, axis: int) -> int:
+    """Return the exact sign of a coordinate of p less that of q, or UNDECIDED."""
+    if len(p) == 2:
         return UNDECIDED
-    return _order_exactly(a, a1, a2, b, b1, b2)
+    e, at = workspace(6), 2 + 2 * axis
+    return sign(e, _set_difference(e, p[axis], p[at], p[at + 1], q[axis], q[at], q[at + 1]))
 
 
 @called
-def _order_exactly(a: float, a1: float, a2: float, b: float, b1: float, b2: float) -> int:
-    """Return the sign of a + a1 + a2 - (b + b1 + b2)."""
-    e = workspace(6)
-    return sign(e, _set_difference(e, a, a1, a2, b, b1, b2))
-
-
-@called
-def _side_exactly(p: Spot, q: Spot, r: Spot) -> int:
-    """Return the exact sign of orient2d of three placed vertices; UNDECIDED if a rest is unknown. Coordinates are below
+def _side_exactly(p: Any, q: Any, r: Any) -> int:
+    """Return the exact sign of orient2d of three placed vertices, or UNDECIDED. Coordinates are below
     2^303 and multiples of 2^-508 (`set_rests`), products of differences multiples of 2^-1016."""
-    if not (p.x1 == p.x1 and q.x1 == q.x1 and r.x1 == r.x1):
+    if len(p) == 2:
         return UNDECIDED
     ax, ay, bx, by, e = workspace(6), workspace(6), workspace(6), workspace(6), workspace(144)
     m_ax = _set_difference(ax, p.x, p.x1, p.x2, r.x, r.x1, r.x2)
@@ -175,14 +180,14 @@ def _side_exactly(p: Spot, q: Spot, r: Spot) -> int:
 
 
 @inline
-def _side(p: Spot, q: Spot, r: Spot, error: float) -> int:
+def _side(p: Any, q: Any, r: Any, error: float) -> int:
     """Return the sign of orient2d of three placed vertices, or UNDECIDED."""
     side = orient2d_near(Point2(p.x, p.y), Point2(q.x, q.y), Point2(r.x, r.y), error)
     return _side_exactly(p, q, r) if side == UNDECIDED and error > 0.0 else side
 
 
 @inline
-def _are_same(p: Spot, q: Spot, error: float) -> bool:
+def _are_same(p: Any, q: Any, error: float) -> bool:
     """Return whether two placed vertices are equal."""
     if error == 0.0:
         return p.x == q.x and p.y == q.y
@@ -190,7 +195,7 @@ def _are_same(p: Spot, q: Spot, error: float) -> bool:
 
 
 @inline
-def _is_in_box(p: Spot, a: Spot, b: Spot, error: float) -> bool:
+def _is_in_box(p: Any, a: Any, b: Any, error: float) -> bool:
     """Return whether p lies in the box around segment ab."""
     if error == 0.0:
         return min(a.x, b.x) <= p.x <= max(a.x, b.x) and min(a.y, b.y) <= p.y <= max(a.y, b.y)
@@ -208,8 +213,8 @@ def _classify_edges(own: PlacedOutline, edge: int, their: PlacedOutline, other: 
         return APART
     if max(p.y, q.y) + slack < min(r.y, s.y) or max(r.y, s.y) + slack < min(p.y, q.y):
         return APART
-    a, b = spot(own, edge), spot(own, own.following[edge])
-    c, d = spot(their, other), spot(their, their.following[other])
+    a, b = _spot(own, edge), _spot(own, own.following[edge])
+    c, d = _spot(their, other), _spot(their, their.following[other])
     by_c, by_d = _side(a, b, c, error), _side(a, b, d, error)
     if by_c * by_d == 1:  # UNDECIDED is 2
         return APART
@@ -279,14 +284,14 @@ def set_rests(body: Body, points: FloatArray, rests: FloatArray) -> bool:
 
 
 @inline
-def inside(p: Spot, body: PlacedOutline, error: float) -> int:
+def inside(p: Any, body: PlacedOutline, error: float) -> int:
     """Return 1 if p is inside the rings of a placed body (even-odd), 0 outside, ON_EDGE, or UNSURE. error: bound on
     each coordinate."""
     is_inside, leaves, slack = 0, len(body.boxes) // 2, 2.0 * error
     leaf = next_leaf(body.boxes, 1, p.x - slack, p.y - slack, np.inf, p.y + slack)
     while leaf > 0:  # bound: each leaf once
         for edge in range(BLOCK * (leaf - leaves), min(BLOCK * (leaf - leaves + 1), len(body.following))):
-            a, b = spot(body, edge), spot(body, body.following[edge])
+            a, b = _spot(body, edge), _spot(body, body.following[edge])
             if max(a.x, b.x) + slack < p.x or min(a.y, b.y) > p.y + slack or max(a.y, b.y) + slack < p.y:
                 continue
             from_a, from_b = order(a, p, 1, error), order(b, p, 1, error)
@@ -315,7 +320,7 @@ def _rings_inside(own: PlacedOutline, their: PlacedOutline, error: float, stop: 
             continue
         if stop[0] != 0:
             return _MAYBE
-        where = inside(spot(own, vertex), their, error)
+        where = inside(_spot(own, vertex), their, error)
         if where != ON_EDGE:
             bits |= _IN if where == 1 else (_OUT if where == 0 else _MAYBE)
     return bits
@@ -325,8 +330,8 @@ def _rings_inside(own: PlacedOutline, their: PlacedOutline, error: float, stop: 
 def relate_placed(
     own: PlacedOutline, their: PlacedOutline, error: float, is_boolean: bool, stop: FlagArray
 ) -> tuple[int, int, int, int, int]:
-    """Relate two placed bodies. error: bound on each coordinate; is_boolean: end at the first contact, as TOUCHING.
-    UNSETTLED if `stop` is set.
+    """Relate two placed bodies; the first one's tree is filled here. error: bound on each coordinate; is_boolean: end
+    at the first contact, as TOUCHING. UNSETTLED if `stop` is set.
 
     | result | meaning |
     |---|---|
@@ -365,6 +370,7 @@ def relate_placed(
             leaf = next_leaf(their.boxes, after(leaf), left, bottom, right, top)
     if is_unsure:
         return UNSETTLED, 0, -1, -1, kind
+    fill_tree(own.points, own.following, own.boxes)
     own_bits, bits_of_their = _rings_inside(own, their, error, stop), _rings_inside(their, own, error, stop)
     if (own_bits | bits_of_their) & _MAYBE:
         return UNSETTLED, 0, -1, -1, kind
