@@ -26,10 +26,11 @@ import numpy as np
 from engine.errors import InvalidOperationError, UnsupportedSolidError
 from engine.polygon_overlay.compiled.loading import RingArrays
 from engine.polygon_overlay.compiled.ring_nesting import Nesting, Rule
+from engine.polygon_overlay.coverage import union_of_coverage
 from engine.polygon_overlay.grid import from_units, grid_of
-from engine.polygon_overlay.implicit_rings import NO_RINGS
+from engine.polygon_overlay.implicit_rings import NO_RINGS, one_polygon
 from engine.polygon_overlay.in_integers import overlay_exactly
-from engine.polygon_overlay.pair_arrays import polygon_arrays_of
+from engine.polygon_overlay.pair_arrays import PolygonArrays, polygon_arrays_of
 from engine.polygon_overlay.result import Overlay, OverlayOptions
 from engine.polygon_overlay.run import (
     SELECTED,
@@ -47,7 +48,7 @@ from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.solids.shapes import as_solid, as_solids
-from engine.types import Accuracy, IntArray
+from engine.types import Accuracy
 
 
 @overload
@@ -369,20 +370,15 @@ def _arrange_all(
 ) -> tuple[Overlay, Accuracy]:
     """Return the overlay of the rings of all polygons by a fill rule, each polygon a source of its own, and the
     accuracy report. grid: spacing to which the result is snapped."""
-    rings, sources, starts = _rings_of_all(polygons)
-    nesting = Nesting(sources, np.zeros(0), int(rule))
-    result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)
-    object.__setattr__(result, "_starts", starts)
-    return result, accuracy_of(ulps_moved(result), len(rings.vertices), n_exact, n_rational)
-
-
-def _rings_of_all(polygons: SolidsLike) -> tuple[RingArrays, IntArray, IntArray]:
-    """Return the rings of all polygons, by ring the number of its polygon, and the first vertex of each polygon but the
-    first. Polygons without rings have no number, so that the number of a ring is at least that of its polygon."""
     each = cast("Sequence[Polygon]", polygons_in(polygons, "polygons"))
-    if not each:
-        return NO_RINGS, np.zeros(0, np.int64), np.zeros(0, np.int64)
-    flat = polygon_arrays_of(each)
-    n_rings = np.diff(flat.polygon_offsets)
-    sources = np.repeat(np.cumsum(n_rings > 0) - 1, n_rings)
-    return RingArrays(*flat[:2]), sources, flat.ring_offsets[flat.polygon_offsets[1:-1]]
+    flat = polygon_arrays_of(each) if each else PolygonArrays(*NO_RINGS, one_polygon(0))
+    joined = union_of_coverage(flat, budget) if rule == Rule.ANY and grid is None else None
+    if joined is not None:
+        result, n_exact, n_rational = *joined, 0
+    else:
+        n_rings = np.diff(flat.polygon_offsets)  # polygons without rings have no number: a ring's is at least its own
+        nesting = Nesting(np.repeat(np.cumsum(n_rings > 0) - 1, n_rings), np.zeros(0), int(rule))
+        rings = RingArrays(*flat[:2])
+        result, n_exact, n_rational = overlay_rings(rings, NO_RINGS, "union", budget, nesting, grid)
+    object.__setattr__(result, "_starts", flat.ring_offsets[flat.polygon_offsets[1:-1]])
+    return result, accuracy_of(ulps_moved(result), len(flat.vertices), n_exact, n_rational)

@@ -45,9 +45,11 @@ class Rule(IntEnum):
     """By the winding number: not zero here, positive or negative for the next two."""
     POSITIVE = 3
     NEGATIVE = 4
-    PAIR = 5
+    ONCE = 5
+    """By the winding number: part 1 where it is 1, part 2 where it is neither that nor 0."""
+    PAIR = 6
     """By a table over the labels of two polygons (bit 0: in the subject, bit 1: in the clip)."""
-    FIRST_ALONE = 6
+    FIRST_ALONE = 7
     """Inside source 0 and no other."""
 
 
@@ -93,7 +95,7 @@ def _cross_half_chain(given: Given, chains: Chains, nesting: Nesting, h: FloodFi
         return n_sources ^ chains.mask[chain]
     while chain >= 0:  # bound: the chains that coincide
         ring = given.masks[given.edges.ring[chains.first[chain]]]
-        if Rule.NON_ZERO <= nesting.rule <= Rule.NEGATIVE:
+        if Rule.NON_ZERO <= nesting.rule <= Rule.ONCE:
             n_sources += 1 if (chains.representative[chain] ^ half) & 1 else -1
         else:
             source = ring if nesting.rule == Rule.AGAIN else nesting.shells[ring]
@@ -115,6 +117,8 @@ def _part_of(rule: int, h: FloodFill, selected: FlagArray, n_sources: int) -> in
     state of the flood fill in the face (`_cross_half_chain`). selected: by label the part, for the rule PAIR."""
     if rule == Rule.PAIR:
         return int(selected[n_sources])
+    if rule == Rule.ONCE:
+        return 2 if n_sources < 0 else min(n_sources, 2)
     if rule == Rule.FIRST_ALONE:
         return int(n_sources == 1 and h.place[0] == 0)
     return int(n_sources < 0 if rule == Rule.NEGATIVE else n_sources > 0 if rule != Rule.NON_ZERO else n_sources != 0)
