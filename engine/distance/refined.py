@@ -254,16 +254,19 @@ def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, 
     balls about their triangles, times the unit."""
     candidates, unit = s.room.candidates, s.a.unit
     least, lowest, origin = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Wide(0.0, 0.0)
+    first_size = origin  # order: bounds are less this, so that a double has what parts near ties
     shift = shift_of(s, start, other)
     for k in range(n):
         i, j, first, second = candidates.pairs[k]
         t, u = corners_of(s.a, i, Wide3(origin, origin, origin)), corners_of(s.b, j, shift)
         size, beyond = _bounds(t, u, first, second)
-        low = less(size, Wide(beyond, 0.0))
-        candidates.bounds[k] = low.h * (1.0 - 2.0**-50) - ROUNDING
+        low, first_size = less(size, Wide(beyond, 0.0)), size if k == 0 else first_size
+        more = less(low, first_size).h
+        candidates.bounds[k] = more - 2.0**-50 * abs(more) - ROUNDING
         least = size if less(size, least).h < 0.0 or k == 0 else least
         lowest = low if less(low, lowest).h < 0.0 or k == 0 else lowest
-    n = retain_below(candidates, n, least.h * (1.0 + 2.0**-50) + ROUNDING)
+    most = less(least, first_size).h
+    n = retain_below(candidates, n, most + 2.0**-50 * abs(most) + ROUNDING)
     distance = less(less(least, Wide(radii[0], 0.0)), Wide(radii[1], 0.0))
     value = distance.h / unit
     is_proven = 2.0**-1000 < value < 2.0**1000

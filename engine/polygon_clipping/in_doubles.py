@@ -56,7 +56,7 @@ class Scratch(NamedTuple):
     | --- | --- | --- |
     | rings | int32 (2, room) | the ring as numbers of vertices, and the next one |
     | signs | int8 (room,) | of its vertices |
-    | ends, codes | int32 (room,) | by original vertex the last one of its run; planes that it is outside of |
+    | ends, codes | int32 (room,) | by original vertex the last one of its run; planes it is outside of; new numbers |
     | lows, highs | float64 (3,) | the box of a polygon |
     """
 
@@ -291,6 +291,28 @@ def cut_ring(
 
 
 @merged
+def renumber(s: Scratch, ring: Int32Array, n: int, n_ring: int, n_made: int) -> int:
+    """Give the cut vertices of a ring of n the lowest numbers from n_ring on, for new ones to take those of dropped
+    ones; return the number of vertices of all kinds then, n_made before."""
+    pool, rests, edges, codes, d = s.vertices.pool, s.vertices.rests, s.vertices.edges, s.codes, len(s.vertices.names)
+    codes[n_ring:n_made] = 0
+    for i in range(n):
+        codes[ring[i]] = 1
+    n_left = n_ring
+    for v in range(n_ring, n_made):
+        if codes[v] != 0:
+            for k in range(2 * d):
+                rests[2 * n_left * d + k] = rests[2 * v * d + k]
+            for k in range(d):
+                pool[n_left * d + k] = pool[v * d + k]
+            codes[v], edges[n_left] = n_left, edges[v]
+            n_left += 1
+    for i in range(n):
+        ring[i] = codes[ring[i]] if ring[i] >= n_ring else ring[i]
+    return n_left
+
+
+@merged
 def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_ring: int) -> tuple[int, int]:
     """Clip the ring of n runs by the n_cutting planes of s.cutting in order; return the number of vertices left (or
     DOUBT), and its row in `rings`. Vertices below n_ring are original ones."""
@@ -305,6 +327,8 @@ def cut_by_planes(s: Scratch, planes: PlaneTables, n_cutting: int, n: int, n_rin
         cutting.contacts[i_plane] += n_on
         if n_in == n:
             continue
+        if n_in != DOUBT and n_made + n > s.signs.size:
+            n_made = renumber(s, ring, n, n_ring, n_made)
         if n_in == DOUBT or n_made + n > s.signs.size:
             return DOUBT, now
         cutting.dropped[i_plane] = True

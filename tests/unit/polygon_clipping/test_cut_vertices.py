@@ -117,6 +117,18 @@ def test_areas_on_both_sides_of_a_line_add_up() -> None:
         assert abs(areas[1] + areas[2] - areas[0]) < Fraction(1, 10**10)
 
 
+def test_stars_on_many_planes_use_the_room_of_dropped_vertices_again() -> None:
+    rng = np.random.default_rng(4)
+    turns = np.arange(128) * 2 * np.pi / 128
+    region = Convex(np.c_[-np.cos(turns), -np.sin(turns), np.ones(128)])
+    around = np.arange(200) * 2 * np.pi / 200
+    star = np.stack([np.cos(around), np.sin(around)], 1) * rng.uniform(0.1, 3.0, 200)[:, None]
+    clipped, accuracy = clip_polygons([[star]], region, report=True)
+    assert accuracy.n_rational == 0
+    (left,), _ = clip_polygon([star.tolist()], [integer_row(row) for row in region.planes.tolist()], lambda: None)
+    assert clipped.rings(0)[0].tolist() == left
+
+
 def area(ring: Any) -> Fraction:
     points = [tuple(map(Fraction, vertex)) for vertex in ring]
     return sum((p[0] * q[1] - p[1] * q[0] for p, q in zip(points, points[1:] + points[:1])), Fraction(0)) / 2
