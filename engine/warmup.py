@@ -27,7 +27,7 @@ from engine.errors import InvalidInputError
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.planes import orientations
 from engine.polygon_overlay.batch import overlay_batch
-from engine.polygon_overlay.overlay import overlay
+from engine.polygon_overlay.overlay import overlay, union_all
 from engine.running.budget import Budget
 from engine.running.parallel import check_options
 from engine.scenes.collide_scene import collide_scene
@@ -258,6 +258,8 @@ def _warm_overlay_rest() -> None:
     overlay(Polygon([circle]), Polygon([circle + 0.5]))  # large ones, of which few edges are looked at
     overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=0.5)
     overlay(Polygon([circle]), Polygon([circle + 0.5]), grid=1e-14)  # distinguishable as doubles, but not certainly
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    union_all([Polygon([corner + [x, y]]) for x in range(8) for y in range(8)])  # many, that share edges
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")

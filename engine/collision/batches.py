@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ _LEAST_POSES: Final = 32
 _FEW: Final = 64
 """Largest number of distinct solids that are all prepared for a query about some of them."""
 _SMALL: Final = 64
-"""Most vertices of a polygon whose box is computed together with those of others, and not cached with it."""
+"""Most vertices of a polygon for `_is_small`."""
 
 
 class PairBatches:
@@ -249,15 +250,21 @@ def bodies_of(
 ) -> SceneBodies:  # fmt: skip
     """Return bodies of any type as arrays. solids, poses: of each body; distinct: each solid object once; kinds: index
     in `distinct` of each body's solid; check: called while another thread computes a box, may raise."""
-    n = len(distinct)
-    own = OwnBoxes(np.empty((n, 2, distinct[0].dimension if n else 3)), np.empty(n), np.zeros(n))
-    small = [k for k, solid in enumerate(distinct) if type(solid) is Polygon and 0 < len(solid.vertices) <= _SMALL]
-    if small:
-        own.boxes[small], own.reaches[small] = boxes_of_polygons([distinct[k] for k in small])
-    for k in sorted({*range(n)}.difference(small)):
-        own.boxes[k, 0], own.boxes[k, 1], own.reaches[k] = own_box(distinct[k], check)
-        own.radii[k] = getattr(distinct[k], "radius", 0.0)
-    return _place_bodies(solids, poses, distinct, kinds, own)
+    d, is_small = (distinct[0].dimension if distinct else 3), [_is_small(solid) for solid in distinct]
+    boxes, reaches = np.empty((len(distinct), 2, d)), np.empty(len(distinct))
+    if d == 2 and any(is_small):
+        boxes[is_small], reaches[is_small] = boxes_of_polygons([*compress(distinct, is_small)])
+    others = np.flatnonzero(~np.array(is_small, np.bool_))
+    if len(others):
+        own = [own_box(distinct[k], check) for k in others.tolist()]
+        boxes[others], reaches[others] = np.array([box[:2] for box in own]), [box[2] for box in own]
+    radii = np.array([getattr(solid, "radius", 0.0) for solid in distinct])
+    return _place_bodies(solids, poses, distinct, kinds, OwnBoxes(boxes, reaches, radii))
+
+
+def _is_small(solid: Solid) -> bool:
+    """Return whether a solid is a polygon whose box is computed together with those of others, and not cached."""
+    return type(solid) is Polygon and 0 < len(solid.vertices) <= _SMALL
 
 
 def _place_bodies(
