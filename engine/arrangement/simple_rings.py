@@ -19,8 +19,11 @@ BLOCK: Final = 8
 """Consecutive edges around which one box lies."""
 _SMALLEST, _LARGEST = 2.0**-480, 2.0**480
 """Range of nonzero coordinates (_SMALLEST, _LARGEST) in which orient2d is never UNDECIDED."""
-_MOST_STEPS: Final = 1 << 28
-"""Largest number of rings times edges for which sides are computed: half a second."""
+_MOST_STEPS: Final = 1 << 26
+"""Largest number of rings times edges for which sides are computed: a tenth of a second."""
+_MOST_NEAR, _MORE = 1 << 8, 1 << 13
+"""Most pairs of edges near each other that are looked at, by edge, and edges added to those of a body for that: long
+edges beside each other would be n^2 pairs."""
 _POLL: Final = 0xFF
 
 
@@ -84,9 +87,9 @@ def _do_meet(a: Point2, b: Point2, c: Point2, d: Point2) -> bool:
 
 @inline
 def _has_simple_edges(vertices: FloatArray, following: IntArray, boxes: FloatArray, stop: FlagArray) -> bool:
-    """Return whether edges meet only in the vertices between consecutive ones, and none has length 0; False if `stop`
-    is set. boxes: the tree over them."""
-    leaves = len(boxes) // 2
+    """Return whether edges meet only in the vertices between consecutive ones, and none has length 0; False also if too
+    many are near each other, or `stop` is set. boxes: the tree over them."""
+    leaves, n_left = len(boxes) // 2, _MOST_NEAR * (len(following) + _MORE) // BLOCK
     for i in range(len(following)):
         if i & _POLL == 0 and stop[0] != 0:
             return False
@@ -100,12 +103,15 @@ def _has_simple_edges(vertices: FloatArray, following: IntArray, boxes: FloatArr
         left, bottom, right, top = min(a.x, b.x), min(a.y, b.y), max(a.x, b.x), max(a.y, b.y)
         leaf = next_leaf(boxes, 1, left, bottom, right, top)
         while leaf > 0 and BLOCK * (leaf - leaves) < i:
+            n_left -= 1
             for j in range(BLOCK * (leaf - leaves), min(BLOCK * (leaf - leaves + 1), i)):
                 if following[i] == j or following[j] == i:
                     continue
                 if _do_meet(a, b, as_point2(vertices, j), as_point2(vertices, following[j])):
                     return False
             leaf = next_leaf(boxes, after(leaf), left, bottom, right, top)
+        if n_left < 0:
+            return False
     return True
 
 

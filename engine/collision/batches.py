@@ -66,7 +66,7 @@ class PairBatches:
         solid its index there, -1 for a solid that they do not take. In the plane `OutlineArrays` of outlines with
         simple boundaries, in space `ConvexArrays` of convex bodies. Cached."""
         if self.cached_pool is None:
-            self.cached_pool = outline_pool(self.distinct) if self.is_planar else _convex_pool(self.distinct, budget)
+            self.cached_pool = (outline_pool if self.is_planar else _convex_pool)(self.distinct, budget)
         return self.cached_pool
 
     def task(

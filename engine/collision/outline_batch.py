@@ -58,7 +58,7 @@ Room = namedtuple("Room", "points rests boxes")
 """Work space for a `PlacedOutline`."""
 
 
-def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
+def outline_pool(bodies: Sequence[Solid], budget: Budget = UNLIMITED) -> tuple[OutlineArrays, IntArray]:
     """Return bodies in one set of arrays, and by body its index there, -1 for a body without edges."""
     of_kind = dict(zip(map(type, bodies), bodies))
     has_edges = {kind: has_faces(body) for kind, body in of_kind.items()}
@@ -69,12 +69,12 @@ def outline_pool(bodies: Sequence[Solid]) -> tuple[OutlineArrays, IntArray]:
     joined = np.frombuffer(b"".join([offsets for _, offsets in rings]), np.int64)
     lengths = np.delete(np.diff(joined, append=0), np.cumsum(counts) - 1)
     following, sides, firsts = np.empty(len(vertices), np.int64), np.zeros(len(vertices), np.int8), summed(sizes)
+    groups = summed(lengths), summed(counts - 1)
     if len(vertices):
-        entry_of(find_rings)(
-            vertices, summed(lengths), summed(counts - 1), _AT_ONCE, following, sides, UNLIMITED.flag
-        )  # fmt: skip
+        entry_of(find_rings)(vertices, *groups, _AT_ONCE, following, sides, budget.flag)
+        budget.check()
     for number in np.flatnonzero(sizes > _AT_ONCE).tolist():
-        sides[firsts[number] : firsts[number + 1]] = outline_arrays(bodies[number])[2]
+        sides[firsts[number] : firsts[number + 1]] = outline_arrays(bodies[number], budget)[2]
     pool = OutlineArrays(vertices, read_only(following), read_only(sides), firsts)
     return pool, np.where(sizes > 0, np.arange(len(bodies)), -1)
 

@@ -7,7 +7,7 @@ part outside the other. A ring that meets nothing is located by one vertex. This
 interior only at a contact, or its whole ring lies there.
 
 Signs are those of rounded poses where these prove them. Else every coordinate r x + s y + t is an exact sum of three
-doubles, mostly, and expansions decide.
+doubles, mostly, and expansions decide (J. R. Shewchuk, 1997).
 """
 
 from __future__ import annotations

@@ -348,8 +348,6 @@ def pair_keys(named: Any, n_bodies: int, name: str, budget: Budget) -> IntArray:
 _STRETCHED: Final = 1.0 + 2.0**-38
 """R'R = I + E with |E_ij| <= 1e-12: |R v|^2 <= (1 + 3e-12) |v|^2, so |R v| < (1 + 2^-38) |v|. Needed since boxes are
 posed, while `collide` leaves out poses that both bodies have in common."""
-
-
 _NONE: Final = pool_bodies([])
 
 
