@@ -2,7 +2,7 @@
 
 Each boundary, with the interior on its left, winds once around its interior and not around the rest. The sum of all
 winds around each point as often as polygons contain it. In it two edges with the same ends in opposite directions
-cancel, so the union is where what remains winds (K. Hormann, A. Agathos, 2001); nothing else is assumed of the polygons.
+cancel, so the union is where what remains winds (K. Hormann, A. Agathos, 2001), whatever polygons they are.
 """
 
 from __future__ import annotations
