@@ -152,8 +152,8 @@ def collide_scene(
     Notes
     -----
     Broad phase: boxes around the posed bodies, by a grid, or by a sweep where sizes are mixed. Narrow phase: pairs of
-    boxes, balls and convex polyhedra are decided in batches where float64 with a proven margin can; all others,
-    contacts above all, as by `collide`.
+    boxes, balls and convex polyhedra are decided in batches where float64 with a proven margin can, outlines of the
+    plane by exact signs, in contact too; all others, contacts above all, as by `collide`.
 
     Boundary and degenerate input: as `collide`; a pair exactly as far apart as the gap is clear. An empty scene has no
     pairs; two surfaces touch or are disjoint.

@@ -30,6 +30,7 @@ from engine import (
     clearance_poses,
 )
 from engine.collision.result import Clearance, Feature
+from engine.predicates.rational import nearest_with_root
 from tests.unit.collision.lattices import solid
 from tests.unit.distance.makers import (
     FAMILIES,
@@ -259,3 +260,37 @@ def test_empty_and_wrong_input() -> None:
     cancel.set()
     with pytest.raises(CancelledError):
         clearance_poses(box, box, [np.eye(3)], [[3, 0, 0]], cancel=cancel)
+
+
+def test_near_ties_of_rings_around_rings_are_parted_exactly() -> None:
+    """Of 600 corners each is as far from the other ring as the rest, but for its rounding."""
+    n = 600
+    t = np.arange(n) * 2 * np.pi / n
+    ring = np.stack([np.cos(t), np.sin(t)], 1)
+    move = np.array([0.3, 0.1])
+    inner, hole = ring + move, ring * 1.5 + move
+    found = clearance(Polygon([ring * 2 + move, hole]), Polygon([inner]))
+    assert isinstance(found, Clearance)
+    assert found.features is not None
+    best = None
+    for own, other in ((inner, hole), (hole, inner)):
+        for step in (-1, 0):
+            for k in range(n):
+                places = own[k], other[(k + step) % n], other[(k + step + 1) % n]
+                size = squared_from_segment(*(tuple(map(Fraction, place)) for place in places))
+                best = size if best is None else min(best, size)
+    assert best is not None
+    assert found.distance == nearest_with_root(0, 1, best.numerator * best.denominator, best.denominator)
+    bodies = np.concatenate([ring * 2 + move, hole]), inner
+    ends = [[tuple(map(Fraction, body[k])) for k in each.indices] for body, each in zip(bodies, found.features)]
+    ends.sort(key=len)
+    assert len(ends[0]) == 1
+    assert squared_from_segment(ends[0][0], ends[1][0], ends[1][-1]) == best
+
+
+def squared_from_segment(p: Any, a: Any, b: Any) -> Fraction:
+    """Return the exact squared distance of a point from a segment."""
+    u, w = (b[0] - a[0], b[1] - a[1]), (p[0] - a[0], p[1] - a[1])
+    size, along = u[0] * u[0] + u[1] * u[1], u[0] * w[0] + u[1] * w[1]
+    share = Fraction(0) if size == 0 else min(max(along / size, Fraction(0)), Fraction(1))
+    return Fraction((w[0] - share * u[0]) ** 2 + (w[1] - share * u[1]) ** 2)
