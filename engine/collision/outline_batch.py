@@ -34,7 +34,6 @@ from engine.collision.result import Kind, has_faces
 from engine.compiling.jit import allocating_kernel, entry_of, inline
 from engine.running.budget import UNLIMITED, Budget
 from engine.solids.base import Solid
-from engine.solids.polygon import Polygon
 from engine.solids.primitives import Aabb
 from engine.solids.ragged import summed
 from engine.types import FlagArray, FloatArray, Int8Array, Int32Array, IntArray, read_only
@@ -81,11 +80,11 @@ def outline_pool(bodies: Sequence[Solid], budget: Budget = UNLIMITED) -> tuple[O
 
 def rings_of(body: Any) -> tuple[FloatArray, IntArray]:
     """Return vertices (n, 2) and ring offsets (n_rings + 1,) of a polygon, triangle or box of the plane."""
-    if isinstance(body, Polygon):
-        body.check_not_empty()
     if isinstance(body, Aabb):
         (x0, y0), (x1, y1) = body.min, body.max
         return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]), np.array([0, 4])
+    if not len(body.vertices):
+        body.check_not_empty()
     return body.vertices, body.ring_offsets
 
 

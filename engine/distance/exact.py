@@ -103,7 +103,7 @@ def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap
         if all(is_beyond(wall, corner) for corner in s) and all(is_beyond(other, corner) for corner in t):
             return suggested
     best = None
-    for i, j in _PAIRS:
+    for i, j in _OF_EDGES if s[1] == s[2] and t[1] == t[2] else _PAIRS:
         candidate = _gap(s, t, i, j)
         if candidate is not None and (best is None or candidate.is_less(best)):
             best = candidate
@@ -114,6 +114,8 @@ def nearest_of_triangles(s: Corners, t: Corners, first: int, second: int) -> Gap
 _ALL: Final = [(i, j) for i in range(7) for j in range(7) if (i < 6 and j < 6) or i < 3 or j < 3]
 _PAIRS: Final = sorted(_ALL, key=lambda pair: max(pair[0] // 3, pair[1] // 3))
 """Pairs of feature codes that can be nearest, pairs of vertices first."""
+_OF_EDGES: Final = [pair for pair in _PAIRS if {*pair} <= {0, 1, 3}]
+"""The same for two edges of the plane, which are triangles whose last two corners are equal."""
 
 
 def walls(gap: Gap) -> tuple[Wall, Wall]:
