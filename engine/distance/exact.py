@@ -115,7 +115,7 @@ _ALL: Final = [(i, j) for i in range(7) for j in range(7) if (i < 6 and j < 6) o
 _PAIRS: Final = sorted(_ALL, key=lambda pair: max(pair[0] // 3, pair[1] // 3))
 """Pairs of feature codes that can be nearest, pairs of vertices first."""
 _OF_EDGES: Final = [pair for pair in _PAIRS if {*pair} <= {0, 1, 3}]
-"""The same for two edges of the plane, which are triangles whose last two corners are equal."""
+"""The same for two edges, which are triangles whose last two corners are equal."""
 
 
 def walls(gap: Gap) -> tuple[Wall, Wall]:
