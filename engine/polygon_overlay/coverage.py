@@ -53,7 +53,8 @@ def union_of_coverage(polygons: PolygonArrays, budget: Budget) -> tuple[Overlay,
         return None
     is_left, state[:] = sides > 0, 0
     tails, heads = np.where(is_left, starts, ends), np.where(is_left, ends, starts)
-    cancel(places, tails, heads, 0, table, state, budget.flag)
+    if cancel(places, tails, heads, 0, table, state, budget.flag)[1] < 0:
+        return None
     edges, rings = np.empty(n, np.int32), np.empty(n + 1, np.int64)
     links = np.empty((2, n), np.int32)
     n_left, n_rings = entry_of(trace_rings)(places, tails, heads, table, state, links, edges, rings, budget.flag)

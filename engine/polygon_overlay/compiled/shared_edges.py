@@ -14,6 +14,8 @@ from engine.types import FlagArray, Int8Array, Int32Array, IntArray
 
 _NONE: Final = -1
 _POLL: Final = 0x3FFF
+_MOST_PROBES: Final = 1 << 10
+"""Most slots that are looked at for an edge: more are taken by many equal edges alone."""
 
 
 @inline
@@ -43,7 +45,8 @@ def cancel_edges(
     """Set state (n,), zero on entry, to 1 for edges that cancel in pairs; return the numbers of edges seen and of those
     cancelled. Edge e runs from vertex tails[e] to heads[e]; places (n, 2) int64: the bits of all coordinates. sample:
     if not 0, only edges without these bits in their hash are seen, and equal ones cancel in either direction. table: a
-    power of two of slots, at least 2 n. Ends early if `stop` is set."""
+    power of two of slots, at least 2 n. Ends early, with -1 for the last number, if two edges are equal in one
+    direction (polygons overlap), or very many share a slot; or if `stop` is set."""
     mask, n_seen, n_cancelled = len(table) - 1, 0, 0
     table[:] = _NONE
     for e in range(len(tails)):
@@ -54,17 +57,22 @@ def cancel_edges(
             continue
         n_seen += 1
         slot = _slot_of(h, mask)
-        while table[slot] != _NONE:  # bound: half of the slots are empty
+        for _ in range(_MOST_PROBES + 1):
             f = table[slot]
+            if f == _NONE:
+                break
             is_pair = _are_same(places, tails[e], heads[f]) and _are_same(places, heads[e], tails[f])
-            if sample != 0 and not is_pair:
-                is_pair = _are_same(places, tails[e], tails[f]) and _are_same(places, heads[e], heads[f])
-            if is_pair and state[f] == 0:
+            is_twin = _are_same(places, tails[e], tails[f]) and _are_same(places, heads[e], heads[f])
+            if is_twin and sample == 0 and state[f] == 0:
+                return n_seen, -1
+            if (is_pair or is_twin) and state[f] == 0:
                 state[e] = state[f] = 1
                 n_cancelled += 2
                 break
             slot = (slot + 1) & mask
         if state[e] == 0:
+            if table[slot] != _NONE:
+                return n_seen, -1
             table[slot] = e
     return n_seen, n_cancelled
 

@@ -93,6 +93,12 @@ def crossing_itself(random: Random) -> list[list[Any]]:
     return [*parcels(random), [np.array([[20, 0], [21, 1], [21, 0], [20, 1.0]])]]
 
 
+def equal(random: Random) -> list[list[Any]]:
+    """Parcels twice and more often, either way round."""
+    found = parcels(random)
+    return [*found, *([[found[5][0][:: random.choice([-1, 1])]] for _ in range(1500)])]
+
+
 def pie(random: Random) -> list[list[Any]]:
     """Two hundred slices with one common corner."""
     t = np.sort(random.uniform(0, 2 * np.pi, 200))
@@ -102,7 +108,7 @@ def pie(random: Random) -> list[list[Any]]:
 
 FAMILIES: dict[Callable[[Random], list[list[Any]]], bool | None] = {
     parcels: True, with_gaps: True, with_islands: True, with_junctions: True, of_many_corners: None, overlapping: False,
-    crossing_itself: False, pie: None,
+    crossing_itself: False, pie: None, equal: False,
 }  # fmt: skip
 """Whether the union is made without the arrangement of all; None: as it happens."""
 
