@@ -39,6 +39,7 @@ from engine.segment_clipping.exact_pieces import (
     nodes_with_locations,
     parameter,
 )
+from engine.segment_clipping.on_boundary.contacts import Bit
 from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.segment_clipping.pieces import Piece, Pieces, as_pieces
@@ -347,7 +348,8 @@ def _contacts(p: Point, q: Point, solid: Any, pose: Pose | None, budget: Budget)
     """Yield the exact contacts of segment p q, in the solid's own frame, with the solid's edges or triangles."""
     boundary = boundary_of(solid)
     if pose is None and list(p) != list(q):
-        near, _, _ = contacts_with(np.array([[p, q]], np.float64), boundary, budget)
+        near, kinds, _ = contacts_with(np.array([[p, q]], np.float64), boundary, budget)
+        near = near[kinds & np.uint8(Bit.CEASES) == 0]  # each element once
     else:
         near = _near(boundary.elements, p, q)
     n = len(p)

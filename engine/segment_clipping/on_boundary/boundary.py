@@ -93,25 +93,24 @@ def clip_chunk(
         of_starts = at_once[0]
     locations[:, 0] = of_starts
     if np.count_nonzero(of_starts) < len(points):
-        _locate_second_ends(part, locations, boundary, locator or locator_of(region), budget)
+        on_it = np.flatnonzero(of_starts == 0)
+        locator = locator or locator_of(region)
+        locator.fill(part[on_it, 1], of_ends := np.empty(len(on_it), np.int8), budget)
+        locations[on_it, 1] = of_ends
     parts, state = cut_at_crossings(part, locations, boundary, budget)
     left = state.nonzero()[0]  # not SETTLED
+    chords = left[(locations[left] == 0).all(axis=1)]
+    if len(chords) and locator is not None:
+        some, of_chords = part[chords], locations[chords]
+        locate_before_contacts(some, of_chords, boundary, locator, budget)
+        more, state[chords] = cut_at_crossings(some, of_chords, boundary, budget)
+        parts += [pieces._replace(source=chords[pieces.source]) for pieces in more]
+        left = state.nonzero()[0]
     if len(left):
         locations[np.abs(locations) > 1] = 0
         parts.append(clip_exactly(part, left, region, None, budget, locations[left].tolist()))
-    pieces = in_order_of_source(parts) if len(left) else joined(parts) if len(parts) > 1 else parts[0]
+    pieces = in_order_of_source(parts) if len(left) + len(chords) else joined(parts) if len(parts) > 1 else parts[0]
     return (pieces._replace(source=pieces.source + first) if first else pieces), left
-
-
-def _locate_second_ends(
-    segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
-) -> None:
-    """Set locations[:, 1] of the segments whose first end is on the boundary (locations[:, 0] is 0) to the location of
-    the second end. For chords, with both ends on the boundary, set what `locate_before_contacts` does."""
-    chords = np.flatnonzero(locations[:, 0] == 0)
-    locator.fill(segments[chords, 1], second := np.empty(len(chords), np.int8), budget)
-    locations[chords, 1] = second
-    locate_before_contacts(segments, locations, boundary, locator, budget)
 
 
 def cut_at_crossings(
@@ -141,6 +140,8 @@ def cut_at_crossings(
 
 _AT_END: Final = 2 * Place.END + 5
 """Code of an element crossed at the segment's end; one less if it is touched."""
+_ALONG_AT_END: Final = _AT_END - Bit.CROSSES | Bit.ALONG
+"""The same without CROSSES, BEGINS and CEASES, of an element that the segment runs along."""
 _PER_BLOCK: Final = 64
 """Chords (segments with both ends on the boundary) whose contacts are in memory together."""
 _PLACES: Final = (0.5, 0.3125, 0.8125)
@@ -188,14 +189,10 @@ def _crossing_parity(
     elements that contain a segment's end, and the segment of each."""
     met, kinds, offsets = contacts_with(segments, boundary, budget)
     owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
-    holds_end = kinds | Bit.CROSSES == _AT_END
+    holds_end, place = kinds | Bit.CROSSES == _AT_END, kinds & ~np.uint8(Bit.CROSSES | Bit.BEGINS | Bit.CEASES)
     turning = owners[(kinds & Bit.CROSSES != 0) & ~holds_end]
     is_sure = np.ones(len(segments), np.bool_)
-    is_sure[owners[kinds == Kind.DEGENERATE]] = False
-    along = np.flatnonzero(kinds == Kind.ALONG)
-    edges, ends = boundary.elements[met[along]], segments[owners[along], 1]
-    reaches = ((edges.min(axis=1) <= ends) & (ends <= edges.max(axis=1))).all(axis=1)
-    is_sure[owners[along[reaches]]] = False
+    is_sure[owners[(kinds == Kind.DEGENERATE) | (place == _ALONG_AT_END)]] = False
     is_odd = np.bincount(turning, minlength=len(segments)) & 1 == 1
     return is_odd, is_sure, met[holds_end], owners[holds_end]
 

@@ -29,7 +29,6 @@ from engine.segment_clipping.on_boundary.contacts import (
     allocate_contacts,
     are_same_point,
     axis_of,
-    code_of,
     decode_place,
     edge_stack,
     gather_edges,
@@ -54,17 +53,14 @@ def cut_touching(segments: FloatArray, item: int, boundary: Any, contacts: Any, 
     """Compute the contacts of segment ``item`` into `cuts`, sorted along it; return their number, UNSURE if one is
     undecided. boundary: `Outline` or `Mesh`; contacts: filled by `gather_edges` or `gather_triangles`."""
     first, last, n = contacts.offsets[item], contacts.offsets[item + 1], 0
-    if not is_item_safe(segments, item) or 2 * (last - first) > cuts.t.size:
+    if not is_item_safe(segments, item) or last - first > cuts.t.size:
         return UNSURE
     for i in range(first, last):
         element, kind = contacts.met[i], contacts.kinds[i]
         if kind == Kind.DEGENERATE or not (boundary.are_safe or is_item_safe(boundary.elements, element)):
             return UNSURE
         cuts.met[n], cuts.faces[n] = element, boundary.faces[element]
-        if kind == Kind.ALONG:
-            n = _write_overlap(segments, item, boundary.elements, cuts, n)
-        else:
-            n = _write_contact(segments, item, boundary.elements, CROSSED if kind == Kind.PROPER else kind, cuts, n)
+        n = _write_contact(segments, item, boundary.elements, CROSSED if kind == Kind.PROPER else kind, cuts, n)
         if n == UNSURE:
             return UNSURE
     sort_crossings(cuts, n)
@@ -88,32 +84,11 @@ def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: 
         for k in range(dimension):
             cuts.points[n, k] = elements[element, place, k] + 0.0
         return n + 1 if sure else UNSURE
-    cuts.t[n], sure = cut_at(segments, item, elements, element, cuts.points, n)
+    side = place - 3 if dimension == 3 and code & Bit.ALONG != 0 else -1
+    cuts.t[n], sure = cut_at(segments, item, elements, element, side, cuts.points, n)
     if not sure:
-        cuts.t[n], sure = cross_exactly(segments, item, elements, element, cuts.points[n])
+        cuts.t[n], sure = cross_exactly(segments, item, elements, element, side, cuts.points[n])
     return n + 1 if sure else UNSURE
-
-
-@inline
-def _write_overlap(segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int) -> int:
-    """Write both ends of the overlap of segment ``item`` and the collinear edge ``cuts.met[n]`` as entries n and n + 1
-    of `cuts`, or one entry if it is a point; return the next entry, or UNSURE."""
-    k, element, face = axis_of(segments, item), cuts.met[n], cuts.faces[n]
-    p, q = segments[item, 0, k], segments[item, 1, k]
-    rises = q > p
-    near = 0 if (elements[element, 1, k] > elements[element, 0, k]) == rises else 1
-    a, b = elements[element, near, k], elements[element, 1 - near, k]
-    begin = Place.START if (a <= p if rises else a >= p) else near
-    end = Place.END if (b >= q if rises else b <= q) else 1 - near
-    if b == p or a == q:  # case: one point
-        return _write_contact(
-            segments, item, elements, code_of(Place.START if b == p else Place.END, False) | Bit.ALONG, cuts, n
-        )
-    n = _write_contact(segments, item, elements, code_of(begin, False) | Bit.ALONG | Bit.BEGINS, cuts, n)
-    if n == UNSURE:
-        return UNSURE
-    cuts.met[n], cuts.faces[n] = element, face
-    return _write_contact(segments, item, elements, code_of(end, False) | Bit.ALONG | Bit.CEASES, cuts, n)
 
 
 class Before(IntEnum):
@@ -285,7 +260,7 @@ def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, c
             return False
         place = i - first
         cuts.faces[place] = boundary.faces[element]
-        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, cuts.points, place)
+        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, -1, cuts.points, place)
         if not is_sure:
             return False
     return sort_crossings(cuts, last - first)
@@ -337,7 +312,7 @@ def cut_on_outline(
     | n (3,) int64 | in and out: next segment (less than m if `out` is full), rows filled, capacity for contacts |
     """
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = allocate_contacts(size, n[2], edge_stack()), allocate_crossings(2 * n[2], 2), n[0]
+    contacts, cuts, last = allocate_contacts(size, n[2], edge_stack()), allocate_crossings(n[2], 2), n[0]
     n[1], n_contacts = 0, 0
     while n[0] == last < locations.shape[0] and n_contacts >= 0:  # bound: every turn takes a group
         last = min(n[0] + size, locations.shape[0])
@@ -354,7 +329,7 @@ def cut_on_mesh(
 ) -> None:
     """Clip segments (m, 2, 3) float64 to a polyhedron; arguments and results as in `cut_on_outline`, its table."""
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(2 * n[2], 3), n[0]
+    contacts, cuts, last = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(n[2], 3), n[0]
     n[1], n_contacts = 0, 0
     while n[0] == last < locations.shape[0] and n_contacts >= 0:
         last = min(n[0] + size, locations.shape[0])

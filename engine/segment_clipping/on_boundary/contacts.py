@@ -9,7 +9,7 @@ them:
         PROPER: crossed in a point inside of both, the location changes there
 
 Signs that exclude a common point drop the element. A zero sign means that one point is touched, or that both are
-collinear or coplanar. An UNDECIDED sign, and a triangle coplanar with the segment, are DEGENERATE: the exact fallback
+collinear or coplanar. An UNDECIDED sign, and a coplanar triangle without area, are DEGENERATE: the exact fallback
 decides them (exact_pieces.py). A segment whose contacts are all proper needs only the location of its first end.
 
 A contact in one point has a code (`code_of`), `CROSSES | place + 2 << 1 | ALONG | BEGINS | CEASES`:
@@ -18,9 +18,11 @@ A contact in one point has a code (`code_of`), `CROSSES | place + 2 << 1 | ALONG
 |---|---|---|
 | 0 | CROSSES | the perturbed line crosses the element there |
 | 1-4 | place + 2 | 0 .. 2: that corner; 3 .. 5: the side from corner place - 3 on; then START, END, WITHIN |
-| 5 | ALONG | the segment is collinear with an edge of the plane, which it crosses nowhere |
+| 5 | ALONG | the segment is collinear with the edge, or coplanar with the triangle; it crosses the element nowhere |
 | 6 | BEGINS | the overlap begins there |
 | 7 | CEASES | the overlap ends there |
+
+An overlap longer than a point is two contacts, that of its end after that of its begin.
 
 Source: the separating axes of segment and box stand in C. Ericson, Real-time collision detection, 2005, section 5.3.3.
 """
@@ -40,13 +42,11 @@ from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2
 
 class Kind(IntEnum):
     """How a segment and an element meet: APART (no common point), PROPER (crossed in a point inside of both),
-    DEGENERATE (undecided), ALONG (they overlap on a line). A contact at a corner, side or end has a code instead
-    (`code_of`)."""
+    DEGENERATE (undecided). A contact at a corner, side or end has a code instead (`code_of`)."""
 
     APART = 0
     PROPER = 1
     DEGENERATE = UNDECIDED
-    ALONG = 32
 
 
 class Place(IntEnum):
@@ -59,16 +59,18 @@ class Place(IntEnum):
 
 
 class Bit(IntEnum):
-    """Bits of a contact's code 2 (place + 2) + CROSSES, with ALONG, BEGINS or CEASES added for a collinear edge."""
+    """Bits of a contact's code 2 (place + 2) + CROSSES, with ALONG, BEGINS or CEASES added for an overlap."""
 
     CROSSES = 1
-    ALONG = Kind.ALONG
+    ALONG = 32
     BEGINS = 64
     CEASES = 128
 
 
 CROSSED: Final = 2 * Place.WITHIN + 5
 """Code of an element crossed in its open interior, at no end of the segment."""
+CODE_BITS: Final = 8
+"""Two codes of one element are packed as first | second << CODE_BITS."""
 INSIDE_BEFORE: Final = 2
 OUTSIDE_BEFORE: Final = -2
 """In place of the location of a second end on the boundary: the location of the perturbed line before the first
@@ -151,13 +153,16 @@ def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> 
 
 @inline
 def are_same_point(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
-    """Return whether two contacts of one segment are one point: an end of the segment, or a common corner or side of
-    both elements. first, second: the elements; code, other: the codes of their contacts."""
+    """Return whether two contacts of one segment are one point: an end of the segment, a common corner or side of both
+    elements, or a corner of one on a side of the other. first, second: the elements; code, other: the codes of their
+    contacts."""
     n, m = decode_place(code), decode_place(other)
     if n >= Place.START or m >= Place.START:
         return n == m and n <= Place.END
-    if (n < 3) != (m < 3):
-        return False
+    if n < 3 <= m:
+        return _is_on_line(elements, first, n, second, m)
+    if m < 3 <= n:
+        return _is_on_line(elements, second, m, first, n)
     if n < 3:
         return are_same(elements[first], n, elements[second], m)
     a, b, c, d = n - 3, (n - 2) % 3, m - 3, (m - 2) % 3
@@ -166,32 +171,58 @@ def are_same_point(elements: FloatArray, first: int, code: int, second: int, oth
 
 
 @called
+def _is_on_line(elements: FloatArray, first: int, corner: int, second: int, side: int) -> bool:
+    """Return whether a corner of triangle ``first`` is proven to lie on the line through a side, 3 .. 5, of triangle
+    ``second``."""
+    p, q, is_on = elements[first], elements[second], True
+    for k in range(3):
+        i, j, a, b = (k + 1) % 3, (k + 2) % 3, side - 3, (side - 2) % 3
+        of_corner = orient2d(Point2(q[a, i], q[a, j]), Point2(q[b, i], q[b, j]), Point2(p[corner, i], p[corner, j]))
+        is_on &= of_corner == 0
+    return is_on
+
+
+@called
 def touched_edge(of_a: int, of_b: int, of_p: int, of_q: int) -> int:
-    """Return the code of the contact of edge a b and segment p q, where a sign is zero or UNDECIDED; ALONG if they are
+    """Return the code of the contact of edge a b and segment p q, where a sign is zero or UNDECIDED; APART if they are
     collinear, DEGENERATE if one is UNDECIDED. of_a, of_b: side of a and b at the line p q; of_p, of_q: side of p and q
     at the line a b."""
     if of_a == UNDECIDED or of_b == UNDECIDED or of_p == UNDECIDED or of_q == UNDECIDED:
         return Kind.DEGENERATE
     if of_a == 0 and of_b == 0:
-        return Kind.ALONG
+        return Kind.APART
     place = Place.START if of_p == 0 else Place.END if of_q == 0 else 0 if of_a == 0 else 1
     return code_of(place, (of_a == 1) != (of_b == 1))
 
 
+@inline
+def overlap_code(begin: int, end: int) -> int:
+    """Return the packed codes of an overlap from one place to another."""
+    first, last = code_of(begin, False) | Bit.BEGINS, code_of(end, False) | Bit.CEASES
+    return (first | Bit.ALONG) | (last | Bit.ALONG) << CODE_BITS
+
+
 @called
-def along_edge(a: Point2, b: Point2, p: Point2, q: Point2) -> int:
-    """Return ALONG if segment p q and a collinear edge a b overlap, else APART; DEGENERATE if a = b."""
+def along_edge(a: Point2, b: Point2, p: Point2, q: Point2, of_a: int, of_b: int) -> int:
+    """Return the packed codes of the overlap of segment p q and a collinear edge a b, one code if it is a point; APART
+    if they do not overlap, DEGENERATE if a = b. of_a, of_b: the places of a and b."""
     if a.x == b.x and a.y == b.y:
         return Kind.DEGENERATE
-    if max(a.x, b.x) < min(p.x, q.x) or max(p.x, q.x) < min(a.x, b.x):
+    k = 0 if abs(q.x - p.x) >= abs(q.y - p.y) else 1
+    if p[k] > q[k]:  # case: falling; seen from behind it rises
+        a, b, p, q = Point2(-a.x, -a.y), Point2(-b.x, -b.y), Point2(-p.x, -p.y), Point2(-q.x, -q.y)
+    if a[k] > b[k]:
+        a, b, of_a, of_b = b, a, of_b, of_a
+    if a[k] > q[k] or b[k] < p[k]:
         return Kind.APART
-    return Kind.APART if max(a.y, b.y) < min(p.y, q.y) or max(p.y, q.y) < min(a.y, b.y) else Kind.ALONG
+    if a[k] == q[k] or b[k] == p[k]:
+        return code_of(Place.END if a[k] == q[k] else Place.START, False) | Bit.ALONG
+    return overlap_code(Place.START if a[k] <= p[k] else of_a, Place.END if b[k] >= q[k] else of_b)
 
 
 @inline
 def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
-    """Return the `Kind` (APART, PROPER, ALONG, DEGENERATE) or the code of the contact of a segment and an edge, both
-    (2, 2)."""
+    """Return the `Kind` or the packed codes of the contacts of a segment and an edge, both (2, 2)."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
@@ -203,7 +234,7 @@ def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
     if abs(of_a) == 1 and abs(of_b) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
         return Kind.PROPER  # two different signs each
     code = touched_edge(of_a, of_b, of_p, of_q)
-    return code if code != Kind.ALONG else along_edge(a, b, p, q)
+    return code if code != Kind.APART else along_edge(a, b, p, q, 0, 1)
 
 
 @inline
@@ -251,11 +282,11 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contac
         for place in range(start, min(start + LEAF_SIZE, n_edges)):
             element = outline.order[place]
             kind = edge_contact(outline.elements[element], segment)
-            if kind != Kind.APART:
+            while kind != Kind.APART:  # bound: two codes
                 if n_contacts == contacts.met.size:
                     return NO_ROOM
-                contacts.met[n_contacts], contacts.kinds[n_contacts] = element, kind
-                n_contacts += 1
+                contacts.met[n_contacts], contacts.kinds[n_contacts] = element, kind & ((1 << CODE_BITS) - 1)
+                kind, n_contacts = kind >> CODE_BITS, n_contacts + 1
     return n_contacts
 
 

@@ -36,12 +36,14 @@ from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, p
 from engine.predicates.error_free import U2, dd_div, two_diff, two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, add_scaled, grow, is_safe, magnitude
 from engine.predicates.parameters import minor as exact_minor
-from engine.segment_clipping.on_boundary.mesh_contacts import corner, triangle_at
+from engine.segment_clipping.on_boundary.mesh_contacts import corner, flat_axis, triangle_at
 from engine.segment_clipping.pieces import Triple
 from engine.types import FloatArray, Point3
 
 VALUE_BOUND: Final = 80.0 * U2
 
+Line = tuple[int, int, int, int]
+"""Corners a and b of an element, and the two axes on which the line a b is seen."""
 Normal = tuple[Triple, Triple, Triple]
 Vector = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
@@ -90,20 +92,30 @@ def dot(n: Normal, w: Vector) -> Triple:
     return h, low, VALUE_BOUND * (x_size + y_size + z_size)
 
 
+@called
+def line_of(elements: FloatArray, element: int, side: int) -> Line:
+    """Return the line of an edge, or of side 0 .. 2 of a triangle seen along an axis along which it has an area."""
+    if elements.shape[1] == 2:
+        return 0, 1, 0, 1
+    k, _ = flat_axis(*triangle_at(elements, element))
+    return side, (side + 1) % 3, (k + 1) % 3, (k + 2) % 3
+
+
 @merged
-def line_values(elements: FloatArray, element: int, segments: FloatArray, item: int) -> tuple[Any, Any]:
-    """Return s(p) and d = s(p) - s(q) of segment ``item``, p q, at the line of edge ``element`` of elements (k, 2, 2),
-    each as (h, low, error bound)."""
-    ax, ay = elements[element, 0, 0], elements[element, 0, 1]
-    px, py = segments[item, 0, 0], segments[item, 0, 1]
-    u, u_low = two_diff(elements[element, 1, 0], ax)
-    v, v_low = two_diff(elements[element, 1, 1], ay)
+def line_values(elements: FloatArray, element: int, line: Line, segments: FloatArray, item: int) -> tuple[Any, Any]:
+    """Return s(p) and d = s(p) - s(q) of segment ``item``, p q, at a `Line` of element ``element`` of elements (k,
+    corners, dim), each as (h, low, error bound)."""
+    a, b, i, j = line
+    ax, ay = elements[element, a, i], elements[element, a, j]
+    px, py = segments[item, 0, i], segments[item, 0, j]
+    u, u_low = two_diff(elements[element, b, i], ax)
+    v, v_low = two_diff(elements[element, b, j], ay)
     x, x_low = two_diff(px, ax)
     y, y_low = two_diff(py, ay)
     h, low, size = minor(u, u_low, y, y_low, v, v_low, x, x_low)
     h, low = two_sum(h, low)
-    x, x_low = two_diff(px, segments[item, 1, 0])
-    y, y_low = two_diff(py, segments[item, 1, 1])
+    x, x_low = two_diff(px, segments[item, 1, i])
+    y, y_low = two_diff(py, segments[item, 1, j])
     g, g_low, g_size = minor(u, u_low, y, y_low, v, v_low, x, x_low)
     g, g_low = two_sum(g, g_low)
     return (h, low, VALUE_BOUND * size), (g, g_low, VALUE_BOUND * g_size)
@@ -134,12 +146,13 @@ def is_item_safe(items: FloatArray, item: int) -> bool:
 
 @merged
 def cut_at(
-    segments: FloatArray, item: int, elements: FloatArray, element: int, points: FloatArray, row: int
+    segments: FloatArray, item: int, elements: FloatArray, element: int, side: int, points: FloatArray, row: int
 ) -> tuple[float, bool]:
     """Set points[row] to the crossing of segment ``item`` and element ``element``, by double-doubles; return its
-    parameter t, and whether t and all coordinates are proven nearest doubles."""
-    if segments.shape[2] == 2:
-        at_p, along = line_values(elements, element, segments, item)
+    parameter t, and whether t and all coordinates are proven nearest doubles. side: 0 .. 2, the side of a coplanar
+    triangle that is crossed, else -1."""
+    if segments.shape[2] == 2 or side >= 0:
+        at_p, along = line_values(elements, element, line_of(elements, element, side), segments, item)
     else:
         at_p, along = plane_values(elements, element, segments, item)
     s, s_low, s_bound = at_p
@@ -164,17 +177,20 @@ def cut_at(
 
 
 @called
-def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
+def _size_at(
+    elements: FloatArray, element: int, line: Line, segments: FloatArray, item: int, end: int, e: Components
+) -> int:
     """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of segment ``item``; return its number of components.
-    Triangle a b c: sum over k of component k of (b - a) x (c - a) times (x - a)_k. Edge a b: the last component of (b -
-    a) x (x - a)."""
-    m, n, is_flat = workspace(16), 0, segments.shape[2] == 2
-    for k in range(2 if is_flat else 0, 3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        u, u_tail = two_diff(elements[element, 1, i], elements[element, 0, i])
-        v, v_tail = two_diff(elements[element, 1, j], elements[element, 0, j])
-        x, x_tail = two_diff(segments[item, end, i] if is_flat else elements[element, 2, i], elements[element, 0, i])
-        y, y_tail = two_diff(segments[item, end, j] if is_flat else elements[element, 2, j], elements[element, 0, j])
+    Triangle a b c: sum over k of component k of (b - a) x (c - a) times (x - a)_k. A `Line` a b: the one component of
+    (b - a) x (x - a) on its axes. line: all -1 for the plane of a triangle."""
+    m, n, (a, b, i, j), is_flat = workspace(16), 0, line, line[0] >= 0
+    for k in range(1 if is_flat else 3):
+        if not is_flat:
+            a, b, i, j = 0, 1, (k + 1) % 3, (k + 2) % 3
+        u, u_tail = two_diff(elements[element, b, i], elements[element, a, i])
+        v, v_tail = two_diff(elements[element, b, j], elements[element, a, j])
+        x, x_tail = two_diff(segments[item, end, i] if is_flat else elements[element, 2, i], elements[element, a, i])
+        y, y_tail = two_diff(segments[item, end, j] if is_flat else elements[element, 2, j], elements[element, a, j])
         length = exact_minor(m, u, u_tail, v, v_tail, x, x_tail, y, y_tail)
         factor, tail = (1.0, 0.0) if is_flat else two_diff(segments[item, end, k], elements[element, 0, k])
         for part in (tail, factor):
@@ -185,15 +201,17 @@ def _size_at(elements: FloatArray, element: int, segments: FloatArray, item: int
 
 @called
 def cross_exactly(
-    segments: FloatArray, item: int, elements: FloatArray, element: int, point: FloatArray
+    segments: FloatArray, item: int, elements: FloatArray, element: int, side: int, point: FloatArray
 ) -> tuple[float, bool]:
     """Set `point` to the crossing of segment ``item`` and element ``element`` from exact values; return its parameter
-    t, and whether t and all coordinates are proven nearest doubles. Caller guarantees that the ends lie on different
-    sides, or one of them on the element's line or plane, and that coordinates are zero or of sizes within 2^-120 ..
-    2^120, so that differences are multiples of 2^-172 and values of 2^-516, below 2^366."""
-    wp, wq, e = workspace(192), workspace(192), workspace(2304)
-    n_wp = _size_at(elements, element, segments, item, 0, wp)
-    n_wq = _size_at(elements, element, segments, item, 1, wq)
+    t, and whether t and all coordinates are proven nearest doubles. side: as in `cut_at`. Caller guarantees that the
+    ends lie on different sides, or one of them on the element's line or plane, and that coordinates are zero or of
+    sizes within 2^-120 .. 2^120, so that differences are multiples of 2^-172 and values of 2^-516, below 2^366."""
+    wp, wq, e, line = workspace(192), workspace(192), workspace(2304), (-1, -1, -1, -1)
+    if segments.shape[2] == 2 or side >= 0:
+        line = line_of(elements, element, side)
+    n_wp = _size_at(elements, element, line, segments, item, 0, wp)
+    n_wq = _size_at(elements, element, line, segments, item, 1, wq)
     return parameter_and_point(segments[item], wp, n_wp, wq, n_wq, -1, 0.0, point, e)
 
 

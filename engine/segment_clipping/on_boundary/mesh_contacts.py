@@ -48,22 +48,27 @@ from engine.lanes.faces import AXES_BEFORE, CORNER_ROWS, longest_axis, near_tria
 from engine.lanes.lanes import lowest_bit, prefetch
 from engine.lanes.tracing import LANES
 from engine.predicates.error_free import workspace
-from engine.predicates.orientation import orient3d
+from engine.predicates.orientation import orient2d, orient3d
 from engine.predicates.parameters import compare_differences
+from engine.predicates.vectors import minus
 from engine.running.budget import Budget
 from engine.segment_clipping.on_boundary.contacts import (
+    CODE_BITS,
     NO_ROOM,
     STOPPED,
+    Bit,
     Contacts,
     Kind,
     Place,
     allocate_contacts,
+    along_edge,
     are_same,
     code_of,
     find_contacts_2d,
+    overlap_code,
 )
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
-from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
+from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point2, Point3
 
 EDGE_BOUND: Final = 2.0**-48
 END_BOUND: Final = 2.0**-45
@@ -81,18 +86,19 @@ are far below every slack; is_near: whether it comes near the tree."""
 
 @called
 def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
-    """Return the `Kind` or code of the contact of segment p q and triangle a b c, by exact signs. If an end is off the
-    plane and the triangle has an area, the line meets the plane in one point, on the segment unless both ends are on
-    one side; that point is outside of the triangle only if the signs of two edges differ."""
+    """Return the `Kind` or packed codes of the contacts of segment p q and triangle a b c, by exact signs. If an end is
+    off the plane and the triangle has an area, the line meets the plane in one point, on the segment unless both ends
+    are on one side; that point is outside of the triangle only if the signs of two edges differ."""
     of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return Kind.APART
+    if of_p == 0 and of_q == 0:
+        return _coplanar_contact(a, b, c, p, q)
     ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
-    if of_p != 0 or of_q != 0:  # case: in the plane of the triangle the edge signs are all zero and say nothing
-        has_left, has_right = ab == 1 or bc == 1 or ca == 1, ab == -1 or bc == -1 or ca == -1
-        if has_left and has_right:
-            return Kind.APART
-    if max(ab, bc, ca, of_p, of_q) == UNDECIDED or (of_p == 0 and of_q == 0):
+    has_left, has_right = ab == 1 or bc == 1 or ca == 1, ab == -1 or bc == -1 or ca == -1
+    if has_left and has_right:
+        return Kind.APART
+    if max(ab, bc, ca, of_p, of_q) == UNDECIDED:
         return Kind.DEGENERATE
     if ab == bc and bc == ca and ab != 0 and of_p != 0 and of_q != 0:
         return Kind.PROPER
@@ -107,6 +113,82 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
     if place < Place.START and (ab == 0) + (bc == 0) + (ca == 0) == 2:
         place = 0 if bc != 0 else 1 if ca != 0 else 2
     return code_of(place, first == second and second == third)
+
+
+@inline
+def _seen_along(a: Point3, k: int) -> Point2:
+    """Return a point without its coordinate on axis k."""
+    return Point2(a[AXES_BEFORE[k]], a[AXES_BEFORE[k + 1]])
+
+
+@called
+def flat_axis(a: Point3, b: Point3, c: Point3) -> tuple[int, int]:
+    """Return (k, turn): an axis along which triangle a b c is proven to be seen with an area, and the sign of orient2d
+    there; turn is not 1 or -1 if there is none."""
+    u, v = minus(b, a), minus(c, a)
+    k, turn = longest_axis((u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x)), 0
+    for _ in range(3):
+        turn = orient2d(_seen_along(a, k), _seen_along(b, k), _seen_along(c, k))
+        if abs(turn) == 1:
+            break
+        k = AXES_BEFORE[k]
+    return k, turn
+
+
+@called
+def _coplanar_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
+    """Return the packed codes of the overlap of segment p q with a coplanar triangle a b c, one code if it is a point;
+    APART if there is none, DEGENERATE if the triangle has no area. Seen along an axis, the line enters a triangle that
+    turns left where the triangle's boundary passes from the left to the right of the line, and leaves it where the
+    boundary passes back: in a side, or in a corner on the line."""
+    k, turn = flat_axis(a, b, c)
+    start, end = _seen_along(p, k), _seen_along(q, k)
+    corners = _seen_along(a, k), _seen_along(b, k), _seen_along(c, k)
+    sides = orient2d(start, end, corners[0]), orient2d(start, end, corners[1]), orient2d(start, end, corners[2])
+    if abs(turn) != 1 or max(sides) == UNDECIDED:
+        return Kind.DEGENERATE
+    if min(sides) > 0 or max(sides) < 0:
+        return Kind.APART
+    enter, leave = -1, -1
+    for i in range(3):
+        before, at, after = sides[(i + 2) % 3], sides[i], sides[(i + 1) % 3]
+        if at == 0 and after == 0:
+            return along_edge(corners[i], corners[(i + 1) % 3], start, end, i, (i + 1) % 3)
+        if at == 0 and before == after:  # case: touched in a corner
+            enter, leave = i, i
+        elif at * after < 0 or (at == 0 and before * after < 0):
+            place = 3 + i if at != 0 else i
+            if (after < 0) == (turn > 0):
+                enter = place
+            else:
+                leave = place
+    from_enter, to_enter = (
+        _beyond(corners, enter, turn, start, start, end),
+        _beyond(corners, enter, turn, end, start, end),
+    )
+    from_leave, to_leave = (
+        _beyond(corners, leave, -turn, start, start, end),
+        _beyond(corners, leave, -turn, end, start, end),
+    )
+    if max(from_enter, to_enter, from_leave, to_leave) == UNDECIDED:
+        return Kind.DEGENERATE
+    if to_enter < 0 or from_leave > 0:
+        return Kind.APART
+    if to_enter == 0 or from_leave == 0 or enter == leave:
+        return code_of(Place.END if to_enter == 0 else Place.START if from_leave == 0 else enter, False) | Bit.ALONG
+    return overlap_code(Place.START if from_enter >= 0 else enter, Place.END if to_leave <= 0 else leave)
+
+
+@inline
+def _beyond(corners: Any, place: int, turn: int, x: Point2, p: Point2, q: Point2) -> int:
+    """Return 1 if a point x of the line p q lies beyond the place where the line passes a corner, 0 .. 2, or a side,
+    3 .. 5, of a triangle; 0 at it, -1 before it; or UNDECIDED. turn: 1 if what lies left of the side is beyond it."""
+    if place >= 3:
+        side = orient2d(corners[place - 3], corners[(place - 2) % 3], x)
+        return side if side == UNDECIDED else turn * side
+    k = 0 if abs(q.x - p.x) >= abs(q.y - p.y) else 1
+    at, there = (x[k], corners[place][k]) if q[k] > p[k] else (corners[place][k], x[k])
+    return 1 if at > there else -1 if at < there else 0
 
 
 @called
@@ -168,8 +250,8 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
 
 @merged
 def triangle_contact(elements: FloatArray, element: int, p: Point3, q: Point3, blur: float) -> int:
-    """Return the `Kind` or code of the contact of segment p q with triangle ``element`` of elements (k, 3, 3). blur:
-    error of each coordinate of p and q; if above 0, UNDECIDED where the filter does not decide."""
+    """Return the `Kind` or packed codes of the contacts of segment p q with triangle ``element`` of elements (k, 3, 3).
+    blur: error of each coordinate of p and q; if above 0, UNDECIDED where the filter does not decide."""
     a, b, c = triangle_at(elements, element)
     kind = contact_filter(a, b, c, p, q, blur)
     return kind if kind != UNDECIDED or blur > 0.0 else exact_contact(a, b, c, p, q)
@@ -266,13 +348,13 @@ def _append_triangles(
     for place in range(n):
         element = triangles[place]
         kind = triangle_contact(mesh.elements, element, p, q, blur)
-        if kind == Kind.APART:
-            continue
-        row = 0 if is_any else n_met
-        if row == met.size:
-            return NO_ROOM
-        prefetch(mesh.faces, element)
-        met[row], kinds[row], n_met = element, kind, row + 1
+        while kind != Kind.APART:  # bound: two codes
+            row = 0 if is_any else n_met
+            if row == met.size:
+                return NO_ROOM
+            prefetch(mesh.faces, element)
+            met[row], kinds[row], n_met = element, kind & ((1 << CODE_BITS) - 1), row + 1
+            kind >>= CODE_BITS
         if is_answered(is_any, n_met, kinds):
             break
     return n_met
