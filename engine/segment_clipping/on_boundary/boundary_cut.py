@@ -312,15 +312,14 @@ def cut_on_outline(
     | n (3,) int64 | in and out: next segment (less than m if `out` is full), rows filled, capacity for contacts |
     """
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = allocate_contacts(size, n[2], edge_stack()), allocate_crossings(n[2], 2), n[0]
-    n[1], n_contacts = 0, 0
-    while n[0] == last < locations.shape[0] and n_contacts >= 0:  # bound: every turn takes a group
-        last = min(n[0] + size, locations.shape[0])
-        group = segments[n[0] : last]
-        n_contacts = gather_edges(contacts, outline, group, group.shape[0], stop)
-        if n_contacts >= 0:
-            n[0], n[1] = cut_group(group, locations, n[0], outline, contacts, cuts, stop, out, n[1], state)
-    n[2] *= 2 if n_contacts < 0 else 1
+    contacts, cuts = allocate_contacts(size, n[2], edge_stack()), allocate_crossings(n[2], 2)
+    last, n_ready, n[1] = n[0], 1, 0
+    while n[0] == last < locations.shape[0] and n_ready > 0:  # bound: every turn takes a segment
+        group = segments[last : last + size]
+        n_ready = gather_edges(contacts, outline, group, group.shape[0], stop)
+        n[0], n[1] = cut_group(group[:n_ready], locations, last, outline, contacts, cuts, stop, out, n[1], state)
+        last += n_ready
+    n[2] *= 2 if n_ready == 0 else 1
 
 
 @allocating_kernel
@@ -329,12 +328,11 @@ def cut_on_mesh(
 ) -> None:
     """Clip segments (m, 2, 3) float64 to a polyhedron; arguments and results as in `cut_on_outline`, its table."""
     size = group_size(locations.shape[0] - n[0])
-    contacts, cuts, last = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(n[2], 3), n[0]
-    n[1], n_contacts = 0, 0
-    while n[0] == last < locations.shape[0] and n_contacts >= 0:
-        last = min(n[0] + size, locations.shape[0])
-        group = segments[n[0] : last]
-        n_contacts = gather_triangles(contacts, mesh, group, group.shape[0], stop)
-        if n_contacts >= 0:
-            n[0], n[1] = cut_group(group, locations, n[0], mesh, contacts, cuts, stop, out, n[1], state)
-    n[2] *= 2 if n_contacts < 0 else 1
+    contacts, cuts = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(n[2], 3)
+    last, n_ready, n[1] = n[0], 1, 0
+    while n[0] == last < locations.shape[0] and n_ready > 0:
+        group = segments[last : last + size]
+        n_ready = gather_triangles(contacts, mesh, group, group.shape[0], stop)
+        n[0], n[1] = cut_group(group[:n_ready], locations, last, mesh, contacts, cuts, stop, out, n[1], state)
+        last += n_ready
+    n[2] *= 2 if n_ready == 0 else 1

@@ -78,7 +78,6 @@ contact."""
 GROUP: Final = 2048
 """Most segments of a group."""
 NO_ROOM: Final = -1
-STOPPED: Final = -2
 """Returned instead of a number of contacts: too many for the arrays, or the flag was set."""
 
 
@@ -292,26 +291,24 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contac
 
 @called
 def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill `contacts` with those of the first n of segments (m, 2, 2) and the edges of an `Outline`; return their
-    number. Segments of zero length have none. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
+    """Fill `contacts` with those of the first n of segments (m, 2, 2) and the edges of an `Outline`; return the number
+    of segments for which there is room. Segments of zero length have none. Ends early if `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
         if not are_same(segments[i], 0, segments[i], 1):
             n_met = append_edges(contacts, outline, segments[i], n_met)
         contacts.offsets[i + 1] = n_met
-        if n_met < 0:
-            return NO_ROOM
-        if stop[0]:
-            return STOPPED
-    return n_met
+        if n_met < 0 or stop[0]:
+            return i
+    return n
 
 
 @allocating_kernel
 def find_contacts_2d(segments: FloatArray, outline: Any, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
     """Return (number, met, kinds, offsets): the contacts of segments (n, 2, 2) float64 with the edges of an `Outline`,
     segment by segment. met int64: the elements; kinds uint8: `Kind` or code; offsets (n + 1,) of segments. The number
-    is NO_ROOM if there are more than `room`, STOPPED if `stop` (one uint8) is set."""
-    contacts = allocate_contacts(segments.shape[0], room, edge_stack())
-    n_met = gather_edges(contacts, outline, segments, segments.shape[0], stop)
+    is NO_ROOM if there are more than `room`, or `stop` (one uint8) is set."""
+    n, contacts = segments.shape[0], allocate_contacts(segments.shape[0], room, edge_stack())
+    n_met = contacts.offsets[n] if gather_edges(contacts, outline, segments, n, stop) == n else NO_ROOM
     return n_met, contacts.met, contacts.kinds, contacts.offsets

@@ -55,7 +55,6 @@ from engine.running.budget import Budget
 from engine.segment_clipping.on_boundary.contacts import (
     CODE_BITS,
     NO_ROOM,
-    STOPPED,
     Bit,
     Contacts,
     Kind,
@@ -89,12 +88,23 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
     """Return the `Kind` or packed codes of the contacts of segment p q and triangle a b c, by exact signs. If an end is
     off the plane and the triangle has an area, the line meets the plane in one point, on the segment unless both ends
     are on one side; that point is outside of the triangle only if the signs of two edges differ."""
-    of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
+    is_apart = False
+    for k in range(3):
+        is_apart |= min(a[k], b[k], c[k]) > max(p[k], q[k]) or max(a[k], b[k], c[k]) < min(p[k], q[k])
+    if is_apart:
+        return Kind.APART
+    at_p, at_q = _corner_at(a, b, c, p), _corner_at(a, b, c, q)
+    of_p, of_q = 0 if at_p >= 0 else orient3d(a, b, c, p), 0 if at_q >= 0 else orient3d(a, b, c, q)
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return Kind.APART
     if of_p == 0 and of_q == 0:
         return _coplanar_contact(a, b, c, p, q)
-    ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
+    if at_p >= 0 or at_q >= 0:  # case: the line passes the corner; its side of the opposite edge is known
+        if max(at_p, at_q) > 0:
+            a, b, c = (b, c, a) if max(at_p, at_q) == 1 else (c, a, b)
+        ab, bc, ca = 0, of_q - of_p, 0
+    else:
+        ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
     has_left, has_right = ab == 1 or bc == 1 or ca == 1, ab == -1 or bc == -1 or ca == -1
     if has_left and has_right:
         return Kind.APART
@@ -113,6 +123,16 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
     if place < Place.START and (ab == 0) + (bc == 0) + (ca == 0) == 2:
         place = 0 if bc != 0 else 1 if ca != 0 else 2
     return code_of(place, first == second and second == third)
+
+
+@inline
+def _corner_at(a: Point3, b: Point3, c: Point3, p: Point3) -> int:
+    """Return the corner (0, 1, 2) of triangle a b c that equals p, or -1."""
+    if p.x == a.x and p.y == a.y and p.z == a.z:
+        return 0
+    if p.x == b.x and p.y == b.y and p.z == b.z:
+        return 1
+    return 2 if p.x == c.x and p.y == c.y and p.z == c.z else -1
 
 
 @inline
@@ -432,8 +452,8 @@ def append_contacts(
 
 @called
 def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: int, stop: FlagArray) -> int:
-    """Fill `contacts` with those of the first n of segments (m, 2, 3) and the triangles of a `Mesh`; return their
-    number. NO_ROOM: the arrays are too small; STOPPED: `stop` (one uint8) is set."""
+    """Fill `contacts` with those of the first n of segments (m, 2, 3) and the triangles of a `Mesh`; return the number
+    of segments for which there is room. Ends early if `stop` (one uint8) is set."""
     n_met = 0
     contacts.offsets[0] = 0
     for i in range(n):
@@ -441,24 +461,22 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
             p, q = corner(segments, i, 0), corner(segments, i, 1)
             n_met = append_contacts(mesh, p, q, 0.0, False, contacts.waiting, contacts.met, contacts.kinds, n_met)
         contacts.offsets[i + 1] = n_met
-        if n_met < 0:
-            return NO_ROOM
-        if stop[0]:
-            return STOPPED
-    return n_met
+        if n_met < 0 or stop[0]:
+            return i
+    return n
 
 
 @allocating_kernel
 def find_contacts_3d(segments: FloatArray, mesh: Mesh, stop: FlagArray, room: int) -> tuple[int, Any, Any, Any]:
     """Return (number, met, kinds, offsets): the contacts of at most GROUP segments (n, 2, 3) float64 with triangles,
     segment by segment. met int64: the elements; kinds uint8: `Kind` or code; offsets (n + 1,) of segments. The number
-    is NO_ROOM if there are more than `room`, STOPPED if `stop` (one uint8) is set."""
-    contacts = allocate_contacts(segments.shape[0], room, traversal_buffers())
-    n_met = gather_triangles(contacts, mesh, segments, segments.shape[0], stop)
+    is NO_ROOM if there are more than `room`, or `stop` (one uint8) is set."""
+    n, contacts = segments.shape[0], allocate_contacts(segments.shape[0], room, traversal_buffers())
+    n_met = contacts.offsets[n] if gather_triangles(contacts, mesh, segments, n, stop) == n else NO_ROOM
     return n_met, contacts.met, contacts.kinds, contacts.offsets
 
 
-_LEAST_CONTACTS: Final = 1 << 8
+_LEAST_CONTACTS: Final = 1 << 10
 """Smallest capacity for contacts, plus `_EACH` for each segment; doubled if there are more."""
 _EACH: Final = 8
 
