@@ -146,7 +146,8 @@ def way_of(segments: FloatArray, item: int, bodies: BodyTree) -> Way:
     is_flat = segments.shape[2] == 2
     px, py, pz = point_of(segments, item, 0, is_flat)
     qx, qy, qz = point_of(segments, item, 1, is_flat)
-    return local_segment(Point3(px, py, pz), Point3(qx, qy, qz), bodies.tree.origin, bodies.inverse, 0.0)
+    inverse = bodies.inverse, bodies.inverse, bodies.inverse
+    return local_segment(Point3(px, py, pz), Point3(qx, qy, qz), bodies.tree.origin, inverse, 0.0)
 
 
 @inline

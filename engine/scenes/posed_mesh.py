@@ -40,11 +40,11 @@ be prepared first."""
 
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
 """A mesh in its own frame, as kernels here read it: fields of `Mesh` in on_boundary/prepared_boundary.py."""
-MESH_WORDS: Final = 37
+MESH_WORDS: Final = 39
 """Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_row`'s
 addresses, 0 without a tree, and sizes (8,); then as doubles origin, inverse, whether all is in range, low and high of
-its box (11,), and `tree_row`'s places (10,)."""
-TREE, PLACES, TREE_PLACES = 8, 16, 27
+its box (13,), and `tree_row`'s places (10,)."""
+TREE, PLACES, TREE_PLACES = 8, 16, 29
 """Offsets of the tree's addresses, of the doubles, and of the tree's places among these numbers."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
 
@@ -59,8 +59,8 @@ def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
         array_at(lines[2], (lines[6], BOX_ROWS, WIDTH), np.float32),
         array_at(lines[3], (lines[6], WIDTH), np.int32),
         (numbers[PLACES], numbers[PLACES + 1], numbers[PLACES + 2]),
-        numbers[PLACES + 3],
-        numbers[PLACES + 4] != 0.0,
+        (numbers[PLACES + 3], numbers[PLACES + 4], numbers[PLACES + 5]),
+        numbers[PLACES + 6] != 0.0,
         lines[7],
         array_at(lines[4], (lines[6] - lines[7], CORNER_ROWS, LANES), np.float32),
     )
@@ -231,7 +231,7 @@ def crossings_in(
 def _is_near_box(numbers: FloatArray, p: Point3, blur: float) -> bool:
     """Return whether point p, each coordinate known to +- `blur`, may lie in the box of a mesh. numbers: its MESH_WORDS
     as float64."""
-    low, high = PLACES + 5, PLACES + 8
+    low, high = PLACES + 7, PLACES + 10
     is_out = (p.x + blur < numbers[low]) | (p.x - blur > numbers[high])
     is_out |= (p.y + blur < numbers[low + 1]) | (p.y - blur > numbers[high + 1])
     return not (is_out | (p.z + blur < numbers[low + 2]) | (p.z - blur > numbers[high + 2]))

@@ -102,7 +102,7 @@ def _words_of(solid: Any) -> IntArray:
     words = np.zeros(MESH_WORDS, np.int64)
     words[:5] = [array.ctypes.data for array in (mesh.elements, mesh.faces, mesh.boxes, mesh.child, mesh.corners)]
     words[5:TREE] = len(mesh.elements), len(mesh.child), mesh.n_inner
-    words.view(np.float64)[PLACES:TREE_PLACES] = *mesh.origin, mesh.inverse, mesh.are_safe, *low, *high
+    words.view(np.float64)[PLACES:TREE_PLACES] = *mesh.origin, *mesh.inverse, mesh.are_safe, *low, *high
     return words
 
 

@@ -18,14 +18,15 @@ near the tree, and stored as its middle and half in float32; the slack covers wh
     edges    E . (A x B), E . (B x C), E . (C x A)        the line passes the edge on one side or the other
     ends     s(p) = -A . (B x C), s(q) = s(p) + the sum of the edges          p, q on either side of the plane
 
-Let u = 2^-53, S the largest |coordinate| of A, B, C and L = |E_x| + |E_y| + |E_z|. An edge is within (7 u + 56 u^2) of
-its permanent, at most 2 S^2 L (orientation.py): 2^-49 S^2 L; s(p) likewise, its permanent at most 6 S^3: 2^-47 S^3.
-s(q) carries both, thrice that of an edge, and three roundings of at most 6 S^2 L + 6 S^3: below 2^-46 S^2 (S + L). The
-bounds used are twice that, so their own rounding is covered, and 2^-700 more for products that underflow: if S < 2^300
-they lose less, else the relative part is more. What overflows is UNDECIDED.
+Let u = 2^-53; by axis k, S_k the largest |coordinate| of A, B, C, L_k = |E_k| and M_k = S_k + L_k, so that bounds do
+not depend on the units of an axis. Let Q = L_x S_y S_z + S_x L_y S_z + S_x S_y L_z and V = S_x S_y S_z. An edge is
+within (7 u + 56 u^2) of its permanent, at most 2 Q (orientation.py): 2^-49 Q; s(p) likewise, its permanent at most 6 V:
+2^-47 V. s(q) carries both, thrice that of an edge, and three roundings of at most 6 Q + 6 V: below 2^-46 (Q + V). The
+bounds used are twice that, so their own rounding is covered, and 2^-700 + 2^-1000 sum M for products that underflow.
+What overflows is UNDECIDED.
 
-Where p and q are known to `blur` a coordinate only, below 2^-20 S, the edges move by less than 16 blur S (S + L), the
-ends by less than 64 blur S (S + L).
+Where p and q are known to `blur` a coordinate only, A, B, C move by as much, E by twice that. With T = M_x M_y + M_y
+M_z + M_z M_x the edges move by at most 4 blur T + 8 blur^2 sum M, the ends by 6 blur T and terms of second order.
 
 **Touched.** The perturbed line, the segment's line moved by infinitesimals, meets no corner and no side: from one open
 span of the segment to the next the location flips once for each element that it crosses (exact_pieces.py).
@@ -245,14 +246,13 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
     ab = ex * (ay * bz - az * by) + ey * (az * bx - ax * bz) + ez * (ax * by - ay * bx)
     bc = ex * nx + ey * ny + ez * nz
     ca = ex * (cy * az - cz * ay) + ey * (cz * ax - cx * az) + ez * (cx * ay - cy * ax)
-    size = max(abs(ax), abs(ay), abs(az), abs(bx), abs(by), abs(bz), abs(cx), abs(cy), abs(cz))
-    length = abs(ex) + abs(ey) + abs(ez)
-    moved = 0.0
+    sx, sy, sz = max(abs(ax), abs(bx), abs(cx)), max(abs(ay), abs(by), abs(cy)), max(abs(az), abs(bz), abs(cz))
+    lx, ly, lz = abs(ex), abs(ey), abs(ez)
+    mx, my, mz = sx + lx, sy + ly, sz + lz
+    lost, across = UNDERFLOW + 2.0**-1000 * (mx + my + mz), lz * sx * sy + sz * (lx * sy + sx * ly)
     if blur > 0.0:
-        if not blur < 2.0**-20 * size:
-            return UNDECIDED
-        moved = blur * size * (size + length)
-    bound = EDGE_BOUND * (size * size * length) + UNDERFLOW + 16.0 * moved
+        lost += 16.0 * blur * (mx * my + mz * (mx + my) + blur * (mx + my + mz))
+    bound = EDGE_BOUND * across + lost
     least, most = min(ab, bc, ca), max(ab, bc, ca)
     if least < -bound and most > bound:
         return Kind.APART
@@ -261,7 +261,7 @@ def contact_filter(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, blur: 
         return UNDECIDED
     of_p = -(ax * nx + ay * ny + az * nz)
     of_q = of_p + (ab + bc + ca)
-    bound = END_BOUND * (size * size * (size + length)) + UNDERFLOW + 64.0 * moved
+    bound = END_BOUND * (across + sx * sy * sz) + lost
     least, most = min(of_p, of_q), max(of_p, of_q)
     if least > bound or most < -bound:
         return Kind.APART
@@ -292,12 +292,12 @@ def triangle_at(elements: FloatArray, element: int) -> tuple[Point3, Point3, Poi
 
 
 @merged
-def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float) -> Way:
-    """Return segment p q in tree coordinates, (x - origin) * inverse, as a `Way`. blur: error of each coordinate of p
-    and q."""
-    ox, oy, oz = origin[0] * inverse, origin[1] * inverse, origin[2] * inverse
-    px, py, pz = p.x * inverse - ox, p.y * inverse - oy, p.z * inverse - oz
-    dx, dy, dz = q.x * inverse - p.x * inverse, q.y * inverse - p.y * inverse, q.z * inverse - p.z * inverse
+def local_segment(p: Point3, q: Point3, origin: Any, inverse: Any, blur: float) -> Way:
+    """Return segment p q in tree coordinates, by axis (x - origin) * inverse, as a `Way`. blur: error of each
+    coordinate of p and q."""
+    ix, iy, iz = inverse[0], inverse[1], inverse[2]
+    px, py, pz = p.x * ix - origin[0] * ix, p.y * iy - origin[1] * iy, p.z * iz - origin[2] * iz
+    dx, dy, dz = q.x * ix - p.x * ix, q.y * iy - p.y * iy, q.z * iz - p.z * iz
     size = max(abs(px), abs(py), abs(pz), abs(px + dx), abs(py + dy), abs(pz + dz))
     start, end, is_near = 0.0, 1.0, True
     cut = CUT_SLACK * (size + 2.0)
@@ -317,7 +317,7 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: float, blur: float
         (np.float32(px + middle * dx), np.float32(py + middle * dy), np.float32(pz + middle * dz)),
         half,
         (min(max(x, -_MOST), _MOST), min(max(y, -_MOST), _MOST), min(max(z, -_MOST), _MOST)),
-        np.float32(SLACK * (size + 2.0) + cut + 64.0 * blur * inverse),
+        np.float32(SLACK * (size + 2.0) + cut + 64.0 * blur * max(ix, iy, iz)),
         is_near,
     )
 
