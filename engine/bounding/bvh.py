@@ -52,6 +52,11 @@ _HUGE = 2.0**1022
 """Half extent from which the origin is the middle: from a point near an end the difference to the other end could
 overflow."""
 
+_LEAST_STRETCH, _MOST_STRETCH = 5, 100
+"""Exponents: see `_stretch`."""
+_MOST_STRETCHED = 2.0**900
+"""Boxes beyond this size, or below its reciprocal, are not stretched: coordinates could overflow or lose bits."""
+
 _FEW_ROWS = 64
 _FEW_ITEMS, _FEW_BINS = 64, 8
 """A run of at most _FEW_ITEMS items is split with _FEW_BINS bins, because the bins would cost more than the items."""
@@ -114,6 +119,36 @@ def build_bvh(boxes: FloatArray) -> Bvh:
             _collapse_to_eight(items, halves, nodes, child, stack, state)
     origin.setflags(write=False)
     return Bvh(cache_aligned(nodes[: state[1]]), cache_aligned(child[: state[1]]), origin, scale)
+
+
+def build_stretched_bvh(boxes: FloatArray) -> tuple[Bvh, FloatArray, FloatArray]:
+    """Return (tree, origin, scale): the tree over boxes (n_items, 6), which are overwritten, stretched along each axis
+    by a power of two so that float32, and one slack for all axes, resolve what is small on a short axis; and by axis x
+    = origin + scale * local, (3,) each."""
+    _stretch(boxes, stretch := np.ones(3))
+    tree = build_bvh(boxes)
+    return tree, read_only(tree.origin / stretch), read_only(tree.scale / stretch)
+
+
+@kernel
+def _stretch(boxes: FloatArray, stretch: FloatArray) -> None:
+    """Multiply boxes (n, 6) by `stretch` (3,), ones on entry: powers of two, up to 2^_MOST_STRETCH, for axes that are
+    shorter by more than 2^_LEAST_STRETCH than the longest."""
+    longest, size = 0.0, 0.0
+    for turn in range(6):
+        axis, low, high = turn % 3, np.inf, -np.inf
+        for item in range(boxes.shape[0]):
+            low, high = min(low, boxes[item, axis]), max(high, boxes[item, 3 + axis])
+        size, extent = max(size, abs(low), abs(high)), 0.5 * high - 0.5 * low
+        if turn < 3:
+            longest = max(longest, extent)
+        elif extent > 0.0 and 1.0 / _MOST_STRETCHED < size < _MOST_STRETCHED:
+            shorter = min(frexp(longest)[1] - frexp(extent)[1], _MOST_STRETCH)
+            stretch[axis] = ldexp(1.0, shorter) if shorter > _LEAST_STRETCH else 1.0
+    for axis in range(3):
+        for item in range(boxes.shape[0] if stretch[axis] != 1.0 else 0):
+            boxes[item, axis] *= stretch[axis]
+            boxes[item, 3 + axis] *= stretch[axis]
 
 
 def cache_aligned(array: Any) -> Any:

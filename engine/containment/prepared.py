@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import Axis, cell_of, make_axis
-from engine.bounding.bvh import WIDTH, build_bvh, cache_aligned
+from engine.bounding.bvh import WIDTH, build_stretched_bvh, cache_aligned
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, reorder_by_tree
@@ -249,7 +249,8 @@ class TriangleTree(NamedTuple):
     blocks: Float32Array
     """``(n_nodes, 8, 8)``: the triangles of each node as `overhead` takes them."""
     origin: tuple[float, float, float]
-    scale: float
+    scale: tuple[float, float, float]
+    """Both as of `build_stretched_bvh`."""
     low: tuple[float, float, float]
     """Low and high corner of the box of all triangles."""
     high: tuple[float, float, float]
@@ -266,30 +267,28 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     boxes, triangles = np.empty((len(solid.triangles), 6)), np.empty((len(solid.triangles), 3), np.int32)
     fill_triangle_boxes(solid.vertices, solid.triangles, boxes)
     check()
-    tree = build_bvh(boxes)
-    check()
-    child, blocks = np.empty_like(tree.child), np.zeros((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
-    reorder_by_tree(solid.vertices, solid.triangles, tree, child, triangles, blocks)
-    check()
     x, y, z, u, v, w = boxes.T
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
-    origin = tuple(tree.origin.tolist())
-    return TriangleTree(
-        solid.vertices, triangles, tree.boxes, child, cache_aligned(blocks), origin, tree.scale, low, high
-    )
+    tree, origin, scale = build_stretched_bvh(boxes)
+    check()
+    child, blocks = np.empty_like(tree.child), np.zeros((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
+    reorder_by_tree(solid.vertices, solid.triangles, tree, origin, scale, child, triangles, blocks)
+    check()
+    places = tuple(origin.tolist()), tuple(scale.tolist()), low, high
+    return TriangleTree(solid.vertices, triangles, tree.boxes, child, cache_aligned(blocks), *places)
 
 
 def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
-    """Return the addresses of the arrays (5), their sizes (3) and the numbers (10: origin, scale, low, high) of a tree,
+    """Return the addresses of the arrays (5), their sizes (3) and the numbers (12: origin, scale, low, high) of a tree,
     as one row of the tables that `tree_at` reads."""
     arrays: Any = tree.vertices, tree.triangles, tree.boxes, tree.child, tree.blocks
     sizes = len(tree.vertices), len(tree.triangles), len(tree.child)
-    return tuple(array.ctypes.data for array in arrays), sizes, (*tree.origin, tree.scale, *tree.low, *tree.high)
+    return tuple(array.ctypes.data for array in arrays), sizes, (*tree.origin, *tree.scale, *tree.low, *tree.high)
 
 
 @inline
 def tree_at(tables: Any, row: int) -> TriangleTree:
-    """Return the tree that row `row` of the tables encodes: addresses (n, 5), sizes (n, 3), places (n, 10), see
+    """Return the tree that row `row` of the tables encodes: addresses (n, 5), sizes (n, 3), places (n, 12), see
     `tree_row`."""
     addresses, sizes, places = tables.addresses, tables.sizes, tables.places
     return TriangleTree(
@@ -298,8 +297,8 @@ def tree_at(tables: Any, row: int) -> TriangleTree:
         array_at(addresses[row, 2], (sizes[row, 2], BOX_ROWS, WIDTH), np.float32),
         array_at(addresses[row, 3], (sizes[row, 2], WIDTH), np.int32),
         array_at(addresses[row, 4], (sizes[row, 2], OVERHEAD_ROWS, WIDTH), np.float32),
-        (places[row, 0], places[row, 1], places[row, 2]), places[row, 3],
-        (places[row, 4], places[row, 5], places[row, 6]), (places[row, 7], places[row, 8], places[row, 9]),
+        (places[row, 0], places[row, 1], places[row, 2]), (places[row, 3], places[row, 4], places[row, 5]),
+        (places[row, 6], places[row, 7], places[row, 8]), (places[row, 9], places[row, 10], places[row, 11]),
     )  # fmt: skip
 
 

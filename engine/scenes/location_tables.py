@@ -194,13 +194,13 @@ def _meshes(solids: list[Polyhedron]) -> tuple[Any, ...]:
     """Return, by polyhedron, the arrays cell_frames, cell_places, addresses, sizes and places of `LocateTables`; rows
     of 0 for cells and trees that are not cached."""
     cells, trees = [solid.cached("sides") for solid in solids], [solid.cached("tree") for solid in solids]
-    lines = [((0,) * 5, (0,) * 3, (0.0,) * 10) if tree is None else tree_row(tree) for tree in trees]
+    lines = [((0,) * 5, (0,) * 3, (0.0,) * 12) if tree is None else tree_row(tree) for tree in trees]
     addresses, sizes, places = zip(*lines) if lines else ((), (), ())
     return (
         np.array([np.zeros(6) if each is None else each.frame for each in cells]).reshape(-1, 6),
         np.array([(0, 0, 0, 0) if each is None else each.place for each in cells], np.int64).reshape(-1, 4),
         np.array(addresses, np.int64).reshape(-1, 5), np.array(sizes, np.int64).reshape(-1, 3),
-        np.array(places, np.float64).reshape(-1, 10),
+        np.array(places, np.float64).reshape(-1, 12),
     )  # fmt: skip
 
 

@@ -40,10 +40,10 @@ be prepared first."""
 
 PlacedMesh = namedtuple("PlacedMesh", "elements faces boxes child origin inverse are_safe n_inner corners")
 """A mesh in its own frame, as kernels here read it: fields of `Mesh` in on_boundary/prepared_boundary.py."""
-MESH_WORDS: Final = 39
+MESH_WORDS: Final = 41
 """Numbers of a solid: addresses (5,) of its arrays, numbers (3,) of elements, nodes and inner nodes; `tree_row`'s
 addresses, 0 without a tree, and sizes (8,); then as doubles origin, inverse, whether all is in range, low and high of
-its box (13,), and `tree_row`'s places (10,)."""
+its box (13,), and `tree_row`'s places (12,)."""
 TREE, PLACES, TREE_PLACES = 8, 16, 29
 """Offsets of the tree's addresses, of the doubles, and of the tree's places among these numbers."""
 _Lines = namedtuple("_Lines", "addresses sizes places")
@@ -72,7 +72,7 @@ def _tree_of(address: int) -> Any:
     lines = _Lines(
         array_at(address + 8 * TREE, (1, 5), np.int64),
         array_at(address + 8 * (TREE + 5), (1, 3), np.int64),
-        array_at(address + 8 * TREE_PLACES, (1, 10), np.float64),
+        array_at(address + 8 * TREE_PLACES, (1, 12), np.float64),
     )
     return tree_at(lines, 0)
 

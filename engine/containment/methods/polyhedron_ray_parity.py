@@ -180,7 +180,8 @@ def _in_tree(tree: Any, q: Point3, blur: float) -> tuple[Any, Any, Any, float, b
     """Return (q in tree coordinates, its z rounded up; low, high: the float32 box of the upward rays from all of q's
     blur; the blur in tree coordinates; whether q is near enough to the tree for these to hold)."""
     origin, scale = tree.origin, tree.scale
-    x, y, z, wide = (q.x - origin[0]) / scale, (q.y - origin[1]) / scale, (q.z - origin[2]) / scale, blur / scale
+    x, y, z = (q.x - origin[0]) / scale[0], (q.y - origin[1]) / scale[1], (q.z - origin[2]) / scale[2]
+    wide = blur / min(scale[0], scale[1], scale[2])
     u, v, w = _SLACK * abs(x) + wide + LEAST, _SLACK * abs(y) + wide + LEAST, _SLACK * abs(z) + wide + LEAST
     least = np.float32(x - u), np.float32(y - v), np.float32(z - w)
     most = np.float32(x + u), np.float32(y + v), _ABOVE_ALL
@@ -298,12 +299,13 @@ def fill_triangle_boxes(vertices: FloatArray, triangles: IntArray, boxes: FloatA
 
 @kernel
 def reorder_by_tree(
-    vertices: FloatArray, triangles: IntArray, tree: Bvh, child: Int32Array, ordered: Int32Array, blocks: Float32Array
-) -> None:
+    vertices: FloatArray, triangles: IntArray, tree: Bvh, origin: FloatArray, scale: FloatArray, child: Int32Array,
+    ordered: Int32Array, blocks: Float32Array,
+) -> None:  # fmt: skip
     """Fill ordered (m, 3) int32 with the triangles in the order of a `Bvh`, and child with its children, triangles
-    renumbered accordingly. blocks: (n_nodes, 8, 8) float32, zero on entry; filled with the triangles of each node as
-    `overhead` takes them."""
-    place, origin, scale = 0, tree.origin, tree.scale
+    renumbered accordingly. tree, origin, scale: of `build_stretched_bvh`. blocks: (n_nodes, 8, 8) float32, zero on
+    entry; filled with the triangles of each node as `overhead` takes them."""
+    place = 0
     for node in range(len(child)):
         centre_x, centre_y = float(tree.boxes[node, 0, 0]), float(tree.boxes[node, 1, 0])
         reach = 0.0
@@ -314,8 +316,8 @@ def reorder_by_tree(
                 continue
             for corner in range(3):
                 vertex = triangles[triangle, corner]
-                x = (vertices[vertex, 0] - origin[0]) / scale - centre_x
-                y = (vertices[vertex, 1] - origin[1]) / scale - centre_y
+                x = (vertices[vertex, 0] - origin[0]) / scale[0] - centre_x
+                y = (vertices[vertex, 1] - origin[1]) / scale[1] - centre_y
                 blocks[node, 2 * corner, lane], blocks[node, 2 * corner + 1, lane] = x, y
                 reach = max(reach, abs(x), abs(y))
                 ordered[place, corner] = vertex

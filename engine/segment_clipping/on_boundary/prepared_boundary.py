@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from engine.bounding.bvh import UNUSED, Bvh, build_bvh, cache_aligned
+from engine.bounding.bvh import UNUSED, Bvh, build_stretched_bvh, cache_aligned
 from engine.containment.methods.rational_locate import next_in_ring
 from engine.lanes.boxes import EMPTY
 from engine.lanes.faces import CORNER_ROWS
@@ -26,10 +26,6 @@ from engine.solids.polygon import Polygon
 from engine.solids.primitives import Triangle
 from engine.types import Float32Array, FloatArray, Int32Array, IntArray, read_only
 
-_LEAST_STRETCH: Final = 5
-_MOST_STRETCH: Final = 100
-_MOST_STRETCHED: Final = 2.0**900
-"""Axes are stretched by 2^6 .. 2^100, if halves of coordinates are below 2^900."""
 _BITS: Final = 20
 """Bits of each coordinate in the Morton code."""
 
@@ -61,8 +57,8 @@ class Mesh(NamedTuple):
     child: Int32Array
     origin: FloatArray
     inverse: FloatArray
-    """boxes, child, origin, and by axis 1 / scale: a `Bvh` with its inner nodes before all leaf blocks, close to each
-    other, of the mesh stretched by `stretch_of`."""
+    """boxes, child, origin, 1 / scale: result of `build_stretched_bvh`, inner nodes before all leaf blocks, close to
+    each other."""
     n_inner: int
     """Number of inner nodes; the first is the root, unless there is one block only."""
     corners: Float32Array
@@ -144,24 +140,12 @@ def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     """Build the boundary of a mesh from its triangles (k, 3, 3). faces: the caller's number of the face of each."""
     low, high = elements.min(axis=1), elements.max(axis=1)
-    stretch = stretch_of(low, high)
-    tree, n_inner = _inner_first(build_bvh(np.concatenate([low * stretch, high * stretch], axis=1)))
+    stretched, origin, scale = build_stretched_bvh(np.concatenate([low, high], axis=1))
+    tree, n_inner = _inner_first(stretched)
     return Mesh(
-        cache_aligned(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child,
-        read_only(tree.origin / stretch), read_only(stretch / tree.scale), n_inner,
-        corners_of(tree, n_inner, elements, stretch),
+        cache_aligned(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, origin,
+        read_only(1.0 / scale), n_inner, corners_of(tree, n_inner, (elements, origin, scale)),
     )  # fmt: skip
-
-
-def stretch_of(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return, by axis, a power of two by which bodies with the boxes `low`, `high` (n, 3) become about equally long on
-    all axes, 1 where they are long enough, and where one is out of range: float32 and one slack for all axes resolve
-    what is small on its axis then."""
-    first, last = low.min(axis=0) / 2, high.max(axis=0) / 2
-    exponents = np.frexp(last - first)[1]
-    shorter = np.where(last > first, exponents.max() - exponents, 0)
-    is_in_range = np.maximum(np.abs(first), np.abs(last)).max() < _MOST_STRETCHED
-    return np.ldexp(1.0, np.where(is_in_range & (shorter > _LEAST_STRETCH), np.minimum(shorter, _MOST_STRETCH), 0))
 
 
 def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
@@ -175,16 +159,16 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
     return Bvh(cache_aligned(tree.boxes[order]), cache_aligned(child), tree.origin, tree.scale), int((~is_block).sum())
 
 
-def corners_of(tree: Bvh, n_inner: int, elements: FloatArray, stretch: FloatArray) -> Float32Array:
+def corners_of(tree: Bvh, n_inner: int, local: tuple[FloatArray, FloatArray, FloatArray]) -> Float32Array:
     """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates: by row a
     coordinate of a corner, by lane a triangle. Unused lanes lie far from everything. n_inner: number of inner nodes,
-    which come first in the tree; elements (k, 3, 3), before they are stretched."""
+    which come first in the tree; local: elements (k, 3, 3), origin and scale (3,)."""
     child = tree.child[n_inner:]
     is_item = child != EMPTY
     block, lane = np.nonzero(is_item)
     corners = np.full((len(child), CORNER_ROWS, LANES), -UNUSED, np.float32)
-    inverse = 1.0 / tree.scale
+    elements, origin, scale = local
     with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
-        local = elements[-1 - child[is_item]] * (stretch * inverse) - tree.origin * inverse
-    corners[block, :, lane] = local.reshape(-1, CORNER_ROWS)
+        places = elements[-1 - child[is_item]] * (1.0 / scale) - origin * (1.0 / scale)
+    corners[block, :, lane] = places.reshape(-1, CORNER_ROWS)
     return cache_aligned(corners)

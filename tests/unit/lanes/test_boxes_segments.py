@@ -24,7 +24,7 @@ def test_touching_boxes_are_near() -> None:
         low, high = inside - rng.uniform(0, 0.1, (64, 3)), inside + rng.uniform(0, 0.1, (64, 3))
         p, q = p - size * (q - p), q + size * (q - p)
         tree = build_bvh(np.concatenate([low, high], axis=1))
-        way = local_segment(Point3(*p), Point3(*q), tree.origin, 1.0 / tree.scale, 0.0)
+        way = local_segment(Point3(*p), Point3(*q), tree.origin, np.full(3, 1.0 / tree.scale), 0.0)
         assert way.is_near
         entered = np.empty((1, 8), np.float32)
         for node in range(len(tree.child)):

@@ -8,26 +8,45 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.predicates.rational import orient2d_rational
-from engine.segment_clipping.exact_pieces import triangle_overlap
-from engine.segment_clipping.on_boundary.contacts import NO_ROOM, Bit, Kind, Place, find_contacts_2d
+from engine.predicates.rational import cross, minus, orient2d_rational
+from engine.segment_clipping.exact_pieces import edge_overlap, triangle_overlap
+from engine.segment_clipping.on_boundary.contacts import CODE_BITS, NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.mesh_contacts import contact_filter, exact_contact
 from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
 from engine.types import UNDECIDED, Point3
 
 
-def contact(edge: list[list[float]], segment: list[list[float]]) -> int:
+def contact(edge: list[list[float]], segment: list[list[float]]) -> list[int]:
+    """Return the kind or the codes of the contact of an edge and a segment, in halves; [] if they are apart."""
     signs = [orient2d_rational(*segment, end) for end in edge], [orient2d_rational(*edge, end) for end in segment]
     if any(pair in ([1, 1], [-1, -1]) for pair in signs):
-        return Kind.APART
+        return []
     if all(sorted(pair) == [-1, 1] for pair in signs):
-        return Kind.PROPER
+        return [Kind.PROPER]
     (of_a, of_b), (of_p, of_q) = signs
     if of_a == of_b == 0:
-        return Kind.DEGENERATE if edge[0] == edge[1] else Bit.ALONG
+        p, q, a, b = ([int(2 * x) for x in point] for point in (*segment, *edge))
+        overlap = edge_overlap(p, q, a, b)
+        return [Kind.DEGENERATE] if a == b else [] if overlap is None else overlap_codes(p, q, [a, b], *overlap[:2])
     place = Place.START if of_p == 0 else Place.END if of_q == 0 else 0 if of_a == 0 else 1
-    return 2 * place + 4 + ((of_a > 0) != (of_b > 0))
+    return [2 * place + 4 + ((of_a > 0) != (of_b > 0))]
+
+
+def overlap_codes(p: list[int], q: list[int], corners: list[list[int]], first: Fraction, last: Fraction) -> list[int]:
+    """Return the codes of the overlap, from one parameter to another, of a segment with an edge or a triangle."""
+
+    def at(t: Fraction) -> int:
+        point = [x + t * (y - x) for x, y in zip(p, q)]
+        if t in (0, 1):
+            return int(Place.START + t)
+        if point in corners:
+            return corners.index(point)
+        ends = zip(corners, [*corners[1:], corners[0]])
+        return 3 + [not any(cross(minus(b, a), minus(point, a))) for a, b in ends].index(True)  # type: ignore[arg-type]
+
+    codes = [2 * at(t) + 4 + Bit.ALONG for t in (first, last)]
+    return [codes[0] + Bit.BEGINS, codes[1] + Bit.CEASES] if first < last else codes[:1]
 
 
 def test_contacts_are_those_of_all_edges() -> None:
@@ -39,13 +58,13 @@ def test_contacts_are_those_of_all_edges() -> None:
     assert n == offsets[-1] > 20
     for i, segment in enumerate(segments.tolist()):
         mine = slice(offsets[i], offsets[i + 1])
-        found = dict(zip(met[mine].tolist(), kinds[mine].tolist()))
-        surely = {k: contact(edge, segment) for k, edge in enumerate(edges.tolist()) if i > 0}
-        # boxes keep apart what only lines that touch, or points on a line, leave open
-        assert {k: kind for k, kind in found.items() if kind == Kind.PROPER} == {
-            k: kind for k, kind in surely.items() if kind == Kind.PROPER
-        }
-        assert found.items() <= surely.items()
+        found = sorted(zip(met[mine].tolist(), kinds[mine].tolist()))
+        surely = [(k, kind) for k, edge in enumerate(edges.tolist()) if i > 0 for kind in contact(edge, segment)]
+        # boxes keep apart what only edges that are points leave open
+        assert set(found) <= set(surely)
+        assert [pair for pair in found if pair[1] != Kind.DEGENERATE] == sorted(
+            pair for pair in surely if pair[1] != Kind.DEGENERATE
+        )
     assert find_contacts_2d(segments, outline, stop, 3)[0] == NO_ROOM
 
 
@@ -55,9 +74,9 @@ def test_contacts_are_those_of_all_edges() -> None:
 def test_contacts_are_those_of_whole_numbers() -> None:
     """What is apart is not met, what is proper is met within; the filter agrees where it says anything."""
     rng = np.random.default_rng(1)
-    n_told = 0
-    for _ in range(300):
-        numbers = rng.integers(-4, 5, (5, 3))
+    n_told = n_along = 0
+    for _ in range(3000):
+        numbers = rng.integers(-2, 3, (5, 3))
         if (numbers[3] == numbers[4]).all():
             continue
         points = [Point3(*row) for row in (numbers * 0.25).tolist()]
@@ -66,11 +85,30 @@ def test_contacts_are_those_of_whole_numbers() -> None:
         a, b, c, p, q = numbers.tolist()
         stretch = triangle_overlap(p, q, a, b, c)
         assert rough in (kind, UNDECIDED) or (rough == Kind.APART and stretch is None)
-        assert kind in (Kind.APART, Kind.DEGENERATE) if stretch is None else kind != Kind.APART
-        if stretch is not None:
-            assert (kind == Kind.DEGENERATE) == stretch[2]
+        has_area = any(cross(minus(b, a), minus(c, a)))
+        assert (kind == Kind.DEGENERATE) == (not has_area and kind != Kind.APART)
+        assert kind == Kind.APART or stretch is not None or not has_area
+        if stretch is not None and has_area:
+            codes = [kind & 255, kind >> CODE_BITS] if kind >> CODE_BITS else [kind]
+            assert codes == overlap_codes(p, q, [a, b, c], *stretch[:2]) if stretch[2] else not kind & Bit.ALONG
             assert kind != Kind.PROPER or 0 < stretch[0] == stretch[1] < 1
-    assert n_told > 150
+            n_along += stretch[2]
+    assert n_told > 1500
+    assert n_along > 10
+
+
+def test_segments_in_the_plane_of_a_triangle() -> None:
+    """Segments and triangles of a lattice: the codes are those of rational parameters."""
+    rng = np.random.default_rng(3)
+    for numbers in rng.integers(-2, 3, (3000, 5, 2)).tolist():
+        a, b, c, p, q = ([x, y, 2 * x - 3 * y] for x, y in numbers)
+        if p == q:
+            continue
+        kind, stretch = exact_contact(*(Point3(*map(float, row)) for row in (a, b, c, p, q))), None
+        if any(cross(minus(b, a), minus(c, a))):
+            stretch = triangle_overlap(p, q, a, b, c)
+            codes = [kind & 255, kind >> CODE_BITS] if kind >> CODE_BITS else [kind]
+            assert codes == ([Kind.APART] if stretch is None else overlap_codes(p, q, [a, b, c], *stretch[:2]))
 
 
 # --- Signed distances and where they say that elements are crossed ---
@@ -88,7 +126,6 @@ def exact_value(element: Any, w: Any) -> Fraction:
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_values_and_crossings_are_those_of_rationals(dimension: int) -> None:
     rng = np.random.default_rng(dimension)
-    values = line_values if dimension == 2 else plane_values
     elements = rng.uniform(-1, 1, (40, dimension, dimension)) * 2.0 ** rng.integers(-30, 30, (40, 1, 1))
     segments = elements.mean(axis=1)[:, None] + rng.uniform(-1, 1, (40, 2, dimension))
     points = np.empty((1, dimension))
@@ -96,10 +133,11 @@ def test_values_and_crossings_are_those_of_rationals(dimension: int) -> None:
         p, q = ([Fraction(x) for x in end] for end in segment)
         at_p = exact_value(element, [x - Fraction(y) for x, y in zip(p, element[0])])
         along = exact_value(element, [x - y for x, y in zip(p, q)])
-        found = values(elements, i, segments, i)
+        line = line_values(elements, i, (0, 1, 0, 1), segments, i)
+        found = line if dimension == 2 else plane_values(elements, i, segments, i)
         for exact, (h, low, bound) in zip((at_p, along), found):
             assert abs(Fraction(h) + Fraction(low) - exact) <= Fraction(bound)
-        t, is_sure = cut_at(segments, i, elements, i, points, 0)
+        t, is_sure = cut_at(segments, i, elements, i, -1, points, 0)
         if is_sure and 0 <= at_p / along <= 1:
             exact_t = at_p / along
             assert t == float(exact_t)

@@ -9,6 +9,7 @@ from engine.segment_clipping.clip_segments import clip_segments
 from engine.solids.base import Solid
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
+from tests.reference.shapes import box, union_of
 from tests.unit.segment_clipping.scenes import Floats, assert_exact
 
 OCTAHEDRON = [(0.7, 0, 0), (-0.7, 0, 0), (0, 0.7, 0), (0, -0.7, 0), (0, 0, 0.7), (0, 0, -0.7)]
@@ -64,3 +65,40 @@ def test_chords_of_meshes() -> None:
     chords += [[a, -a] for a in corners] + [[a, b] for a in on_faces for b in corners if (a @ b) < 0]
     assert len(chords) > 20
     settled_by_signs(chords, Polyhedron(corners, EIGHT))
+
+
+def _meshes() -> dict[str, Polyhedron]:
+    """Meshes whose edges, corners and planes many segments run along: flush shells with T-vertices, coplanar faces of
+    one shell, a plane that no axis shows, and a mesh 10^5 times longer than thick."""
+    flush = union_of(box((0, 0, 0), (2, 2, 2)), box((2, 1, 1), (3, 3, 4)), box((0, 0, 2), (1, 1, 3)))
+    grid = union_of(*(box((i, j, 0), (i + 1, j + 1, 1)) for i in range(2) for j in range(2)))
+    ell = [[0, 0], [2, 0], [4, 0], [4, 2], [2, 2], [2, 4], [0, 4], [0, 2]]
+    walls = [[i, (i + 1) % 8, 8 + (i + 1) % 8, 8 + i] for i in range(8)]
+    faces = [[*range(7, -1, -1)], [*range(8, 16)], *walls]
+    corners = np.array([[*p, z] for z in (0.0, 1.0) for p in ell])
+    slanted = corners @ [[0.6, 0.8, 0.3], [-0.8, 0.6, 0.1], [0.1, -0.3, 1.0]]
+    return {
+        "flush": Polyhedron(flush["vertices"], flush["faces"]),
+        "grid": Polyhedron(grid["vertices"], grid["faces"]),
+        "ell": Polyhedron(corners, faces),
+        "slanted": Polyhedron(slanted, faces),
+        "long": Polyhedron(slanted * [1e5, 1.0, 1e-3], faces),
+    }
+
+
+@pytest.mark.parametrize("name", ["flush", "grid", "ell", "slanted", "long"])
+def test_segments_along_a_mesh(name: str) -> None:
+    """Its edges, parts of them and beyond them, segments in its planes and between its corners."""
+    region, rng = _meshes()[name], np.random.default_rng(7)
+    triangles = region.vertices[region.triangles]
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [2, 1]]])
+    edges = sides[rng.permutation(len(sides))[:12]]
+    way = edges[:, 1] - edges[:, 0]
+    ends = [(0, 1), (-1, 2), (0.25, 0.75), (-1, 0.5), (1, 0)]
+    along = [np.stack([edges[:, 0] + s * way, edges[:, 0] + t * way], axis=1) for s, t in ends]
+    weights = rng.integers(-2, 4, (24, 2, 3)) / 2.0
+    weights[:, :, 2] = 1.0 - weights[:, :, 0] - weights[:, :, 1]
+    weights = weights[(weights[:, 0] != weights[:, 1]).any(axis=1)]
+    inside = np.einsum("nkj,njd->nkd", weights, triangles[rng.integers(0, len(triangles), len(weights))])
+    chords = region.vertices[rng.integers(0, len(region.vertices), (16, 2))]
+    settled_by_signs(np.concatenate([*along, inside, chords[(chords[:, 0] != chords[:, 1]).any(axis=1)]]), region)
