@@ -84,7 +84,7 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
     search with 1. blur: error of each coordinate of p and q."""
     cuts = scratch.cuts
     waiting = Waiting(scratch.stack, scratch.entered, cuts.order, cuts.faces)
-    n_met = append_contacts(mesh, p, q, blur, is_any, waiting, cuts.met, cuts.codes, 0)
+    n_met = append_contacts(mesh, p, q, blur, is_any, False, waiting, cuts.met, cuts.codes, 0)
     for i in range(n_met):
         kind = cuts.codes[i]
         if kind == Kind.DEGENERATE or (not is_any and kind & Bit.ALONG != 0):
@@ -174,7 +174,7 @@ def _cut_at(mesh: PlacedMesh, segments: FloatArray, item: int, place: int, frame
         bound = (T_BOUND + slack) * abs(t)
         is_proven = slack < 0.001 and t + (low - bound) == t + (low + bound)
     if not is_proven and along_blur == 0.0:  # case: unposed, a coordinate midway between two doubles above all
-        cuts.t[place], is_proven = cross_exactly(segments, item, mesh.elements, element, -1, cuts.points[place])
+        cuts.t[place], is_proven = cross_exactly(segments, item, mesh.elements, element, code, cuts.points[place])
     return is_proven
 
 

@@ -12,17 +12,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.compiling.jit import entry_of, kernel
+from engine.compiling.jit import entry_of
 from engine.containment.locate import locate_small_batch
 from engine.containment.locators import Locator, locator_of
-from engine.predicates.orientation import orient2d, orient3d
-from engine.predicates.vectors import as_point2
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.segment_clipping.decide_then_cut import FEW, Clipped, Plan
 from engine.segment_clipping.on_boundary.boundary_cut import cut_on_mesh, cut_on_outline
-from engine.segment_clipping.on_boundary.contacts import GROUP, INSIDE_BEFORE, OUTSIDE_BEFORE, Bit, Kind, Place
-from engine.segment_clipping.on_boundary.mesh_contacts import contacts_with, corner, triangle_at
+from engine.segment_clipping.on_boundary.contacts import GROUP
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline, boundary_of
 from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, in_order_of_source, joined
 from engine.segment_clipping.profiles import clip_exactly
@@ -30,7 +27,7 @@ from engine.solids.checks import check_finite
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Triangle
-from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray
+from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 
 Bounded = Polygon | Polyhedron | Triangle
 """Solids with a boundary of edges or triangles; triangles only in 2D."""
@@ -99,17 +96,10 @@ def clip_chunk(
         locations[on_it, 1] = of_ends
     parts, state = cut_at_crossings(part, locations, boundary, budget)
     left = state.nonzero()[0]  # not SETTLED
-    chords = left[(locations[left] == 0).all(axis=1)]
-    if len(chords) and locator is not None:
-        some, of_chords = part[chords], locations[chords]
-        locate_before_contacts(some, of_chords, boundary, locator, budget)
-        more, state[chords] = cut_at_crossings(some, of_chords, boundary, budget)
-        parts += [pieces._replace(source=chords[pieces.source]) for pieces in more]
-        left = state.nonzero()[0]
     if len(left):
         locations[np.abs(locations) > 1] = 0
         parts.append(clip_exactly(part, left, region, None, budget, locations[left].tolist()))
-    pieces = in_order_of_source(parts) if len(left) + len(chords) else joined(parts) if len(parts) > 1 else parts[0]
+    pieces = in_order_of_source(parts) if len(left) else joined(parts) if len(parts) > 1 else parts[0]
     return (pieces._replace(source=pieces.source + first) if first else pieces), left
 
 
@@ -136,82 +126,3 @@ def cut_at_crossings(
     if counted > least:
         budget.take(_CONTACT_BYTES * (least - counted))
     return parts or [allocate_pieces(0, dimension)], state
-
-
-_AT_END: Final = 2 * Place.END + 5
-"""Code of an element crossed at the segment's end; one less if it is touched."""
-_ALONG_AT_END: Final = _AT_END - Bit.CROSSES | Bit.ALONG
-"""The same without CROSSES, BEGINS and CEASES, of an element that the segment runs along."""
-_PER_BLOCK: Final = 64
-"""Chords (segments with both ends on the boundary) whose contacts are in memory together."""
-_PLACES: Final = (0.5, 0.3125, 0.8125)
-"""Parameters of inner points tried in turn, if a point is on the boundary or elements separate it from the end."""
-
-
-def locate_before_contacts(
-    segments: FloatArray, locations: Int8Array, boundary: Outline | Mesh, locator: Locator, budget: Budget
-) -> None:
-    """Set locations[:, 1] of chords (both ends on the boundary) to INSIDE_BEFORE or OUTSIDE_BEFORE, the location of the
-    perturbed line before the first contact; unchanged if the filter does not decide."""
-    if not boundary.are_safe:  # signs of the perturbed line are exact only then
-        return
-    chords = np.flatnonzero((locations == 0).all(axis=1))
-    for begin in range(0, len(chords), _PER_BLOCK):
-        some = chords[begin : begin + _PER_BLOCK]
-        locations[some, 1] = _before(segments[some], boundary, locator, budget)
-
-
-def _before(segments: FloatArray, boundary: Outline | Mesh, locator: Locator, budget: Budget) -> Int8Array:
-    """Return INSIDE_BEFORE, OUTSIDE_BEFORE or 0 (undecided) for chords (n, 2, dim): the location of the perturbed line
-    before the first contact."""
-    sides = np.zeros(len(segments), np.int8)
-    is_odd, is_left, met, owners = _crossing_parity(segments, boundary, budget)
-    for place in _PLACES:
-        if not is_left.any():
-            break
-        inner = segments.copy()
-        inner[:, 0] = (1.0 - place) * segments[:, 0] + place * segments[:, 1]
-        locator.fill(inner[:, 0].copy(), of_inner := np.empty(len(segments), np.int8), budget)
-        turns_odd, is_known, _, _ = _crossing_parity(inner, boundary, budget)
-        entry_of(exclude_separated)(boundary.elements, met, owners, segments, inner, is_known)
-        is_known &= is_left & (of_inner != 0)
-        is_in = (of_inner > 0) ^ turns_odd ^ is_odd
-        sides[is_known] = np.where(is_in, INSIDE_BEFORE, OUTSIDE_BEFORE)[is_known]
-        is_left &= ~is_known
-    return sides
-
-
-def _crossing_parity(
-    segments: FloatArray, boundary: Outline | Mesh, budget: Budget
-) -> tuple[BoolArray, BoolArray, IntArray, IntArray]:
-    """Return (is_odd, is_certain, met, owners): by segment, whether its perturbed line crosses the boundary an odd
-    number of times before its end, and whether that is certain (not where an edge runs along that end); then the
-    elements that contain a segment's end, and the segment of each."""
-    met, kinds, offsets = contacts_with(segments, boundary, budget)
-    owners = np.repeat(np.arange(len(segments)), np.diff(offsets))
-    holds_end, place = kinds | Bit.CROSSES == _AT_END, kinds & ~np.uint8(Bit.CROSSES | Bit.BEGINS | Bit.CEASES)
-    turning = owners[(kinds & Bit.CROSSES != 0) & ~holds_end]
-    is_sure = np.ones(len(segments), np.bool_)
-    is_sure[owners[(kinds == Kind.DEGENERATE) | (place == _ALONG_AT_END)]] = False
-    is_odd = np.bincount(turning, minlength=len(segments)) & 1 == 1
-    return is_odd, is_sure, met[holds_end], owners[holds_end]
-
-
-@kernel
-def exclude_separated(
-    elements: FloatArray, met: IntArray, owners: IntArray, segments: FloatArray, inner: FloatArray, is_known: BoolArray
-) -> None:
-    """Set is_known (n,) False for each segment whose first end and inner point are not proven to be on one side of each
-    of its elements. met, owners: elements and the segment of each. inner: (n, 2, dim), segments that begin at the inner
-    points."""
-    for place in range(met.size):
-        element, item = met[place], owners[place]
-        if elements.shape[1] == 2:
-            a, b = as_point2(elements[element], 0), as_point2(elements[element], 1)
-            side = orient2d(a, b, as_point2(segments[item], 0))
-            other = orient2d(a, b, as_point2(inner[item], 0))
-        else:
-            c, d, e = triangle_at(elements, element)
-            side, other = orient3d(c, d, e, corner(segments, item, 0)), orient3d(c, d, e, corner(inner, item, 0))
-        if side != other or abs(side) != 1:
-            is_known[item] = False

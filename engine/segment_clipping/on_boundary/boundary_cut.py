@@ -23,22 +23,39 @@ from engine.segment_clipping.on_boundary.contacts import (
     CROSSED,
     GROUP,
     INSIDE_BEFORE,
+    OUTSIDE_BEFORE,
     Bit,
+    Contacts,
     Kind,
     Place,
     allocate_contacts,
+    append_edges,
     are_same_point,
     axis_of,
     decode_place,
     edge_stack,
     gather_edges,
 )
-from engine.segment_clipping.on_boundary.crossing_values import cross_exactly, cut_at, is_item_safe, parameter_exactly
-from engine.segment_clipping.on_boundary.mesh_contacts import gather_triangles, traversal_buffers
+from engine.segment_clipping.on_boundary.crossing_values import (
+    are_at_one_parameter,
+    cross_exactly,
+    cut_at,
+    is_item_safe,
+    parameter_exactly,
+)
+from engine.segment_clipping.on_boundary.mesh_contacts import (
+    append_contacts,
+    corner,
+    gather_triangles,
+    traversal_buffers,
+)
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
 from engine.segment_clipping.pieces import Pieces, put_own_end
 from engine.types import OPEN, FlagArray, FloatArray, Int8Array, IntArray
 
+_WHOLE: Final = 2 * Place.START + 4 | Bit.ALONG | Bit.BEGINS
+_WHOLE_TOO: Final = 2 * Place.END + 4 | Bit.ALONG | Bit.CEASES
+"""Codes of the two contacts of an element along which a segment runs as a whole."""
 SETTLED: Final = 0
 """State of a segment, besides OPEN."""
 UNSURE: Final = -1
@@ -84,10 +101,9 @@ def _write_contact(segments: FloatArray, item: int, elements: FloatArray, code: 
         for k in range(dimension):
             cuts.points[n, k] = elements[element, place, k] + 0.0
         return n + 1 if sure else UNSURE
-    side = place - 3 if dimension == 3 and code & Bit.ALONG != 0 else -1
-    cuts.t[n], sure = cut_at(segments, item, elements, element, side, cuts.points, n)
+    cuts.t[n], sure = cut_at(segments, item, elements, element, code, cuts.points, n)
     if not sure:
-        cuts.t[n], sure = cross_exactly(segments, item, elements, element, side, cuts.points[n])
+        cuts.t[n], sure = cross_exactly(segments, item, elements, element, code, cuts.points[n])
     return n + 1 if sure else UNSURE
 
 
@@ -103,19 +119,23 @@ class Before(IntEnum):
 
 
 @inline
-def _location_before(elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int) -> int:
-    """Return the location (`Before`) of the perturbed line before the first of n sorted contacts; UNKNOWN also if
-    contacts that round alike may be different points. of_p, of_q: locations of the segment's ends, of_q as
-    `emit_touching` takes it."""
+def _location_before(
+    segments: FloatArray, item: int, elements: FloatArray, cuts: Crossings, n: int, of_p: int, of_q: int
+) -> int:
+    """Return the location (`Before`) of the perturbed line before the first of n sorted contacts of segment ``item``;
+    UNKNOWN also if contacts that round alike may be different points. of_p, of_q: locations of the segment's ends, of_q
+    as `emit_touching` takes it."""
     begin, turns = 0, False
     for place in range(n):
         i, first = cuts.order[place], cuts.order[begin]
         if cuts.t[i] != cuts.t[first]:
             begin = place
-        elif i != first and not are_same_point(
-            elements, cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]
-        ):
-            return Before.UNKNOWN
+        elif i != first:
+            met, code, other, its = cuts.met[first], cuts.codes[first], cuts.met[i], cuts.codes[i]
+            if not are_same_point(elements, met, code, other, its) and not are_at_one_parameter(
+                segments, item, elements, met, code, other, its
+            ):
+                return Before.UNKNOWN
         turns ^= (cuts.codes[i] & Bit.CROSSES != 0) & (decode_place(cuts.codes[i]) != Place.END)
     if of_p != 0:
         return int(of_p > 0)
@@ -147,8 +167,14 @@ def emit_touching(
 ) -> int:  # fmt: skip
     """Write the pieces between n contacts, at most n + 1, to `out` from `row` on; return the next row, or UNSURE.
     source: number of the segment. ends: (2,) int8 locations of the segment's ends; the second counts only if the first
-    is on the boundary, and may be what `locate_before_contacts` sets."""
-    is_in, turned, n_along, is_open, place = _location_before(elements, cuts, n, ends[0], ends[1]), 0, 0, ends[0] > 0, 0
+    is on the boundary, and may be INSIDE_BEFORE or OUTSIDE_BEFORE."""
+    is_in, turned, n_along, is_open, place = (
+        _location_before(segments, item, elements, cuts, n, ends[0], ends[1]),
+        0,
+        0,
+        ends[0] > 0,
+        0,
+    )
     if is_in == Before.UNKNOWN:
         return UNSURE
     if is_open:
@@ -177,6 +203,26 @@ def emit_touching(
         put_own_end(out, row, 1, segments, item, segments.shape[2] == 2)
         row += 1
     return row
+
+
+@inline
+def _needs_location_before(contacts: Any, item: int, ends: Int8Array) -> bool:
+    """Return whether segment ``item`` is a chord, both ends on the boundary (ends (2,) are 0), that does not run along
+    one element as a whole."""
+    is_chord = ends[0] == 0 and ends[1] == 0
+    for i in range(contacts.offsets[item], contacts.offsets[item + 1] if is_chord else 0):
+        is_chord &= contacts.kinds[i] != _WHOLE or contacts.kinds[i + 1] != _WHOLE_TOO
+    return is_chord
+
+
+@inline
+def _location_before_ends(cuts: Crossings, n: int) -> int:
+    """Return INSIDE_BEFORE or OUTSIDE_BEFORE for the n crossings of the perturbed line before a segment, the kinds of
+    which are in cuts.codes; 0 if one is undecided or there is no room for them."""
+    is_sure = n >= 0
+    for i in range(n):
+        is_sure &= cuts.codes[i] == Kind.PROPER
+    return 0 if not is_sure else INSIDE_BEFORE if n & 1 == 1 else OUTSIDE_BEFORE
 
 
 @allocating
@@ -260,7 +306,7 @@ def cut_segment(segments: FloatArray, item: int, boundary: Any, contacts: Any, c
             return False
         place = i - first
         cuts.faces[place] = boundary.faces[element]
-        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, -1, cuts.points, place)
+        cuts.t[place], is_sure = cut_at(segments, item, boundary.elements, element, CROSSED, cuts.points, place)
         if not is_sure:
             return False
     return sort_crossings(cuts, last - first)
@@ -304,7 +350,7 @@ def cut_on_outline(
 
     | argument | content |
     |---|---|
-    | locations (m, 2) int8 | of their ends, the second only if the first is not OUTSIDE |
+    | locations (m, 2) int8 | of their ends, the second only if the first is on the boundary; overwritten if both are |
     | outline | see `Outline` |
     | stop (1,) uint8 | polled |
     | out | pieces; their source is the index of the segment |
@@ -317,6 +363,12 @@ def cut_on_outline(
     while n[0] == last < locations.shape[0] and n_ready > 0:  # bound: every turn takes a segment
         group = segments[last : last + size]
         n_ready = gather_edges(contacts, outline, group, group.shape[0], stop)
+        for item in range(n_ready):
+            if _needs_location_before(contacts, item, locations[last + item]):
+                room = Contacts(cuts.met, cuts.codes, contacts.offsets, contacts.waiting)
+                locations[last + item, 1] = _location_before_ends(
+                    cuts, append_edges(room, outline, group[item], True, 0)
+                )
         n[0], n[1] = cut_group(group[:n_ready], locations, last, outline, contacts, cuts, stop, out, n[1], state)
         last += n_ready
     n[2] *= 2 if n_ready == 0 else 1
@@ -324,8 +376,9 @@ def cut_on_outline(
 
 @allocating_kernel
 def cut_on_mesh(
-    segments: FloatArray, locations: Int8Array, mesh: Mesh, stop: FlagArray, out: Pieces, state: FlagArray, n: IntArray
-) -> None:
+    segments: FloatArray, locations: Int8Array, mesh: Mesh, stop: FlagArray, out: Pieces, state: FlagArray,
+    n: IntArray,
+) -> None:  # fmt: skip
     """Clip segments (m, 2, 3) float64 to a polyhedron; arguments and results as in `cut_on_outline`, its table."""
     size = group_size(locations.shape[0] - n[0])
     contacts, cuts = allocate_contacts(size, n[2], traversal_buffers()), allocate_crossings(n[2], 3)
@@ -333,6 +386,11 @@ def cut_on_mesh(
     while n[0] == last < locations.shape[0] and n_ready > 0:
         group = segments[last : last + size]
         n_ready = gather_triangles(contacts, mesh, group, group.shape[0], stop)
+        for item in range(n_ready):
+            if _needs_location_before(contacts, item, locations[last + item]):
+                p, q, waiting = corner(group, item, 0), corner(group, item, 1), contacts.waiting
+                n_before = append_contacts(mesh, p, q, 0.0, False, True, waiting, cuts.met, cuts.codes, 0)
+                locations[last + item, 1] = _location_before_ends(cuts, n_before)
         n[0], n[1] = cut_group(group[:n_ready], locations, last, mesh, contacts, cuts, stop, out, n[1], state)
         last += n_ready
     n[2] *= 2 if n_ready == 0 else 1

@@ -152,33 +152,18 @@ def are_same(points: FloatArray, point: int, others: FloatArray, other: int) -> 
 
 @inline
 def are_same_point(elements: FloatArray, first: int, code: int, second: int, other: int) -> bool:
-    """Return whether two contacts of one segment are one point: an end of the segment, a common corner or side of both
-    elements, or a corner of one on a side of the other. first, second: the elements; code, other: the codes of their
-    contacts."""
+    """Return whether two contacts of one segment are one point by their codes: an end of the segment, or a common
+    corner or side of both elements. first, second: the elements; code, other: the codes of their contacts."""
     n, m = decode_place(code), decode_place(other)
     if n >= Place.START or m >= Place.START:
         return n == m and n <= Place.END
-    if n < 3 <= m:
-        return _is_on_line(elements, first, n, second, m)
-    if m < 3 <= n:
-        return _is_on_line(elements, second, m, first, n)
+    if (n < 3) != (m < 3):
+        return False
     if n < 3:
         return are_same(elements[first], n, elements[second], m)
     a, b, c, d = n - 3, (n - 2) % 3, m - 3, (m - 2) % 3
     p, q = elements[first], elements[second]
     return (are_same(p, a, q, c) and are_same(p, b, q, d)) or (are_same(p, a, q, d) and are_same(p, b, q, c))
-
-
-@called
-def _is_on_line(elements: FloatArray, first: int, corner: int, second: int, side: int) -> bool:
-    """Return whether a corner of triangle ``first`` is proven to lie on the line through a side, 3 .. 5, of triangle
-    ``second``."""
-    p, q, is_on = elements[first], elements[second], True
-    for k in range(3):
-        i, j, a, b = (k + 1) % 3, (k + 2) % 3, side - 3, (side - 2) % 3
-        of_corner = orient2d(Point2(q[a, i], q[a, j]), Point2(q[b, i], q[b, j]), Point2(p[corner, i], p[corner, j]))
-        is_on &= of_corner == 0
-    return is_on
 
 
 @called
@@ -236,15 +221,29 @@ def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
     return code if code != Kind.APART else along_edge(a, b, p, q, 0, 1)
 
 
+@called
+def crossed_before(edge: FloatArray, segment: FloatArray) -> int:
+    """Return PROPER if the perturbed line through p and q, a segment (2, 2), crosses an edge (2, 2) before p, APART if
+    not, DEGENERATE if undecided."""
+    a, b = as_point2(edge, 0), as_point2(edge, 1)
+    p, q = as_point2(segment, 0), as_point2(segment, 1)
+    of_p, of_q, of_a, of_b = orient2d(a, b, p), orient2d(a, b, q), orient2d(p, q, a), orient2d(p, q, b)
+    if max(of_p, of_q, of_a, of_b) == UNDECIDED:
+        return Kind.DEGENERATE
+    is_before = of_p == of_q and of_p == (1 if of_a == 1 else -1) and (of_a == 1) != (of_b == 1)
+    return Kind.PROPER if is_before else Kind.APART
+
+
 @inline
-def may_meet(segment: FloatArray, box: FloatArray) -> bool:
-    """Return False if a separating axis proves that a segment (2, 2) misses the closed box, (2, 2) low and high; else
-    True."""
+def may_meet(segment: FloatArray, box: FloatArray, is_before: bool) -> bool:
+    """Return False if a separating axis proves that a segment (2, 2), or with is_before its line before its start,
+    misses the closed box, (2, 2) low and high; else True."""
     n = segment.shape[1]
     largest = 0.0
     for k in range(n):
         p, q, low, high = segment[0, k], segment[1, k], box[0, k], box[1, k]
-        if (p < low and q < low) or (p > high and q > high):
+        is_below, is_above = (q >= p, q <= p) if is_before else (q < low, q > high)
+        if (p < low and is_below) or (p > high and is_above):
             return False
         largest = max(largest, abs(p), abs(q), abs(low), abs(high))
     if largest > _TOO_LARGE:
@@ -263,15 +262,15 @@ def may_meet(segment: FloatArray, box: FloatArray) -> bool:
 
 
 @inline
-def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contacts: int) -> int:
+def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, is_before: bool, n_contacts: int) -> int:
     """Append the contacts of a segment (2, 2) with edges to the n_contacts in `contacts`; return their number then, or
-    NO_ROOM. outline: the `Outline` of the polygon."""
+    NO_ROOM. outline: the `Outline` of the polygon. is_before: instead, what `crossed_before` tells of edges."""
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
         depth -= 1
         node = stack[depth]
-        if not may_meet(segment, outline.boxes[node]):
+        if not may_meet(segment, outline.boxes[node], is_before):
             continue
         if node < n_leaves:
             stack[depth], stack[depth + 1] = 2 * node + 1, 2 * node
@@ -280,7 +279,8 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, n_contac
         start = (node - n_leaves) * LEAF_SIZE
         for place in range(start, min(start + LEAF_SIZE, n_edges)):
             element = outline.order[place]
-            kind = edge_contact(outline.elements[element], segment)
+            edge = outline.elements[element]
+            kind = crossed_before(edge, segment) if is_before else edge_contact(edge, segment)
             while kind != Kind.APART:  # bound: two codes
                 if n_contacts == contacts.met.size:
                     return NO_ROOM
@@ -297,7 +297,7 @@ def gather_edges(contacts: Contacts, outline: Any, segments: FloatArray, n: int,
     contacts.offsets[0] = 0
     for i in range(n):
         if not are_same(segments[i], 0, segments[i], 1):
-            n_met = append_edges(contacts, outline, segments[i], n_met)
+            n_met = append_edges(contacts, outline, segments[i], False, n_met)
         contacts.offsets[i + 1] = n_met
         if n_met < 0 or stop[0]:
             return i

@@ -35,12 +35,16 @@ from engine.compiling.jit import called, inline, merged
 from engine.predicates.cut_point import T_BOUND, nearest, parameter_and_point, point_at
 from engine.predicates.error_free import U2, dd_div, two_diff, two_prod, two_sum, workspace
 from engine.predicates.expansion import Components, add_scaled, grow, is_safe, magnitude
+from engine.predicates.parameters import compare_products
 from engine.predicates.parameters import minor as exact_minor
+from engine.segment_clipping.on_boundary.contacts import Bit, Place, axis_of, decode_place
 from engine.segment_clipping.on_boundary.mesh_contacts import corner, flat_axis, triangle_at
 from engine.segment_clipping.pieces import Triple
 from engine.types import FloatArray, Point3
 
 VALUE_BOUND: Final = 80.0 * U2
+_MOST_COMPONENTS: Final = 12
+"""Most components of values whose products are compared."""
 
 Line = tuple[int, int, int, int]
 """Corners a and b of an element, and the two axes on which the line a b is seen."""
@@ -92,12 +96,19 @@ def dot(n: Normal, w: Vector) -> Triple:
     return h, low, VALUE_BOUND * (x_size + y_size + z_size)
 
 
+_PLANE: Final = (-1, -1, -1, -1)
+
+
 @called
-def line_of(elements: FloatArray, element: int, side: int) -> Line:
-    """Return the line of an edge, or of side 0 .. 2 of a triangle seen along an axis along which it has an area."""
+def line_of(elements: FloatArray, element: int, code: int) -> Line:
+    """Return the line of an edge, or of the side of a coplanar triangle, seen along an axis along which it has an area,
+    where it has a contact with the given code; `_PLANE` for a triangle that is not coplanar."""
     if elements.shape[1] == 2:
         return 0, 1, 0, 1
+    if code & Bit.ALONG == 0:
+        return _PLANE
     k, _ = flat_axis(*triangle_at(elements, element))
+    side = decode_place(code) - 3
     return side, (side + 1) % 3, (k + 1) % 3, (k + 2) % 3
 
 
@@ -146,13 +157,13 @@ def is_item_safe(items: FloatArray, item: int) -> bool:
 
 @merged
 def cut_at(
-    segments: FloatArray, item: int, elements: FloatArray, element: int, side: int, points: FloatArray, row: int
+    segments: FloatArray, item: int, elements: FloatArray, element: int, code: int, points: FloatArray, row: int
 ) -> tuple[float, bool]:
     """Set points[row] to the crossing of segment ``item`` and element ``element``, by double-doubles; return its
-    parameter t, and whether t and all coordinates are proven nearest doubles. side: 0 .. 2, the side of a coplanar
-    triangle that is crossed, else -1."""
-    if segments.shape[2] == 2 or side >= 0:
-        at_p, along = line_values(elements, element, line_of(elements, element, side), segments, item)
+    parameter t, and whether t and all coordinates are proven nearest doubles. code: of the contact, in the
+    element's inside or side."""
+    if segments.shape[2] == 2 or code & Bit.ALONG != 0:
+        at_p, along = line_values(elements, element, line_of(elements, element, code), segments, item)
     else:
         at_p, along = plane_values(elements, element, segments, item)
     s, s_low, s_bound = at_p
@@ -182,7 +193,7 @@ def _size_at(
 ) -> int:
     """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of segment ``item``; return its number of components.
     Triangle a b c: sum over k of component k of (b - a) x (c - a) times (x - a)_k. A `Line` a b: the one component of
-    (b - a) x (x - a) on its axes. line: all -1 for the plane of a triangle."""
+    (b - a) x (x - a) on its axes."""
     m, n, (a, b, i, j), is_flat = workspace(16), 0, line, line[0] >= 0
     for k in range(1 if is_flat else 3):
         if not is_flat:
@@ -201,17 +212,14 @@ def _size_at(
 
 @called
 def cross_exactly(
-    segments: FloatArray, item: int, elements: FloatArray, element: int, side: int, point: FloatArray
+    segments: FloatArray, item: int, elements: FloatArray, element: int, code: int, point: FloatArray
 ) -> tuple[float, bool]:
     """Set `point` to the crossing of segment ``item`` and element ``element`` from exact values; return its parameter
-    t, and whether t and all coordinates are proven nearest doubles. side: as in `cut_at`. Caller guarantees that the
+    t, and whether t and all coordinates are proven nearest doubles. code: of the contact. Caller guarantees that the
     ends lie on different sides, or one of them on the element's line or plane, and that coordinates are zero or of
     sizes within 2^-120 .. 2^120, so that differences are multiples of 2^-172 and values of 2^-516, below 2^366."""
-    wp, wq, e, line = workspace(192), workspace(192), workspace(2304), (-1, -1, -1, -1)
-    if segments.shape[2] == 2 or side >= 0:
-        line = line_of(elements, element, side)
-    n_wp = _size_at(elements, element, line, segments, item, 0, wp)
-    n_wq = _size_at(elements, element, line, segments, item, 1, wq)
+    wp, wq, e = workspace(192), workspace(192), workspace(2304)
+    n_wp, n_wq = _put_weights(segments, item, elements, element, code, wp, wq)
     return parameter_and_point(segments[item], wp, n_wp, wq, n_wq, -1, 0.0, point, e)
 
 
@@ -223,6 +231,41 @@ def parameter_exactly(p: float, q: float, x: float) -> tuple[float, bool]:
     h, low = two_diff(q, p)
     way = 1.0 if h > 0.0 else -1.0
     return nearest(0.0, 1.0, wp, n_wp, wq, n_wq, way * h, way * low, e)
+
+
+@called
+def are_at_one_parameter(
+    segments: FloatArray, item: int, elements: FloatArray, first: int, code: int, second: int, other: int
+) -> bool:
+    """Return whether two contacts of segment ``item``, in no end of it, are proven to have equal parameters. first,
+    second: the elements; code, other: the codes of their contacts. Sizes as in `cross_exactly`: products are multiples
+    of 2^-1032."""
+    wp, wq, vp, vq = workspace(192), workspace(192), workspace(192), workspace(192)
+    if max(decode_place(code), decode_place(other)) == Place.END:
+        return False
+    n_wp, n_wq = _put_weights(segments, item, elements, first, code, wp, wq)
+    n_vp, n_vq = _put_weights(segments, item, elements, second, other, vp, vq)
+    if max(n_wp, n_wq, n_vp, n_vq) > _MOST_COMPONENTS:
+        return False
+    return compare_products(wp, n_wp, vq, n_vq, vp, n_vp, wq, n_wq, workspace(576)) == 0
+
+
+@called
+def _put_weights(
+    segments: FloatArray, item: int, elements: FloatArray, element: int, code: int, wp: Components, wq: Components
+) -> tuple[int, int]:
+    """Set expansions wp, wq (192 places) to distances of both ends of segment ``item`` from its contact with element
+    ``element``, up to a common factor; return their numbers of components. code: of the contact, in no end."""
+    place = decode_place(code)
+    if place < 3:
+        k = axis_of(segments, item)
+        x = elements[element, place, k]
+        return _put_distance(wp, x, segments[item, 0, k]), _put_distance(wq, segments[item, 1, k], x)
+    line = line_of(elements, element, code)
+    return (
+        _size_at(elements, element, line, segments, item, 0, wp),
+        _size_at(elements, element, line, segments, item, 1, wq),
+    )
 
 
 @inline

@@ -113,17 +113,50 @@ def exact_contact(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
         return Kind.DEGENERATE
     if ab == bc and bc == ca and ab != 0 and of_p != 0 and of_q != 0:
         return Kind.PROPER
-    k = longest_axis((q.x - p.x, q.y - p.y, q.z - p.z))
-    way = 1 if q[k] > p[k] else -1
-    first = way * ab if ab != 0 else _side_when_perturbed(a, b, p, q, k)
-    second = way * bc if bc != 0 else _side_when_perturbed(b, c, p, q, k)
-    third = way * ca if ca != 0 else _side_when_perturbed(c, a, p, q, k)
+    first, second, third = _perturbed_sides(a, b, c, p, q, (ab, bc, ca))
     if max(first, second, third) == UNDECIDED:
         return Kind.DEGENERATE
     place = Place.START if of_p == 0 else Place.END if of_q == 0 else 3 if ab == 0 else 4 if bc == 0 else 5
     if place < Place.START and (ab == 0) + (bc == 0) + (ca == 0) == 2:
         place = 0 if bc != 0 else 1 if ca != 0 else 2
     return code_of(place, first == second and second == third)
+
+
+@called
+def crossed_before(a: Point3, b: Point3, c: Point3, p: Point3, q: Point3) -> int:
+    """Return PROPER if the perturbed line through p and q crosses triangle a b c before p, APART if not, DEGENERATE if
+    undecided. The line nears the plane, seen from p, where q is on its other side or farther from it."""
+    of_p, of_q = orient3d(a, b, c, p), orient3d(a, b, c, q)
+    if of_p == 0 or of_q == 0 or of_p == -of_q:
+        return Kind.APART
+    ab, bc, ca = orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)
+    if max(of_p, of_q, ab, bc, ca) == UNDECIDED:
+        return Kind.DEGENERATE
+    if min(ab, bc, ca) * max(ab, bc, ca) < 0 or min(ab, bc, ca) == max(ab, bc, ca) == 0:
+        return Kind.APART
+    first, second, third = _perturbed_sides(a, b, c, p, q, (ab, bc, ca))
+    if max(first, second, third) == UNDECIDED:
+        return Kind.DEGENERATE
+    return (
+        Kind.PROPER
+        if first == second == third and ab + bc + ca != 0 and (ab + bc + ca > 0) == (of_p > 0)
+        else Kind.APART
+    )
+
+
+@inline
+def _perturbed_sides(
+    a: Point3, b: Point3, c: Point3, p: Point3, q: Point3, sides: tuple[int, int, int]
+) -> tuple[int, int, int]:
+    """Return the sides (1, -1) on which the perturbed line passes edges a b, b c and c a, all times one sign; UNDECIDED
+    as in `_side_when_perturbed`. sides: of the line p q itself, 0 where it meets an edge's line."""
+    k = longest_axis((q.x - p.x, q.y - p.y, q.z - p.z))
+    way = 1 if q[k] > p[k] else -1
+    return (
+        way * sides[0] if sides[0] != 0 else _side_when_perturbed(a, b, p, q, k),
+        way * sides[1] if sides[1] != 0 else _side_when_perturbed(b, c, p, q, k),
+        way * sides[2] if sides[2] != 0 else _side_when_perturbed(c, a, p, q, k),
+    )
 
 
 @inline
@@ -322,6 +355,15 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: Any, blur: float) 
     )
 
 
+@inline
+def _far_before(p: Point3, q: Point3, inverse: Any) -> Point3:
+    """Return a point about on the line p q before p, beyond the tree if p is near it; its rounding is far below the
+    slack of `local_segment`."""
+    x, y, z = q.x - p.x, q.y - p.y, q.z - p.z
+    reach = 4.0 * LIMIT / max(abs(x * inverse[0]), abs(y * inverse[1]), abs(z * inverse[2]))
+    return Point3(p.x - reach * x, p.y - reach * y, p.z - reach * z)
+
+
 @merged
 def shear_of(way: Way) -> Any:
     """Return the arguments of `near_triangles` for a segment: the axes (i, j, k), k the one along which it is longest;
@@ -363,11 +405,16 @@ def _append_triangles(
     mesh: Any, ends: Any, is_any: bool, triangles: IntArray, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
     """Append the contacts of a segment with triangles[:n] to met (elements) and kinds, after the n_met there; return
-    their number then, or NO_ROOM. mesh: the `Mesh`; ends: (p, q, blur); is_any: one contact is enough, in row 0."""
-    p, q, blur = ends
+    their number then, or NO_ROOM. mesh: the `Mesh`; ends: (p, q, blur, is_before); is_any: one contact is enough, in
+    row 0."""
+    p, q, blur, is_before = ends
     for place in range(n):
         element = triangles[place]
-        kind = triangle_contact(mesh.elements, element, p, q, blur)
+        if is_before:
+            a, b, c = triangle_at(mesh.elements, element)
+            kind = crossed_before(a, b, c, p, q)
+        else:
+            kind = triangle_contact(mesh.elements, element, p, q, blur)
         while kind != Kind.APART:  # bound: two codes
             row = 0 if is_any else n_met
             if row == met.size:
@@ -385,8 +432,8 @@ def _append_blocks(
     mesh: Any, ends: Any, shear: Any, is_any: bool, waiting: Waiting, n: int, met: IntArray, kinds: Any, n_met: int
 ) -> int:
     """Append the contacts of a segment with the triangles of n leaf blocks, queued in `waiting`, to met (elements) and
-    kinds, after the n_met there; return their number then, or NO_ROOM. ends: (p, q, blur); shear: `shear_of` the
-    segment; is_any: one contact is enough, in row 0."""
+    kinds, after the n_met there; return their number then, or NO_ROOM. ends: (p, q, blur, is_before); shear: `shear_of`
+    the segment; is_any: one contact is enough, in row 0."""
     (i, j, k), place, r, s, reach, slack = shear
     n_waiting = 0
     for turn in range(n):
@@ -410,15 +457,17 @@ def _append_blocks(
 
 @inline
 def append_contacts(
-    mesh: Any, p: Point3, q: Point3, blur: float, is_any: bool, waiting: Waiting, met: IntArray, kinds: Any, n_met: int
-) -> int:
+    mesh: Any, p: Point3, q: Point3, blur: float, is_any: bool, is_before: bool, waiting: Waiting, met: IntArray,
+    kinds: Any, n_met: int,
+) -> int:  # fmt: skip
     """Append the contacts of segment p q with the triangles of a `Mesh` to met (elements) and kinds, after the n_met
     there; return their number then, or NO_ROOM. blur: error of each coordinate of p and q; if above 0, what the filter
     leaves open is Kind.DEGENERATE. is_any: one contact is enough, in row 0; it is Kind.DEGENERATE only if no other is
-    decided. waiting: scratch."""
-    stack, blocks = waiting.stack, waiting.blocks
-    way, last = local_segment(p, q, mesh.origin, mesh.inverse, blur), np.float32(1.0)
-    shear, ends, n_blocks, depth = shear_of(way), (p, q, blur), 0, int(way.is_near)
+    decided. is_before: instead, what `crossed_before` tells of triangles. waiting: scratch."""
+    stack, blocks, last = waiting.stack, waiting.blocks, np.float32(1.0)
+    start, end = (_far_before(p, q, mesh.inverse), p) if is_before else (p, q)
+    way = local_segment(start, end, mesh.origin, mesh.inverse, blur)
+    shear, ends, n_blocks, depth = shear_of(way), (p, q, blur, is_before), 0, int(way.is_near)
     stack[0], blocks[0] = 0, 0
     if mesh.n_inner == 0:
         depth, n_blocks = 0, depth
@@ -459,7 +508,9 @@ def gather_triangles(contacts: Contacts, mesh: Mesh, segments: FloatArray, n: in
     for i in range(n):
         if not are_same(segments[i], 0, segments[i], 1):
             p, q = corner(segments, i, 0), corner(segments, i, 1)
-            n_met = append_contacts(mesh, p, q, 0.0, False, contacts.waiting, contacts.met, contacts.kinds, n_met)
+            n_met = append_contacts(
+                mesh, p, q, 0.0, False, False, contacts.waiting, contacts.met, contacts.kinds, n_met
+            )
         contacts.offsets[i + 1] = n_met
         if n_met < 0 or stop[0]:
             return i

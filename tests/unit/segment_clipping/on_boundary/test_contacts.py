@@ -10,7 +10,7 @@ import pytest
 
 from engine.predicates.rational import cross, minus, orient2d_rational
 from engine.segment_clipping.exact_pieces import edge_overlap, triangle_overlap
-from engine.segment_clipping.on_boundary.contacts import CODE_BITS, NO_ROOM, Bit, Kind, Place, find_contacts_2d
+from engine.segment_clipping.on_boundary.contacts import CODE_BITS, CROSSED, NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
 from engine.segment_clipping.on_boundary.mesh_contacts import contact_filter, exact_contact
 from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
@@ -137,7 +137,7 @@ def test_values_and_crossings_are_those_of_rationals(dimension: int) -> None:
         found = line if dimension == 2 else plane_values(elements, i, segments, i)
         for exact, (h, low, bound) in zip((at_p, along), found):
             assert abs(Fraction(h) + Fraction(low) - exact) <= Fraction(bound)
-        t, is_sure = cut_at(segments, i, elements, i, -1, points, 0)
+        t, is_sure = cut_at(segments, i, elements, i, CROSSED, points, 0)
         if is_sure and 0 <= at_p / along <= 1:
             exact_t = at_p / along
             assert t == float(exact_t)
