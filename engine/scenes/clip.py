@@ -59,7 +59,8 @@ def clip_all(
     """Return all pieces of segments (n, 2, dim) within the bodies of a scene, sorted. counts: filled."""
     parts = _parts(segments, scene, counts, budget, workers)
     pieces = merge_parts(parts, segments.shape[2], budget, workers)
-    return sort_pieces(pieces, len(segments), lambda: _exact_ends(segments, scene, budget), budget, workers)
+    words = scene.words(budget)
+    return sort_pieces(pieces, segments, words, lambda: _exact_ends(segments, scene, budget), budget, workers)
 
 
 def _exact_ends(segments: FloatArray, scene: Placements, budget: Budget) -> Exact:
@@ -92,7 +93,8 @@ def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces
             return None
         if left:
             parts += _cut(segments, scene, Counts(n), UNLIMITED, 1, *np.concatenate(left).T)
-        return sort_pieces(merge_parts(parts, segments.shape[2]), n, lambda: _exact_ends(segments, scene, UNLIMITED))
+        pieces, words = merge_parts(parts, segments.shape[2]), scene.words(UNLIMITED)
+        return sort_pieces(pieces, segments, words, lambda: _exact_ends(segments, scene, UNLIMITED))
     words, room, reached = scene.words(UNLIMITED), scratch_for(scene.n_rows), _IN_ROWS.copy()
     state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
     entry_of(find_first)(segments, order, n, words, room, is_any, UNLIMITED.flag, state, out, reached)

@@ -1,7 +1,7 @@
 """Pieces of segments within the bodies of a scene, in the exact order of their ends along each segment.
 
 Parameters are rounded to nearest, which is monotone; if two ends of a segment round alike, exact arithmetic decides
-their order, or that they are equal (parameters.py).
+their order, or that they are equal: compiled (end_order.py), or in integers.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.running.budget import UNLIMITED, Budget
 from engine.running.parallel import join_columns, run_chunks
+from engine.scenes.end_order import compare_ends
 from engine.segment_clipping.exact_pieces import ONE, ZERO, Parameter, compare
 from engine.solids.columns import Columns
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, IntArray
@@ -96,13 +97,13 @@ def take_pieces(pieces: LoosePieces, rows: IntArray) -> LoosePieces:
 
 
 def sort_pieces(
-    pieces: LoosePieces, n_sources: int, exact: Callable[[], Exact], budget: Budget = UNLIMITED,
+    pieces: LoosePieces, segments: FloatArray, words: IntArray, exact: Callable[[], Exact], budget: Budget = UNLIMITED,
     workers: int | None = 1,
 ) -> ScenePieces:  # fmt: skip
-    """Return pieces of n_sources segments sorted by segment and exact start. Caller guarantees that those of one
-    segment and body are in order. exact: makes the function that gives exact parameters, called if doubles do not
-    decide."""
-    m = len(pieces.source)
+    """Return pieces of segments (n, 2, dim) sorted by segment and exact start. Caller guarantees that those of one
+    segment and body are in order. words: of the scene (`words_of`). exact: makes the function that gives exact
+    parameters, called if kernels do not decide."""
+    m, n_sources = len(pieces.source), len(segments)
     numbers, ends = np.empty((2, m), np.int64), np.empty((2, m, pieces.ends.shape[2]))
     out = *numbers, *ends, np.empty((m, 2)), *np.empty((2, m, 2), np.int64)
     order, ranks, offsets = np.empty(4 * m, np.int64), np.empty((m, 2), np.int64), np.zeros(n_sources + 2, np.int64)
@@ -113,7 +114,11 @@ def sort_pieces(
     are_exact: list[bool] = []
 
     def task(first: int, last: int) -> None:
-        are_exact.append(entry_of(sort_rounded)(arrays, offsets, order, ranks, is_tied, out, first, last, budget.flag))
+        are_exact.append(
+            entry_of(sort_rounded)(
+                arrays, segments, words, offsets, order, ranks, is_tied, out, first, last, budget.flag
+            )
+        )
 
     if budget is UNLIMITED:
         task(0, n_sources)
@@ -180,32 +185,37 @@ def group_by_source(source: IntArray, offsets: IntArray, order: IntArray) -> Non
 
 @kernel
 def sort_rounded(
-    given: Any, offsets: IntArray, order: IntArray, ranks: IntArray, is_tied: BoolArray, out: Any, begin: int, end: int,
-    flag: FlagArray,
+    given: Any, segments: FloatArray, words: IntArray, offsets: IntArray, order: IntArray, ranks: IntArray,
+    is_tied: BoolArray, out: Any, begin: int, end: int, flag: FlagArray,
 ) -> bool:  # fmt: skip
-    """Fill the rows of `out`, the arrays of `ScenePieces`, of sources begin .. end - 1 in order of rounded parameters.
+    """Fill the rows of `out`, the arrays of `ScenePieces`, of sources begin .. end - 1 in order of parameters.
 
-    given: the arrays before the last, and `are_long`. is_tied: (n,) zeros, set for sources whose order is undecided: of
-    ends that round alike, those of one piece may be known to differ or to be equal, and the segment's own are equal.
-    offsets, order: of `group_by_source`. ranks: (m, 2), scratch. Returns whether no source is tied. Polls `flag`.
+    given: the arrays before the last, and `are_long`. is_tied: (n,) zeros, set for sources whose order `compare_ends`
+    leaves undecided. offsets, order: of `group_by_source`. ranks: (m, 2), scratch. Returns whether no source is tied.
+    Polls `flag`.
     """
-    source, body, are_long, start, stop, t, faces = given
+    source, body, _, start, stop, t, faces = given
     are_exact = True
     for item in range(begin, end):
         if flag[0]:
             break
         first, last = 2 * offsets[item], 2 * offsets[item + 1]
         _sort_ends(order, first, last, body, t)
+        for place in range(first + 1, last):  # of ends that round alike: mostly they are equal
+            moved, j = order[place], place
+            while j > first and t[order[j - 1] // 2, order[j - 1] % 2] == t[moved // 2, moved % 2]:
+                sign = compare_ends(order[j - 1], moved, given, segments, words)
+                is_tied[item] |= sign == UNDECIDED
+                if sign != 1:
+                    break
+                order[j], j = order[j - 1], j - 1
+            order[j] = moved
+        are_exact &= not is_tied[item]
         rank, n_starts = -1, offsets[item]
         for place in range(first, last):
-            piece, side = order[place] // 2, order[place] % 2
-            before, other = order[max(first, place - 1)] // 2, order[max(first, place - 1)] % 2
-            if place == first or t[before, other] != t[piece, side]:
-                rank += 1
-            elif piece == before and are_long[piece] != UNDECIDED:
-                rank += are_long[piece]
-            elif faces[before, other] >= 0 or faces[piece, side] >= 0:
-                is_tied[item], are_exact = True, False
+            piece, side, before = order[place] // 2, order[place] % 2, order[max(first, place - 1)]
+            is_equal = place > first and t[before // 2, before % 2] == t[piece, side]
+            rank += not is_equal or compare_ends(before, order[place], given, segments, words) != 0
             ranks[piece, side] = rank
             if side == 0:
                 order[2 * source.size + n_starts] = piece

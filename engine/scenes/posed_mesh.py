@@ -50,9 +50,9 @@ _Lines = namedtuple("_Lines", "addresses sizes places")
 
 
 @inline
-def _mesh_of(lines: IntArray, numbers: FloatArray) -> PlacedMesh:
-    """Return the mesh encoded in MESH_WORDS numbers (`_words_of`); lines and numbers are one array, as int64 and as
-    float64."""
+def mesh_at(address: int) -> PlacedMesh:
+    """Return the mesh encoded in MESH_WORDS numbers (`_words_of`) at an address."""
+    lines, numbers = array_at(address, (MESH_WORDS,), np.int64), array_at(address, (MESH_WORDS,), np.float64)
     return PlacedMesh(
         array_at(lines[0], (lines[5], 3, 3), np.float64),
         array_at(lines[1], (lines[5],), np.int64),
@@ -201,7 +201,7 @@ def crossings_in(
     p, q, blur = _ends_of(frame[0], frame[1], frame[2], frame[3], is_placed)
     if not is_placed:
         q = corner(segments, item, 1)
-    mesh, is_in = _mesh_of(lines, numbers), False
+    mesh, is_in = mesh_at(body[2]), False
     n_met = _collect_crossings(mesh, p, q, blur, is_any, scratch)
     if n_met < 0 or (is_any and n_met > 0):
         return n_met, False

@@ -345,7 +345,8 @@ class Scene(Immutable):
             self._placements.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):
-                result = sort_pieces(merge_parts([], array.shape[2]), n, lambda: lambda *_: (ZERO, ONE))
+                nothing = np.zeros((2, 0), np.int64)
+                result = sort_pieces(merge_parts([], array.shape[2]), array, nothing, lambda: lambda *_: (ZERO, ONE))
                 result = np.zeros(n, np.bool_) if keep == "any" else result
             else:
                 cut: Any = {"all": clip_all, "first": clip_first, "any": meets_any}[keep]

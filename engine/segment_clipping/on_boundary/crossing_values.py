@@ -43,7 +43,7 @@ from engine.segment_clipping.pieces import Triple
 from engine.types import FloatArray, Point3
 
 VALUE_BOUND: Final = 80.0 * U2
-_MOST_COMPONENTS: Final = 12
+MOST_COMPONENTS: Final = 12
 """Most components of values whose products are compared."""
 
 Line = tuple[int, int, int, int]
@@ -96,17 +96,18 @@ def dot(n: Normal, w: Vector) -> Triple:
     return h, low, VALUE_BOUND * (x_size + y_size + z_size)
 
 
-_PLANE: Final = (-1, -1, -1, -1)
+PLANE: Final = (-1, -1, -1, -1)
+"""In place of a `Line`: the plane of a triangle."""
 
 
 @called
 def line_of(elements: FloatArray, element: int, code: int) -> Line:
     """Return the line of an edge, or of the side of a coplanar triangle, seen along an axis along which it has an area,
-    where it has a contact with the given code; `_PLANE` for a triangle that is not coplanar."""
+    where it has a contact with the given code; `PLANE` for a triangle that is not coplanar."""
     if elements.shape[1] == 2:
         return 0, 1, 0, 1
     if code & Bit.ALONG == 0:
-        return _PLANE
+        return PLANE
     k, _ = flat_axis(*triangle_at(elements, element))
     side = decode_place(code) - 3
     return side, (side + 1) % 3, (k + 1) % 3, (k + 2) % 3
@@ -188,7 +189,7 @@ def cut_at(
 
 
 @called
-def _size_at(
+def size_at(
     elements: FloatArray, element: int, line: Line, segments: FloatArray, item: int, end: int, e: Components
 ) -> int:
     """Set expansion e (192 places) to |s(x)|, x end 0 or 1 of segment ``item``; return its number of components.
@@ -245,7 +246,7 @@ def are_at_one_parameter(
         return False
     n_wp, n_wq = _put_weights(segments, item, elements, first, code, wp, wq)
     n_vp, n_vq = _put_weights(segments, item, elements, second, other, vp, vq)
-    if max(n_wp, n_wq, n_vp, n_vq) > _MOST_COMPONENTS:
+    if max(n_wp, n_wq, n_vp, n_vq) > MOST_COMPONENTS:
         return False
     return compare_products(wp, n_wp, vq, n_vq, vp, n_vp, wq, n_wq, workspace(576)) == 0
 
@@ -263,8 +264,8 @@ def _put_weights(
         return _put_distance(wp, x, segments[item, 0, k]), _put_distance(wq, segments[item, 1, k], x)
     line = line_of(elements, element, code)
     return (
-        _size_at(elements, element, line, segments, item, 0, wp),
-        _size_at(elements, element, line, segments, item, 1, wq),
+        size_at(elements, element, line, segments, item, 0, wp),
+        size_at(elements, element, line, segments, item, 1, wq),
     )
 
 
