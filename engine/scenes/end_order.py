@@ -27,7 +27,7 @@ _FRAME: Final = 21
 """Numbers of a frame (table.py)."""
 
 
-@inline
+@called
 def compare_ends(first: int, second: int, given: Any, segments: FloatArray, words: IntArray) -> int:
     """Return the sign of the difference of the parameters, equal as doubles, of two ends (2 * piece + side) of pieces
     of one segment; or UNDECIDED. given: as in `sort_rounded`; words: both rows of `words_of`."""
@@ -36,21 +36,25 @@ def compare_ends(first: int, second: int, given: Any, segments: FloatArray, word
     if i == j and are_long[i] != UNDECIDED:
         return (side - other) * int(are_long[i])
     face, its = faces[i, side], faces[j, other]
-    if face < 0 or its < 0:
-        return 0 if face < 0 and its < 0 else UNDECIDED
     a, b = array_at(_row_of(words, bodies[i]), (4,), np.int64), array_at(_row_of(words, bodies[j]), (4,), np.int64)
-    if min(a[0], b[0]) <= BodyKind.OTHER or not _are_equal(a[3], b[3], _FRAME):
-        return UNDECIDED
-    are_twins = (
-        a[0] == b[0] and a[1] == b[1] and (a[2] == b[2] or (a[0] == BodyKind.BALL and _are_equal(a[2], b[2], 7)))
-    )
-    if are_twins and side == other and t[i, 0] < t[i, 1] and t[j, 0] == t[i, 0] and t[j, 1] == t[i, 1]:
-        return 0  # pieces of one body that are longer than a point have different parameters
-    if a[0] == BodyKind.ROWS and b[0] == BodyKind.ROWS and _is_one_plane(a[2] + 32 * face, b[2] + 32 * its):
+    if face >= 0 and its >= 0:
+        if min(a[0], b[0]) <= BodyKind.OTHER or not _are_equal(a[3], b[3], _FRAME):
+            return UNDECIDED
+        are_twins = a[2] == b[2] or (a[0] == BodyKind.BALL and b[0] == BodyKind.BALL and _are_equal(a[2], b[2], 7))
+        if are_twins and side == other and t[i, 0] < t[i, 1] and t[j, 0] == t[i, 0] and t[j, 1] == t[i, 1]:
+            return 0  # pieces of one body that are longer than a point have different parameters
+        if a[0] == BodyKind.ROWS and b[0] == BodyKind.ROWS and _is_one_plane(a[2] + 32 * face, b[2] + 32 * its):
+            return 0
+    elif face < 0 and its < 0:
         return 0
-    if a[3] != 0 or a[0] == BodyKind.BALL or b[0] == BodyKind.BALL or not is_item_safe(segments, source[i]):
+    if not is_item_safe(segments, source[i]):
         return UNDECIDED
-    return _compare_planes(a, face, b, its, segments, source[i])
+    wp, wq, vp, vq = workspace(192), workspace(192), workspace(192), workspace(192)
+    n_wp, n_wq = _put_weights(a, face, side, segments, source[i], wp, wq)
+    n_vp, n_vq = _put_weights(b, its, other, segments, source[i], vp, vq)
+    if max(n_wp, n_wq, n_vp, n_vq) > MOST_COMPONENTS or n_wp + n_wq == 0 or n_vp + n_vq == 0:
+        return UNDECIDED
+    return compare_products(wp, n_wp, vq, n_vq, vp, n_vp, wq, n_wq, workspace(576))
 
 
 @inline
@@ -84,26 +88,32 @@ def _is_one_plane(first: int, second: int) -> bool:
 
 
 @called
-def _compare_planes(a: IntArray, face: int, b: IntArray, its: int, segments: FloatArray, item: int) -> int:
-    """Return the sign of the difference of the parameters at which segment ``item`` meets the planes of two faces of
-    bodies a and b without a pose, rows (4,) of a `Table`; or UNDECIDED."""
-    wp, wq, vp, vq = workspace(192), workspace(192), workspace(192), workspace(192)
-    n_wp, n_wq = _put_size(a, face, segments, item, 0, wp), _put_size(a, face, segments, item, 1, wq)
-    n_vp, n_vq = _put_size(b, its, segments, item, 0, vp), _put_size(b, its, segments, item, 1, vq)
-    if max(n_wp, n_wq, n_vp, n_vq) > MOST_COMPONENTS or n_wp + n_wq == 0 or n_vp + n_vq == 0:
-        return UNDECIDED
-    return compare_products(wp, n_wp, vq, n_vq, vp, n_vp, wq, n_wq, workspace(576))
+def _put_weights(
+    body: IntArray, face: int, side: int, segments: FloatArray, item: int, wp: Components, wq: Components
+) -> tuple[int, int]:
+    """Set expansions wp, wq (192 places) to the distances of both ends of segment ``item`` from the plane of a face, up
+    to a common factor, or from its own end `side` if face is -1; return their numbers of components, more than
+    MOST_COMPONENTS if the plane is unknown. body: row (4,) of a `Table`."""
+    if face < 0:
+        wp[0], wq[0] = 1.0, 1.0
+        return side, 1 - side
+    unknown, is_flat = (MOST_COMPONENTS + 1, 0), segments.shape[2] == 2
+    if body[3] != 0 or (body[0] != BodyKind.MESH and body[0] != BodyKind.ROWS):
+        return unknown
+    if body[0] == BodyKind.MESH:
+        mesh = mesh_at(body[2])
+        if not (mesh.are_safe and face < mesh.faces.size and mesh.faces[face] == face):
+            return unknown
+        n_wp = size_at(mesh.elements, face, PLANE, segments, item, 0, wp)
+        return n_wp, size_at(mesh.elements, face, PLANE, segments, item, 1, wq)
+    row = array_at(body[2] + 32 * face, (4,), np.float64)
+    n_wp = _put_distance(row, point_of(segments, item, 0, is_flat), wp)
+    return n_wp, _put_distance(row, point_of(segments, item, 1, is_flat), wq)
 
 
 @inline
-def _put_size(body: IntArray, face: int, segments: FloatArray, item: int, end: int, e: Components) -> int:
-    """Set expansion e (192 places) to the distance of an end of segment ``item`` from the plane of a face, up to a
-    factor of the face; return its number of components, more than MOST_COMPONENTS if it is out of range."""
-    if body[0] == BodyKind.MESH:
-        mesh = mesh_at(body[2])
-        is_known = face < mesh.faces.size and mesh.faces[face] == face and mesh.are_safe
-        return size_at(mesh.elements, face, PLANE, segments, item, end, e) if is_known else MOST_COMPONENTS + 1
-    row, point = array_at(body[2] + 32 * face, (4,), np.float64), point_of(segments, item, end, segments.shape[2] == 2)
+def _put_distance(row: FloatArray, point: Any, e: Components) -> int:
+    """Set expansion e to |dot(row, (point, 1))|; return its number of components, at most 7."""
     n = grow(e, 0, row[3])
     for k in range(3):
         n = grow_product(e, n, row[k], point[k])
