@@ -205,20 +205,21 @@ def _cut_near(
     parts, left, n = list[LoosePieces](), list[IntArray](), np.array([first, 0, 0, 0, 0, 0, 0])
     words, n_rows = scene.words(budget), 4 * (last - first) + MOST_MET
     scratch = scratch_for(scene.n_rows)
-    while n[0] < last:  # bound: each turn has room for a body, or prepares one
+    while n[0] < last:  # bound: each turn has room for a body
         out, names = allocate_pieces(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
-        pairs = np.empty((_LEFT + last - first, 2), np.int64)
-        entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
-        budget.check()
-        _, _, m, m_left, wanted, body, _ = n.tolist()
+        pairs, n[2:5] = np.empty((_LEFT + last - first, 2), np.int64), (0, 0, -1)
+        while n[4]:  # bound: each turn prepares a body
+            entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
+            budget.check()
+            if n[4]:
+                scene.prepare(int(n[5]), int(n[4]), budget)
+        m, m_left = n[2:4].tolist()
         if m:
             budget.take(_BYTES * m)
             pieces = first_of(out, m)
             parts.append(LoosePieces(pieces.source, names[0, :m], names[1, :m], *pieces[1:]))
         if m_left:
             left.append(pairs[:m_left])
-        if wanted:
-            scene.prepare(body, wanted, budget)
     return parts, left, not n[6]
 
 

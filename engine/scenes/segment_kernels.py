@@ -107,12 +107,12 @@ def cut_near(
     | n | meaning |
     |---|---|
     | 0, 1 | on entry the first segment and its first candidate, on return where to continue |
-    | 2, 3 | number of rows of `out`, of `left` |
+    | 2, 3 | number of rows of `out`, of `left`, to which others are appended |
     | 4, 5 | 0, or the code of what must be prepared (WANTS_BODY, WANTS_TREE), and the body |
     | 6 | whether a segment is out of the kernels' range |
     """
     near = scratch_at(scratch).near
-    n[2], n[3], n[4] = 0, 0, 0
+    n[4] = 0
     for turn in range(n[0], last):
         item, begin, n[0], n[1] = order[turn], n[1], turn, 0
         prefetch(segments, order[min(turn + AHEAD, last - 1)] * 2 * segments.shape[2])

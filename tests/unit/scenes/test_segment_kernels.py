@@ -42,7 +42,7 @@ def cut_on(segments: Any, solid: Solid, pose: Pose | None) -> tuple[Pieces, Any]
         each.setflags(write=False)
     with Budget() as budget:
         while n[0] < m:
-            words = placements.words(budget)
+            words, n[2:4] = placements.words(budget), 0
             cut_near(segments, order, m, words, scratch_for(1), budget.flag, out, names, left, n)
             parts.append(Pieces(*(each.copy() for each in first_of(out, int(n[2])))))
             is_settled[left[: n[3], 0]] = False
