@@ -7,7 +7,7 @@ import pytest
 
 from engine import Surface
 from engine.bounding import bvh
-from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh
+from engine.bounding.bvh import MAX_DEPTH, UNUSED, WIDTH, Bvh, build_bvh, build_stretched_bvh
 from engine.collision.meshes.mesh_arrays import MeshBody, mesh_body_of
 from engine.errors import CancelledError
 from engine.lanes.boxes import EMPTY
@@ -121,3 +121,20 @@ def test_a_disc_holds_the_faces_of_its_child(name: str) -> None:
             assert (np.abs(along) <= disc[7]).all()
             assert (np.linalg.norm(away - along[:, None] * n, axis=1) <= disc[6]).all()
             assert name != "flat" or disc[7] < 1e-5
+
+
+@pytest.mark.parametrize("units", [[1.0, 1.0, 1.0], [1e5, 1.0, 1e-3], [1.0, 2.0**-90, 2.0**-200], [1e150, 1.0, 1e-150]])
+def test_stretched_trees_have_axes_of_about_one_length(units: list[float]) -> None:
+    """Powers of two, so that boxes are where they were; every leaf holds its item in the coordinates of its axis."""
+    low = np.random.default_rng(2).uniform(-1, 1, (200, 3)) * units
+    high = low + 0.01 * np.array(units)
+    tree, origin, scale = build_stretched_bvh(np.concatenate([low, high], axis=1))
+    assert (np.frexp(scale)[0] == 0.5).all()
+    extents = (high.max(axis=0) - low.min(axis=0)) / scale
+    assert extents.max() <= 4.0
+    assert extents.min() > 2.0**-6 or units[2] in (2.0**-200, 1e-150)
+    for node, lane in zip(*np.nonzero((tree.child < 0) & (tree.child != EMPTY))):
+        item = -1 - tree.child[node, lane]
+        centre, half = tree.boxes[node, :3, lane].astype(float), tree.boxes[node, 3:, lane].astype(float)
+        assert (centre - half <= (low[item] - origin) / scale).all()
+        assert (centre + half >= (high[item] - origin) / scale).all()

@@ -97,6 +97,20 @@ def test_contacts_are_those_of_whole_numbers() -> None:
     assert n_along > 10
 
 
+def test_the_filter_does_not_depend_on_the_units_of_an_axis() -> None:
+    """Axes stretched by powers of two change no answer, and hardly any is left open."""
+    rng = np.random.default_rng(4)
+    n_left = 0
+    for _ in range(300):
+        points = rng.uniform(-1, 1, (5, 3))
+        points[4] = points[:3].mean(axis=0) * rng.uniform(0.5, 2.0) + rng.uniform(-1, 1, 3)
+        stretched = points * 2.0 ** rng.integers(-40, 40, 3)
+        kind = contact_filter(*(Point3(*row) for row in points.tolist()), 0.0)
+        assert contact_filter(*(Point3(*row) for row in stretched.tolist()), 0.0) == kind
+        n_left += kind == UNDECIDED
+    assert n_left < 5
+
+
 def test_segments_in_the_plane_of_a_triangle() -> None:
     """Segments and triangles of a lattice: the codes are those of rational parameters."""
     rng = np.random.default_rng(3)
