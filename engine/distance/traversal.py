@@ -247,8 +247,8 @@ def find_nearest(
         a, b = View(first, place, unit), View(second, other, unit)
         s = Search(a, b, 2.0 * unit * (place.error + other.error), room)
         defect = defect_of(place) + defect_of(other)
-        set_frame(room.frames[0], place, first.origin, first.scale, other, second.origin, second.scale, defect)
-        set_frame(room.frames[1], other, second.origin, second.scale, place, first.origin, first.scale, defect)
+        set_frame(room.frames[0], place, first, other, second, defect)
+        set_frame(room.frames[1], other, second, place, first, defect)
         how, n = _search(s, limits, flag)
         if how == CLOSER or (how == DONE and n == 0):
             answers[item] = 0.0 if how == CLOSER else np.inf

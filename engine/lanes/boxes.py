@@ -5,8 +5,8 @@ give 64 answers in some 200 vector instructions: the images of eight boxes are b
 apart where an axis of either tree separates it (six of the fifteen axes of two turned boxes; the others cost more than
 they spare). Boxes and margins hold whatever float32 rounds.
 
-    frames (2, 22, 8) float32, every number in all lanes: [0] takes the second tree to the first, [1] the first to the
-    second. Rows: matrix by rows (9), magnitudes of its entries (9), shift (3), margin (1).
+    frames (2, 25, 8) float32, every number in all lanes: [0] takes the second tree to the first, [1] the first to the
+    second. Rows: matrix by rows (9), magnitudes of its entries (9), shift (3), margin (1), margins by axis (3).
 
 While a tree is built a box is one row (low x, y, z, 0, -high x, -y, -z, 0): the least of two rows is the box around
 both, one comparison of eight lanes.
@@ -56,9 +56,10 @@ from engine.lanes.lanes import (
 from engine.lanes.tracing import LANES, Lanes, Mask, Number, Rows, Triple, traced
 from engine.types import Float32Array
 
-FRAME_ROWS: Final = 22
+FRAME_ROWS: Final = 25
 SHIFT_ROW: Final = 18
 MARGIN_ROW: Final = 21
+MARGINS_ROW: Final = 22
 BOX_ROWS: Final = 6
 EMPTY: Final = -(2**31)
 """Child number of an unused lane of a node (`bvh.py`)."""
@@ -99,7 +100,7 @@ def _image(box: list[Lanes], frames: Rows, first: int) -> Bounds:
     from `first` on."""
     frame = [load(frames, first + row) for row in range(FRAME_ROWS)]
     centre = [dot(frame[3 * k : 3 * k + 3], box[:3]) + frame[SHIFT_ROW + k] for k in range(3)]
-    half = [dot(frame[9 + 3 * k : 12 + 3 * k], box[3:]) + frame[MARGIN_ROW] for k in range(3)]
+    half = [dot(frame[9 + 3 * k : 12 + 3 * k], box[3:]) + frame[MARGINS_ROW + k] for k in range(3)]
     return _ends([*centre, *half])
 
 

@@ -9,10 +9,10 @@ the two planes (`set_normals`, `unseparated_faces`). That saves most of the exac
 locally parallel, and the planes of their triangles separate them.
 
 **margin.** A direction w, however it was rounded, separates two triangles where the numbers w . x of their corners do;
-so only the corners and the products have errors. In the tree of w a corner is off by at most a quarter of `margin`
-(placement.py: the sums there are those of `boxes.meeting`, with room to spare), a product w . x by 2^-22 |w|_1 |x|,
-which is below a quarter of margin |w|_1; both bodies together: `margin` |w|_1. What underflows is below `_TINY`.
-Normals are taken from a tree's own coordinates, at most 2, so nothing overflows where the other tree is large.
+so only the corners and the products have errors. In the tree of w a corner is off on axis k by at most a quarter of its
+margin m_k (placement.py: the sums there are those of `boxes.meeting`, with room to spare), a product w . x by 2^-22 sum
+|w_k| |x_k|, which is below a quarter of sum |w_k| m_k; both bodies together: sum |w_k| m_k. What underflows is below
+`_TINY`. Normals are taken from a tree's own coordinates, at most 2, so nothing overflows where the other tree is large.
 
 **A segment.** Which of a block's triangles a segment may meet.
 
@@ -68,7 +68,17 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from engine.compiling.jit import inline
-from engine.lanes.boxes import BOX_ROWS, DISC_ROWS, FRAME_ROWS, MARGIN_ROW, ROUND, SHIFT_ROW, Bounds, are_separated
+from engine.lanes.boxes import (
+    BOX_ROWS,
+    DISC_ROWS,
+    FRAME_ROWS,
+    MARGIN_ROW,
+    MARGINS_ROW,
+    ROUND,
+    SHIFT_ROW,
+    Bounds,
+    are_separated,
+)
 from engine.lanes.lanes import (
     any_above,
     bits_of,
@@ -205,13 +215,14 @@ def _bounds(
     frame_row: first row in frames of the map."""
     own, other = _block(own_rows, own_block), _block(rows, block)
     frame = [load(frames, frame_row + row) for row in range(FRAME_ROWS)]
-    margin, image = frame[MARGIN_ROW], []
+    margins, image = frame[MARGINS_ROW:], []
     for corner in range(3):
         for k in range(3):
             turned = dot(frame[3 * k : 3 * k + 3], other[3 * corner : 3 * corner + 3])
             image.append(turned + frame[SHIFT_ROW + k])
             store(work, image_row + 3 * corner + k, image[-1])
-    low, high = [_least(*own[k::3]) - margin for k in range(3)], [_greatest(*own[k::3]) + margin for k in range(3)]
+    low = [_least(*own[k::3]) - margins[k] for k in range(3)]
+    high = [_greatest(*own[k::3]) + margins[k] for k in range(3)]
     return (low, high), ([_least(*image[k::3]) for k in range(3)], [_greatest(*image[k::3]) for k in range(3)])
 
 
@@ -225,7 +236,7 @@ def set_normals(first: Rows, i: int, second: Rows, j: int, frames: Rows, work: R
         u, v = [q[k] - p[k] for k in range(3)], [r[k] - p[k] for k in range(3)]
         w = [u[x] * v[y] - u[y] * v[x] for x, y in ((1, 2), (2, 0), (0, 1))]
         products = dot(w, p), dot(w, q), dot(w, r)
-        bound = (abs(w[0]) + abs(w[1]) + abs(w[2])) * load(frames, frame_row + MARGIN_ROW) + _TINY
+        bound = dot(_sizes(w), [load(frames, frame_row + MARGINS_ROW + k) for k in range(3)]) + _TINY
         for place, value in enumerate([*w, _least(*products) - bound, _greatest(*products) + bound]):
             store(work, row + place, value)
 

@@ -149,9 +149,9 @@ def place_bodies(
     placements, and whether the boxes around both bodies are proven disjoint."""
     a, b = place_pair(first.extent, first_pose, first_item, second.extent, second_pose, second_item)
     defect = defect_of(a) + defect_of(b)
-    is_apart = set_frame(descent.frames[0], a, first.origin, first.scale, b, second.origin, second.scale, defect)
+    is_apart = set_frame(descent.frames[0], a, first, b, second, defect)
     if not is_apart:
-        is_apart = set_frame(descent.frames[1], b, second.origin, second.scale, a, first.origin, first.scale, defect)
+        is_apart = set_frame(descent.frames[1], b, second, a, first, defect)
     exact_error = 0.0
     if first_pose.is_posed:
         store_pose(descent.poses, 0, first_pose, first_item)

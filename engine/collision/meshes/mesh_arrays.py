@@ -62,14 +62,15 @@ BOX_TRIANGLES = np.array([[(a, b, c), (a, c, d)] for a, b, c, d in
 
 MeshArrays = namedtuple(
     "MeshArrays",
-    "vertices triangles axis state inner boxes child blocks discs origin scale extent components faces first_face "
-    "has_inside",
+    "vertices triangles axis state inner boxes child blocks discs origin scale sizes extent components faces "
+    "first_face has_inside",
 )
-"""What kernels take; boxes to scale: the tree (`bvh.py`); blocks, discs: what its blocks (`lanes/faces.py`) and its
-inner nodes (`lanes/boxes.py`) hold besides boxes, the rows of the other kind not set. `state` is filled by kernels as
-needed, and `inner`, on which side of a face its body lies (`parity.py`), 0 unknown: any thread writes the same values.
-components: of triangles connected through vertices, one each, ascending. faces: the caller's face of each triangle;
-first_face: the least in the first component. has_inside: False for surfaces and flat boxes."""
+"""What kernels take; boxes to scale: the tree (`bvh.py`); sizes: by axis the largest |tree coordinate|; blocks, discs:
+what its blocks (`lanes/faces.py`) and its inner nodes (`lanes/boxes.py`) hold besides boxes, the rows of the other kind
+not set. `state` is filled by kernels as needed, and `inner`, on which side of a face its body lies (`parity.py`), 0
+unknown: any thread writes the same values. components: of triangles connected through vertices, one each, ascending.
+faces: the caller's face of each triangle; first_face: the least in the first component. has_inside: False for surfaces
+and flat boxes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,14 +131,14 @@ def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: Int
         n_used, n_components, first_face = _reorder_by_tree(*given, child, order, ordered, used, axis, components)
         reach, lowest_bit, shift = _lattice_of(used[:n_used])
     blocks = np.empty((len(child), CORNER_ROWS, WIDTH), np.float32)
-    _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks)
+    _fill_blocks(used, ordered, child, tree.origin, tree.scale, blocks, sizes := np.zeros(3))
     discs = np.empty((len(child), DISC_ROWS, WIDTH), np.float32)
     fill_discs(blocks, child, tree.boxes, discs)
     used = used[:n_used].copy() if n_used < len(used) else used
     arrays = MeshArrays(
         read_only(used), read_only(ordered), read_only(axis), np.full(n_triangles, STATE_UNKNOWN, np.int8),
         np.zeros(n_triangles, np.int8), tree.boxes, read_only(child), read_only(blocks), read_only(discs), tree.origin,
-        tree.scale,
+        tree.scale, sizes,
         Extent(reach, ldexp(1.0, lowest_bit)), components[:n_components].copy(), faces[order], first_face, has_inside,
     )  # fmt: skip
     return MeshBody(arrays, shift)
@@ -189,10 +190,12 @@ def _reorder_by_tree(
 
 @kernel
 def _fill_blocks(
-    vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float, blocks: Float32Array
-) -> None:
+    vertices: FloatArray, triangles: IntArray, child: Int32Array, origin: FloatArray, scale: float,
+    blocks: Float32Array, sizes: FloatArray,
+) -> None:  # fmt: skip
     """Fill blocks (n_nodes, 9, 8) at the leaf nodes of a tree with the corners of their triangles (x, y, z of each),
-    one triangle a lane, in tree coordinates (p - origin) / scale; `NOWHERE` in unused lanes."""
+    one triangle a lane, in tree coordinates (p - origin) / scale; `NOWHERE` in unused lanes. sizes (3,): zeros, set to
+    the largest |coordinate| by axis."""
     for node in range(child.shape[0]):
         if child[node, 0] >= 0:
             continue
@@ -203,7 +206,8 @@ def _fill_blocks(
             for corner in range(3):
                 vertex = triangles[-1 - child[node, lane], corner]
                 for k in range(3):
-                    blocks[node, 3 * corner + k, lane] = (vertices[vertex, k] - origin[k]) / scale
+                    local = (vertices[vertex, k] - origin[k]) / scale
+                    blocks[node, 3 * corner + k, lane], sizes[k] = local, max(sizes[k], abs(local))
 
 
 @kernel

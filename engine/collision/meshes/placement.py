@@ -26,7 +26,7 @@ are left out: nothing is apart on them; so are those of a map that is not finite
 from __future__ import annotations
 
 from math import frexp, ldexp
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -187,13 +187,10 @@ def defect_of(place: Placement) -> float:
 
 
 @inline
-def set_frame(
-    frame: Float32Array, a: Placement, a_origin: FloatArray, a_scale: float, b: Placement, b_origin: FloatArray,
-    b_scale: float, defect: float,
-) -> bool:  # fmt: skip
-    """Fill frame (22, 8) float32 with the map a = M b + T from the tree coordinates of body b to those of body a, and
-    its margin (rows: `lanes/boxes.py`; derivation: top). a, b: placements; origin, scale: of either tree; defect: bound
-    on |R' R - I| of both.
+def set_frame(frame: Float32Array, a: Placement, first: Any, b: Placement, second: Any, defect: float) -> bool:
+    """Fill frame (25, 8) float32 with the map a = M b + T from the tree coordinates of body b to those of body a, and
+    its margins (rows: `lanes/boxes.py`; derivation: top). a, b: placements; first, second: `MeshArrays` of either;
+    defect: bound on |R' R - I| of both.
 
     Returns whether the trees are proven disjoint. |.| of vectors is the largest component; tree coordinates are at most
     2:
@@ -204,23 +201,31 @@ def set_frame(
                                                       |R_a^-1 v - R_a' v| <= 3.1 defect sqrt(3) |v| < 5.4 defect |v|
                + 2^-46 size                           float64, < 128 roundings
                + 2^-1071 / s_a                        six products that may underflow
+        on axis k, e largest coordinates by axis: e_a,k + sum |M_kj| e_b,j + |T_k| instead of the first bracket
     """
-    ratio, origin, shift = b_scale / a_scale, Point3(b_origin[0], b_origin[1], b_origin[2]), minus(b.shift, a.shift)
+    a_origin, a_scale, ratio, shift = first.origin, first.scale, second.scale / first.scale, minus(b.shift, a.shift)
+    origin = Point3(second.origin[0], second.origin[1], second.origin[2])
     there = rotate(b, origin)
     v = rotate_back(a, Point3(there.x + shift.x, there.y + shift.y, there.z + shift.z))
     t = Point3((v.x - a_origin[0]) / a_scale, (v.y - a_origin[1]) / a_scale, (v.z - a_origin[2]) / a_scale)
     a_reach = max(abs(a_origin[0]), abs(a_origin[1]), abs(a_origin[2]))
     sizes = (a_reach + largest_of(origin) + largest_of(shift)) / a_scale + 2.0 + 2.0 * ratio
-    margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest_of(t)) + (32.0 * defect + 2.0**-46) * sizes + 2.0**-1071 / a_scale
+    least = (32.0 * defect + 2.0**-46) * sizes + 2.0**-1071 / a_scale
+    margin = 2.0**-19 * (2.0 + 3.5 * ratio + largest_of(t)) + least
     if not (ratio <= WIDEST_RATIO and margin <= WIDEST_MARGIN and np.isfinite(t.x + t.y + t.z)):
         for row in range(21):
             frame[row, :] = 1.0 if 9 <= row < 18 else 0.0
-        frame[21, :] = NEVER_APART
+        frame[21:, :] = NEVER_APART
         return False
+    reach = first.sizes[0] + abs(t.x), first.sizes[1] + abs(t.y), first.sizes[2] + abs(t.z)
     for k in range(3):
         m = rotate_back(a, column(b, k))
         frame[k, :], frame[3 + k, :], frame[6 + k, :] = ratio * m.x, ratio * m.y, ratio * m.z
         frame[9 + k, :], frame[12 + k, :], frame[15 + k, :] = ratio * abs(m.x), ratio * abs(m.y), ratio * abs(m.z)
+        size = ratio * second.sizes[k]
+        reach = reach[0] + size * abs(m.x), reach[1] + size * abs(m.y), reach[2] + size * abs(m.z)
     frame[18, :], frame[19, :], frame[20, :] = t.x, t.y, t.z
     frame[21, :] = margin
+    for k in range(3):
+        frame[22 + k, :] = 2.0**-19 * 1.01 * reach[k] + least + 2.0**-100
     return largest_of(t) > 2.0 + 3.5 * ratio + margin

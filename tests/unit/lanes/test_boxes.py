@@ -58,7 +58,7 @@ def test_lanes_say_what_tables_of_pairs_say(seed: int) -> None:
     for which, matrix in enumerate((turn, turn.T)):
         frames[which, :9] = matrix.reshape(9, 1)
         frames[which, 9:18] = np.abs(matrix.reshape(9, 1))
-        frames[which, 21] = 1e-6
+        frames[which, 21:] = 1e-6
     first[3, :, 2], second[5, 4, :3] = np.nan, np.inf
     second[6, 0] = [0.0, -0.0, 1e-45, -1e-45, np.inf, -np.inf, np.nan, 3e38]
     found = np.zeros((200, 2), np.int64)

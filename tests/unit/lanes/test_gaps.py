@@ -60,8 +60,8 @@ def test_no_bound_is_above_a_distance(ratio: float, away: float) -> None:
     place, other = place_pair(a.extent, still, 0, b.extent, poses, 0)
     frames, work = np.empty((2, FRAME_ROWS, LANES), np.float32), np.empty((GAP_ROWS, LANES), np.float32)
     fixed, defect = np.zeros((FIXED_ROWS, LANES), np.float32), defect_of(place) + defect_of(other)
-    set_frame(frames[0], place, a.origin, a.scale, other, b.origin, b.scale, defect)
-    set_frame(frames[1], other, b.origin, b.scale, place, a.origin, a.scale, defect)
+    set_frame(frames[0], place, a, other, b, defect)
+    set_frame(frames[1], other, b, place, a, defect)
     for node in _children(a, are_blocks=False):
         for their_node in _children(b, are_blocks=False):
             fixed[:BOX_ROWS, 0], fixed[BOX_ROWS:, 0] = b.boxes[their_node, :, 0], b.discs[their_node, :, 0]
