@@ -55,11 +55,11 @@ Boxes: the axes of either tree, whose gaps are put together. Discs, which hold a
 of their middles and either normal; along d a disc reaches |g| t + sqrt(1 - g^2) r from its middle, g the product of d
 and its normal. Triangles: the line of their middles.
 
-**margin.** Triangles: as derived in `faces.py`, margin |w|_1 along a direction w. Boxes are enlarged by the margin
-where they are taken to the other tree, as in `boxes.py`. Discs: both sides of a comparison along a normal are off by
-less than twice the margin (`boxes.py`); along another direction g is off by no more for either of them. Four of both
-margins are left out of each bound, and 2^-18 of it for what the last operations round and for rotations that are not
-quite orthogonal.
+**margin.** Triangles: as derived above, sum |w_k| m_k along a direction w. Boxes are enlarged by the margins where they
+are taken to the other tree, as in `boxes.py`. Discs: both sides of a comparison along a normal are off by less than
+twice the margin (`boxes.py`); along another direction g is off by no more for either of them; four of both margins are
+left out. 2^-18 of each bound is left out for what the last operations round and for rotations that are not quite
+orthogonal.
 """
 
 from __future__ import annotations
@@ -313,9 +313,9 @@ def child_bounds(
         back = [load(frames, theirs + 3 * k + column) for column in range(3)]
         shift = load(frames, own + SHIFT_ROW + k)
         v.append(dot(turn, their_box[:3]) + shift - box[k])
-        reach.append(dot(_sizes(turn), their_box[3:]) + margin + box[3 + k])
+        reach.append(dot(_sizes(turn), their_box[3:]) + load(frames, own + MARGINS_ROW + k) + box[3 + k])
         w.append(dot(back, box[:3]) + load(frames, theirs + SHIFT_ROW + k) - their_box[k])
-        their_reach.append(dot(_sizes(back), box[3:]) + their_margin + their_box[3 + k])
+        their_reach.append(dot(_sizes(back), box[3:]) + load(frames, theirs + MARGINS_ROW + k) + their_box[3 + k])
         d.append(dot(turn, their_disc[:3]) + shift - disc[k])
         normal.append(dot(turn, their_disc[3:6]) * inverse)
     flat, their_flat = disc[6:], [number * ratio for number in their_disc[6:]]
@@ -328,9 +328,9 @@ def child_bounds(
         (abs(on_their) - their_flat[1], g, None),
     ):
         level = level if cosine is None else level - _width(flat, cosine)
-        bound = greater(level if their_cosine is None else level - _width(their_flat, their_cosine), bound)
-    bound = greater(bound * _BELOW_ONE - (margin + ratio * their_margin) * 4.0, 0.0)  # what is no number is 0
-    store(work, 0, lesser(bound, _MOST))
+        level = level if their_cosine is None else level - _width(their_flat, their_cosine)
+        bound = greater(level - (margin + ratio * their_margin) * 4.001, bound)
+    store(work, 0, lesser(greater(bound * _BELOW_ONE, 0.0), _MOST))  # what is no number is 0
 
 
 def _ends(way: Sequence[Lanes], corners: Sequence[Lanes]) -> tuple[Lanes, Lanes]:
@@ -358,8 +358,7 @@ def near_triangle(blocks: Rows, node: int, lane: int, frames: Rows, most: Number
     """Return the mask of the eight triangles in work (`place_triangles`) that may be within distance `most`, in units
     of the first tree, of the triangle in `lane` of block `node` of that tree. Unused lanes count as near."""
     own = [load_lane(blocks, CORNER_ROWS * node + row, lane) for row in range(CORNER_ROWS)]
-    theirs, margin = [load(work, row) for row in range(CORNER_ROWS)], load(frames, MARGIN_ROW)
+    theirs, margins = [load(work, row) for row in range(CORNER_ROWS)], [load(frames, MARGINS_ROW + k) for k in range(3)]
     d = [load(work, _MIDDLES + k) - (own[k] + own[3 + k] + own[6 + k]) for k in range(3)]
-    x, y, z = _sizes(d)
-    gap = _ends(d, theirs)[0] - _ends(d, own)[1] - margin * (x + y + z)
+    gap = _ends(d, theirs)[0] - _ends(d, own)[1] - dot(margins, _sizes(d))
     return bits_of(~(gap * _BELOW_ONE > most * root(dot(d, d)) + _LEAST_SIZE))

@@ -56,19 +56,28 @@ def place_in_frame(first: Any, first_pose: Any, second: Any, second_pose: Any, d
     return bool(place_bodies(first, first_pose, 0, second, second_pose, 0, descent)[1])
 
 
+@pytest.mark.parametrize("units", [(1.0, 1.0, 1.0), (1e5, 1.0, 1e-2)])
 @pytest.mark.parametrize("pose", [None, TURN])
-def test_points_are_mapped_within_the_margin(pose: Pose | None) -> None:
-    a, b, descent = mesh(2), mesh(1, (1.5, 0.25, 0.5)), new_descent()
+def test_points_are_mapped_within_the_margins(pose: Pose | None, units: tuple[float, ...]) -> None:
+    """By axis; those of axes on which the bodies are short are small where no pose turns them."""
+    descent = new_descent()
+    a, b = (
+        mesh_body_of(Polyhedron(body.arrays.vertices * units, body.arrays.triangles))
+        for body in (mesh(2), mesh(1, (1.5, 0.25, 0.5)))
+    )
+    assert not place_in_frame(a.arrays, a.posed(None), b.arrays, b.posed(None), descent)
+    assert (descent.frames[0, 22:25, 0] <= 2.0**-15 * np.array(units) / max(units)).all()
     assert not place_in_frame(a.arrays, a.posed(pose), b.arrays, b.posed(TURN), descent)
     frame = descent.frames[0, :, 0].astype(np.float64)
-    for local in np.random.default_rng(3).uniform(-1, 1, (20, 3)):
+    for local in np.random.default_rng(3).uniform(-1, 1, (20, 3)) * b.arrays.sizes:
         placed = image_point(b.arrays.origin + b.arrays.scale * local, TURN)
         if pose is not None:  # its transpose, off by far less than the margin
             away = [x - Fraction(t) for x, t in zip(placed, pose.translation.tolist())]
             placed = tuple(dot(tuple(map(Fraction, column)), away) for column in pose.rotation.T.tolist())
         exact = [(float(x) - o) / a.arrays.scale for x, o in zip(placed, a.arrays.origin)]
         mapped = frame[:9].reshape(3, 3) @ local + frame[18:21]
-        assert np.abs(mapped - exact).max() <= frame[21]
+        assert (np.abs(mapped - exact) <= frame[22:25]).all()
+        assert frame[22:25].max() <= frame[21]
 
 
 def test_far_bodies_are_apart_and_unlike_scales_leave_the_frame_out() -> None:
