@@ -38,7 +38,7 @@ q + (eps, eps^2) is
 
 So moved, q lies on no vertex and no edge. Two elements at a common edge decide its zero alike, and so do all that count
 crossings by this rule, in whichever arithmetic: containment/methods/polyhedron_ray_parity.py and rational_locate.py,
-collision/meshes/parity.py and exact_regions.py, segment_clipping/exact_pieces.py and on_boundary/mesh_contacts.py.
+collision/meshes/parity.py and exact_regions.py, segment_clipping/exact_pieces.py and on_boundary/triangle_contacts.py.
 tests/unit/predicates/test_ties.py compares them. In the plane a ray to the right is moved up by eps
 (polygon_ray_parity.py).
 

@@ -27,7 +27,8 @@ from engine.scenes.posed_cut import in_frame
 from engine.segment_clipping.on_boundary.boundary_cut import sort_crossings
 from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_same_point, decode_place
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
-from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts, corner, triangle_at
+from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts
+from engine.segment_clipping.on_boundary.triangle_contacts import corner, triangle_at
 from engine.segment_clipping.pieces import put_point, slack_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
 

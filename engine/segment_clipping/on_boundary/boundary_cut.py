@@ -43,13 +43,9 @@ from engine.segment_clipping.on_boundary.crossing_values import (
     is_item_safe,
     parameter_exactly,
 )
-from engine.segment_clipping.on_boundary.mesh_contacts import (
-    append_contacts,
-    corner,
-    gather_triangles,
-    traversal_buffers,
-)
+from engine.segment_clipping.on_boundary.mesh_contacts import append_contacts, gather_triangles, traversal_buffers
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, Outline
+from engine.segment_clipping.on_boundary.triangle_contacts import corner
 from engine.segment_clipping.pieces import Pieces, put_own_end
 from engine.types import OPEN, FlagArray, FloatArray, Int8Array, IntArray
 

@@ -205,33 +205,26 @@ def along_edge(a: Point2, b: Point2, p: Point2, q: Point2, of_a: int, of_b: int)
 
 
 @inline
-def edge_contact(edge: FloatArray, segment: FloatArray) -> int:
-    """Return the `Kind` or the packed codes of the contacts of a segment and an edge, both (2, 2)."""
+def edge_contact(edge: FloatArray, segment: FloatArray, is_before: bool) -> int:
+    """Return the `Kind` or the packed codes of the contacts of a segment and an edge, both (2, 2). is_before: instead,
+    PROPER if the perturbed line crosses the edge before the segment's start."""
     a, b = as_point2(edge, 0), as_point2(edge, 1)
     p, q = as_point2(segment, 0), as_point2(segment, 1)
     of_a, of_b = orient2d(p, q, a), orient2d(p, q, b)
     if of_a == of_b and (of_a == 1 or of_a == -1):
         return Kind.APART
     of_p, of_q = orient2d(a, b, p), orient2d(a, b, q)
+    if is_before and max(of_a, of_b, of_p, of_q) != UNDECIDED:  # it does if the end is farther from the edge's line
+        is_crossed = (of_a == 1) != (of_b == 1) and of_p == of_q and of_p == (1 if of_a == 1 else -1)
+        return Kind.PROPER if is_crossed else Kind.APART
+    if is_before:
+        return Kind.DEGENERATE
     if of_p == of_q and (of_p == 1 or of_p == -1):
         return Kind.APART
     if abs(of_a) == 1 and abs(of_b) == 1 and abs(of_p) == 1 and abs(of_q) == 1:
         return Kind.PROPER  # two different signs each
     code = touched_edge(of_a, of_b, of_p, of_q)
     return code if code != Kind.APART else along_edge(a, b, p, q, 0, 1)
-
-
-@called
-def crossed_before(edge: FloatArray, segment: FloatArray) -> int:
-    """Return PROPER if the perturbed line through p and q, a segment (2, 2), crosses an edge (2, 2) before p, APART if
-    not, DEGENERATE if undecided."""
-    a, b = as_point2(edge, 0), as_point2(edge, 1)
-    p, q = as_point2(segment, 0), as_point2(segment, 1)
-    of_p, of_q, of_a, of_b = orient2d(a, b, p), orient2d(a, b, q), orient2d(p, q, a), orient2d(p, q, b)
-    if max(of_p, of_q, of_a, of_b) == UNDECIDED:
-        return Kind.DEGENERATE
-    is_before = of_p == of_q and of_p == (1 if of_a == 1 else -1) and (of_a == 1) != (of_b == 1)
-    return Kind.PROPER if is_before else Kind.APART
 
 
 @inline
@@ -264,7 +257,7 @@ def may_meet(segment: FloatArray, box: FloatArray, is_before: bool) -> bool:
 @inline
 def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, is_before: bool, n_contacts: int) -> int:
     """Append the contacts of a segment (2, 2) with edges to the n_contacts in `contacts`; return their number then, or
-    NO_ROOM. outline: the `Outline` of the polygon. is_before: instead, what `crossed_before` tells of edges."""
+    NO_ROOM. outline: the `Outline` of the polygon. is_before: see `edge_contact`."""
     n_leaves, n_edges, stack = outline.boxes.shape[0] // 2, outline.order.size, contacts.waiting
     stack[0], depth = 1, 1
     while depth > 0:  # bound: each node enters the stack once
@@ -279,8 +272,7 @@ def append_edges(contacts: Contacts, outline: Any, segment: FloatArray, is_befor
         start = (node - n_leaves) * LEAF_SIZE
         for place in range(start, min(start + LEAF_SIZE, n_edges)):
             element = outline.order[place]
-            edge = outline.elements[element]
-            kind = crossed_before(edge, segment) if is_before else edge_contact(edge, segment)
+            kind = edge_contact(outline.elements[element], segment, is_before)
             while kind != Kind.APART:  # bound: two codes
                 if n_contacts == contacts.met.size:
                     return NO_ROOM

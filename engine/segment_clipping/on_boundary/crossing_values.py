@@ -38,7 +38,7 @@ from engine.predicates.expansion import Components, add_scaled, grow, is_safe, m
 from engine.predicates.parameters import compare_products
 from engine.predicates.parameters import minor as exact_minor
 from engine.segment_clipping.on_boundary.contacts import Bit, Place, axis_of, decode_place
-from engine.segment_clipping.on_boundary.mesh_contacts import corner, flat_axis, triangle_at
+from engine.segment_clipping.on_boundary.triangle_contacts import corner, flat_axis, triangle_at
 from engine.segment_clipping.pieces import Triple
 from engine.types import FloatArray, Point3
 

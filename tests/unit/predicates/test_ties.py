@@ -17,7 +17,7 @@ from engine.containment.methods.polyhedron_ray_parity import CROSSED, meet_upwar
 from engine.predicates.orientation import tie_sign, tie_sign_exact
 from engine.segment_clipping.exact_pieces import is_crossed
 from engine.segment_clipping.on_boundary.contacts import Bit, Kind
-from engine.segment_clipping.on_boundary.mesh_contacts import exact_contact
+from engine.segment_clipping.on_boundary.triangle_contacts import exact_contact
 from engine.types import Point3
 
 EPS = Fraction(1, 10**6)  # far below what differences of coordinates up to 4 could be taken over by
@@ -64,6 +64,6 @@ def test_all_that_count_crossings_decide_alike(corners: list[Corner]) -> None:
         assert is_crossed(q, top, above) == is_over
         if has_area:  # others are upright, and not asked
             assert _perturbed_line_hits(above, 0, 1, x, y, 1) == is_over
-            kind = exact_contact(*points, low, high)
+            kind = exact_contact(*points, low, high, False)
             assert kind != Kind.DEGENERATE
             assert (kind == Kind.PROPER or (kind > Kind.DEGENERATE and kind & Bit.CROSSES != 0)) == is_over

@@ -12,8 +12,8 @@ from engine.predicates.rational import cross, minus, orient2d_rational
 from engine.segment_clipping.exact_pieces import edge_overlap, triangle_overlap
 from engine.segment_clipping.on_boundary.contacts import CODE_BITS, CROSSED, NO_ROOM, Bit, Kind, Place, find_contacts_2d
 from engine.segment_clipping.on_boundary.crossing_values import cut_at, is_item_safe, line_values, plane_values
-from engine.segment_clipping.on_boundary.mesh_contacts import contact_filter, exact_contact
 from engine.segment_clipping.on_boundary.prepared_boundary import outline_of
+from engine.segment_clipping.on_boundary.triangle_contacts import contact_filter, exact_contact
 from engine.types import UNDECIDED, Point3
 
 
@@ -80,7 +80,7 @@ def test_contacts_are_those_of_whole_numbers() -> None:
         if (numbers[3] == numbers[4]).all():
             continue
         points = [Point3(*row) for row in (numbers * 0.25).tolist()]
-        kind, rough = exact_contact(*points), contact_filter(*points, 0.0)
+        kind, rough = exact_contact(*points, False), contact_filter(*points, 0.0)
         n_told += rough != UNDECIDED
         a, b, c, p, q = numbers.tolist()
         stretch = triangle_overlap(p, q, a, b, c)
@@ -118,7 +118,7 @@ def test_segments_in_the_plane_of_a_triangle() -> None:
         a, b, c, p, q = ([x, y, 2 * x - 3 * y] for x, y in numbers)
         if p == q:
             continue
-        kind, stretch = exact_contact(*(Point3(*map(float, row)) for row in (a, b, c, p, q))), None
+        kind, stretch = exact_contact(*(Point3(*map(float, row)) for row in (a, b, c, p, q)), False), None
         if any(cross(minus(b, a), minus(c, a))):
             stretch = triangle_overlap(p, q, a, b, c)
             codes = [kind & 255, kind >> CODE_BITS] if kind >> CODE_BITS else [kind]

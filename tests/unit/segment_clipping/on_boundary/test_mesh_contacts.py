@@ -9,8 +9,9 @@ import numpy as np
 from engine.predicates.rational import common_integers, cross, minus
 from engine.segment_clipping.exact_pieces import is_crossed, triangle_overlap
 from engine.segment_clipping.on_boundary.contacts import Kind, Place
-from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, exact_contact, find_contacts_3d, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, find_contacts_3d, local_segment
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh, mesh_of
+from engine.segment_clipping.on_boundary.triangle_contacts import exact_contact
 from engine.types import Point3
 from tests.unit.segment_clipping.on_boundary.test_contacts import overlap_codes
 
@@ -60,7 +61,7 @@ def test_contacts_are_those_of_all_triangles() -> None:
     expected: list[set[tuple[int, int]]] = [set() for _ in segments]
     for i, triangle in enumerate(corners):
         for k, segment in enumerate(segments):
-            kind = exact_contact(*(Point3(*row) for row in (*triangle.tolist(), *segment.tolist())))
+            kind = exact_contact(*(Point3(*row) for row in (*triangle.tolist(), *segment.tolist())), False)
             if kind > Kind.DEGENERATE:
                 expected[k] |= {(i, code) for code in codes_of(triangle.tolist(), *segment.tolist())}
             elif kind != Kind.APART:
