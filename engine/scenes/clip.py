@@ -207,13 +207,14 @@ def _cut_near(
     scratch = scratch_for(scene.n_rows)
     while n[0] < last:  # bound: each turn has room for a body
         out, names = allocate_pieces(n_rows, segments.shape[2]), np.empty((2, n_rows), np.int64)
-        pairs, n[2:5] = np.empty((_LEFT + last - first, 2), np.int64), (0, 0, -1)
-        while n[4]:  # bound: each turn prepares a body
+        pairs, wanted = np.empty((_LEFT + last - first, 2), np.int64), -1
+        n[2] = n[3] = 0
+        while wanted:  # bound: each turn prepares a body
             entry_of(cut_near)(segments, order, last, words, scratch, budget.flag, out, names, pairs, n)
             budget.check()
-            if n[4]:
-                scene.prepare(int(n[5]), int(n[4]), budget)
-        m, m_left = n[2:4].tolist()
+            _, _, m, m_left, wanted, body, _ = n.tolist()
+            if wanted:
+                scene.prepare(body, wanted, budget)
         if m:
             budget.take(_BYTES * m)
             pieces = first_of(out, m)

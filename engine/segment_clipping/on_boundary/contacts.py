@@ -204,7 +204,7 @@ def along_edge(a: Point2, b: Point2, p: Point2, q: Point2, of_a: int, of_b: int)
     return overlap_code(Place.START if a[k] <= p[k] else of_a, Place.END if b[k] >= q[k] else of_b)
 
 
-@inline
+@merged
 def edge_contact(edge: FloatArray, segment: FloatArray, is_before: bool) -> int:
     """Return the `Kind` or the packed codes of the contacts of a segment and an edge, both (2, 2). is_before: instead,
     PROPER if the perturbed line crosses the edge before the segment's start."""
@@ -227,7 +227,7 @@ def edge_contact(edge: FloatArray, segment: FloatArray, is_before: bool) -> int:
     return code if code != Kind.APART else along_edge(a, b, p, q, 0, 1)
 
 
-@inline
+@merged
 def may_meet(segment: FloatArray, box: FloatArray, is_before: bool) -> bool:
     """Return False if a separating axis proves that a segment (2, 2), or with is_before its line before its start,
     misses the closed box, (2, 2) low and high; else True."""
