@@ -142,9 +142,11 @@ def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     low, high = elements.min(axis=1), elements.max(axis=1)
     stretched, origin, scale = build_stretched_bvh(np.concatenate([low, high], axis=1))
     tree, n_inner = _inner_first(stretched)
+    with np.errstate(over="ignore"):  # of a mesh of denormal size: what is no number separates nothing
+        inverse = 1.0 / scale
     return Mesh(
         cache_aligned(elements), are_all_safe(elements), read_only(faces), tree.boxes, tree.child, origin,
-        read_only(1.0 / scale), n_inner, corners_of(tree, n_inner, (elements, origin, scale)),
+        read_only(inverse), n_inner, corners_of(tree, n_inner, (elements, origin, inverse)),
     )  # fmt: skip
 
 
@@ -162,13 +164,13 @@ def _inner_first(tree: Bvh) -> tuple[Bvh, int]:
 def corners_of(tree: Bvh, n_inner: int, local: tuple[FloatArray, FloatArray, FloatArray]) -> Float32Array:
     """Return the corners (n_blocks, 9, 8) float32 of the triangles of each leaf block, in tree coordinates: by row a
     coordinate of a corner, by lane a triangle. Unused lanes lie far from everything. n_inner: number of inner nodes,
-    which come first in the tree; local: elements (k, 3, 3), origin and scale (3,)."""
+    which come first in the tree; local: elements (k, 3, 3), origin and 1 / scale (3,)."""
     child = tree.child[n_inner:]
     is_item = child != EMPTY
     block, lane = np.nonzero(is_item)
     corners = np.full((len(child), CORNER_ROWS, LANES), -UNUSED, np.float32)
-    elements, origin, scale = local
+    elements, origin, inverse = local
     with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
-        places = elements[-1 - child[is_item]] * (1.0 / scale) - origin * (1.0 / scale)
+        places = elements[-1 - child[is_item]] * inverse - origin * inverse
     corners[block, :, lane] = places.reshape(-1, CORNER_ROWS)
     return cache_aligned(corners)
