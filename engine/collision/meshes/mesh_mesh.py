@@ -88,7 +88,7 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
     if poses[0] is not None or poses[1] is not None:
         poses = unless_identity(poses)
         posed = a.posed(poses[0]), b.posed(poses[1])
-    if a.has_inside and poses[0] == poses[1] and not work.boolean and _have_same_arrays(a, b) and _has_clean_face(a):
+    if poses[0] == poses[1] and not work.boolean and _have_same_arrays(a, b) and _has_clean_face(a):
         face = int(a.faces[a.arrays.axis >= 0].min())
         same = decode_row(OVERLAPPING, FACE_FACE, face, face, False)
         return same if work.witness and same is not None else UNNAMED[OVERLAPPING]
@@ -103,8 +103,10 @@ def mesh_mesh(first: Solid, second: Solid, poses: Poses, work: Work) -> Collisio
 
 
 def _have_same_arrays(first: MeshBody, second: MeshBody) -> bool:
-    """Return whether two bodies have the same vertices and faces in the same order."""
+    """Return whether two bodies with an inside have the same vertices and faces in the same order."""
     a, b = first.arrays, second.arrays
+    if not (a.has_inside and b.has_inside):
+        return False
     if a is b:
         return True
     if a.extent != b.extent or len(a.faces) != len(b.faces) or len(a.vertices) != len(b.vertices):

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from engine import Polyhedron, Pose, Relation, clearance, collide, collide_poses
+from engine import Polyhedron, Pose, Relation, Surface, clearance, collide, collide_poses
 from engine.collision.meshes.contact_kinds import STRENGTH
 from engine.collision.meshes.exact_body import classify_exact, exact_pair, kind_of_contact
 from engine.collision.meshes.mesh_arrays import mesh_body_of
@@ -99,6 +99,9 @@ def test_a_body_and_an_equal_one(pose: Pose | None) -> None:
     for second in (body, doubled):
         answer = collide(body, second, first_pose=pose, second_pose=pose, detail=True)
         assert str(answer) == "<Collision: overlapping, face_face 0 0, EQ>"
+    sheet = Surface(body.vertices, body.triangles)  # the same arrays, and no inside
+    for pair in ((body, sheet), (sheet, body), (sheet, sheet)):
+        assert collide(*pair, first_pose=pose, second_pose=pose).relation == Relation.TOUCHING
     hollow = np.concatenate([body.triangles, body.triangles[:, ::-1]])  # its faces cancel: no inside at all
     nothing = Polyhedron(body.vertices, hollow)
     assert collide(nothing, nothing).relation == Relation.TOUCHING
