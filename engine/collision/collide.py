@@ -120,6 +120,14 @@ def instead_of(solid: Solid) -> str:
     return f"; {named(solid.type)}: {INSTEAD[solid.type]}" if solid.type in INSTEAD else ""
 
 
+def read_pair(
+    first: object, second: object, deadline: float | None, cancel: Cancel | None
+) -> tuple[Solid, Solid, float | None]:
+    """Return two solids, given as such or as what stands for them, and the seconds left."""
+    with reading(deadline, cancel) as reader:
+        return as_solid(first, "first"), as_solid(second, "second"), reader.left()
+
+
 def posed(given: object, solid: Solid, *where: str | int) -> Pose | None:
     """Return a given pose, which may be a matrix or a pair (rotation, translation), as a `Pose`; None for None. Raises
     unless it has the solid's dimension; where: path of the argument in the call, for the message."""
@@ -257,9 +265,7 @@ def collide(
     'TPP'
     """
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        with reading(deadline, cancel) as reader:
-            first, second = as_solid(first, "first"), as_solid(second, "second")
-        deadline = reader.left()
+        first, second, deadline = read_pair(first, second, deadline, cancel)
     if first_pose is not None or second_pose is not None:
         pair_function(first, second)
         first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")

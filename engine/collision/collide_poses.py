@@ -40,7 +40,6 @@ from engine.solids.pose import Pose, motion_of
 from engine.solids.poses import Poses, as_pose_arrays, check_pose_arrays
 from engine.solids.primitives import Sphere
 from engine.solids.rotations import is_certified_rotation
-from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 
 _Answers = (
@@ -151,9 +150,7 @@ def collide_poses(
     if workers is not None or progress is not None or not are_plain:
         check_options(workers, progress, report=report, witnesses=witnesses, boolean=boolean, detail=detail)
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        with reading(deadline, cancel) as reader:
-            first, second = as_solid(first, "first"), as_solid(second, "second")
-        deadline = reader.left()
+        first, second, deadline = one_pair.read_pair(first, second, deadline, cancel)
     one_pair.pair_function(first, second)
     if detail:
         one_pair.check_has_detail(((("first",), first), (("second",), second)), boolean)

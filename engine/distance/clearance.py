@@ -8,7 +8,7 @@ from typing import Literal, Unpack, overload
 import numpy as np
 
 from engine.collision.codes import DISJOINT, TOUCHING, UNSETTLED
-from engine.collision.collide import Answers, collide_pair, pair_function, posed
+from engine.collision.collide import Answers, collide_pair, pair_function, posed, read_pair
 from engine.collision.collide_poses import as_poses, batch_of, read_poses
 from engine.collision.meshes.mesh_arrays import STILL
 from engine.collision.meshes.placement import PoseArrays
@@ -16,13 +16,12 @@ from engine.collision.result import Clearance, Poses, Work
 from engine.distance import forms
 from engine.distance.spreads import SpreadPair, in_space, spread_pair
 from engine.errors import InvalidInputError
-from engine.running.budget import UNLIMITED, Budget, Cancel, reading
+from engine.running.budget import UNLIMITED, Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, run_chunks
 from engine.solids.accepted import PoseLike, PosesLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown
 from engine.solids.pose import Pose
-from engine.solids.shapes import as_solid
 from engine.types import Accuracy, BoolArray, FloatArray, Relation, read_only
 
 
@@ -122,9 +121,7 @@ def clearance(
     True
     """
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        with reading(deadline, cancel) as reader:
-            first, second = as_solid(first, "first"), as_solid(second, "second")
-        deadline = reader.left()
+        first, second, deadline = read_pair(first, second, deadline, cancel)
     pair_function(first, second, "distance")
     if first_pose is not None or second_pose is not None:
         first_pose, second_pose = posed(first_pose, first, "first_pose"), posed(second_pose, second, "second_pose")
@@ -250,9 +247,7 @@ def clearance_poses(
     """
     check_options(workers, progress, report=report)
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
-        with reading(deadline, cancel) as reader:
-            first, second = as_solid(first, "first"), as_solid(second, "second")
-        deadline = reader.left()
+        first, second, deadline = read_pair(first, second, deadline, cancel)
     pair_function(first, second, "distance")
     least = None if at_least is None else checked_distance(at_least)
     if translations is None:

@@ -47,11 +47,12 @@ def nearest_between_walls(bodies: tuple[ExactBody, ExactBody], pairs: IntArray, 
     ones first."""
     i, j, *codes = pairs[0].tolist()
     gap = nearest_of_triangles(bodies[0].corners(i), bodies[1].corners(j), *codes)
-    sides = [_heights(body, wall) for body, wall in zip(bodies, walls(gap))]
+    own, their = walls(gap)
+    sides = _heights(bodies[0], own), _heights(bodies[1], their)
     if any(bool((side > 0).any()) for side in sides):
         return None
     budget.check()
-    n = np.array([float(x) for x in walls(gap)[0][0]])
+    n = np.array([float(x) for x in own[0]])
     axes = np.linalg.svd(n[None] / np.abs(n).max())[2][1:]
     live = [_on_wall(body, (side == 0).astype(bool), axes) for body, side in zip(bodies, sides)]
     found = _lowest(bodies, gap, live, budget)

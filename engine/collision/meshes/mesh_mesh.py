@@ -226,7 +226,7 @@ def mesh_parts(first: Solid, second: Solid, poses: Poses, work: Work) -> Parts:
 
 def _have_equal_faces(first: MeshBody, second: MeshBody) -> bool:
     """Return whether two meshes have the same triangles, in any order and orientation."""
-    if first is second:
+    if _have_same_arrays(first, second):
         return True
     if len(first.faces) != len(second.faces) or first.arrays.extent.reach != second.arrays.extent.reach:
         return False
