@@ -8,6 +8,7 @@ from engine.collision.triangles import collide_triangles
 from engine.compare import Comparison, compare
 from engine.containment.locate import contains, locate
 from engine.distance.clearance import clearance, clearance_poses
+from engine.distance.distances import Distances, distances
 from engine.errors import (
     CancelledError,
     DeadlineExceededError,
@@ -71,7 +72,8 @@ from engine.warmup import warm
 
 __all__ = [
     "Aabb", "Accuracy", "Bounds", "Cancel", "CancelledError", "Clearance", "ClippedPolygons", "Collapse", "Collision",
-    "Comparison", "Convex", "Csg", "DeadlineExceededError", "EmptyGeometryError", "EngineError", "FaceNotSimpleError",
+    "Comparison", "Convex", "Csg", "DeadlineExceededError", "Distances", "EmptyGeometryError", "EngineError",
+    "FaceNotSimpleError",
     "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError", "IndexOutOfRangeError", "Inspection",
     "InvalidArrayError", "InvalidInputError", "InvalidOperationError", "InvalidPolynomialError", "LinePieces",
     "Location", "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
@@ -81,8 +83,8 @@ __all__ = [
     "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
     "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
     "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
-    "contains", "default_workers", "filled", "inspect", "layers", "locate", "locate_scene", "overlay", "overlay_batch",
-    "polygons", "read_layer", "read_mesh", "release", "solid_types", "union_all", "warm",
+    "contains", "default_workers", "distances", "filled", "inspect", "layers", "locate", "locate_scene", "overlay",
+    "overlay_batch", "polygons", "read_layer", "read_mesh", "release", "solid_types", "union_all", "warm",
 ]  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from typing import Final
 from engine.containment import locators
 from engine.containment import posed_locators as posed
 from engine.containment.methods import rational_locate
+from engine.distance.point_measures import BallMeasure, PlanesMeasure, TriangleMeasure
 from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import profiles
@@ -41,6 +42,7 @@ ROWS: Final = (
         clip=segments.on_planes,
         planes=planes.planes_of_rows,
         meets={2: "half_space", 3: "half_space"},
+        measure=PlanesMeasure,
     ),
     Row(
         solid=Sphere,
@@ -56,6 +58,7 @@ ROWS: Final = (
         profile=profiles.on_sphere,
         clip=segments.on_ball,
         meets={2: "sphere", 3: "sphere"},
+        measure=BallMeasure,
     ),
     Row(
         solid=Aabb,
@@ -76,6 +79,7 @@ ROWS: Final = (
         clip=segments.on_box,
         planes=planes.planes_of_rows,
         meets={2: "box", 3: "box"},
+        measure=TriangleMeasure,
     ),
     Row(
         solid=Convex,
@@ -93,6 +97,7 @@ ROWS: Final = (
         n_faces=lambda solid: len(solid.planes),
         clip=segments.on_planes,
         planes=planes.planes_of_rows,
+        measure=PlanesMeasure,
     ),
     Row(
         solid=Polyhedron,
@@ -114,6 +119,7 @@ ROWS: Final = (
         clip=boundary.on_boundary,
         planes=planes.planes_of_faces,
         meets={3: "mesh"},
+        measure=TriangleMeasure,
     ),
     Row(
         solid=Surface,
@@ -129,6 +135,7 @@ ROWS: Final = (
         bounds=bounds.bounds_of_vertices,
         profile=profiles.on_boundary,
         meets={3: "mesh"},
+        measure=TriangleMeasure,
     ),
     Row(
         solid=Triangle,
@@ -144,6 +151,7 @@ ROWS: Final = (
         profile=profiles.on_triangle,
         n_faces=lambda solid: len(solid.vertices),
         meets={2: "outline"},
+        measure=TriangleMeasure,
     ),
     Row(
         solid=Polygon,
@@ -161,6 +169,7 @@ ROWS: Final = (
         n_faces=lambda solid: len(solid.vertices),
         clip=boundary.on_boundary,
         meets={2: "outline"},
+        measure=TriangleMeasure,
     ),
     Row(
         solid=Implicit,

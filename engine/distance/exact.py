@@ -56,16 +56,19 @@ class ScaledGap(NamedTuple):
 
     def clearance(self, features: tuple[Feature, Feature], dimension: int) -> Clearance:
         """Return distance, nearest points with `dimension` coordinates, and the given features."""
-        p, q, distance = self.gap.p, self.gap.q, self.distance()
+        distance, points = self.distance(), np.array(self.ends())[:, :dimension]
+        points.setflags(write=False)
+        return Clearance(distance, points, features)
+
+    def ends(self) -> tuple[list[float], list[float]]:
+        """Return the nearest points, each coordinate the nearest double. Raises: NotRepresentableError."""
+        p, q = self.gap.p, self.gap.q
         try:
-            ends = self._toward(p, q, self.radii[0]), self._toward(q, p, self.radii[1])
+            return self._toward(p, q, self.radii[0]), self._toward(q, p, self.radii[1])
         except OverflowError:
             raise NotRepresentableError(
                 "a nearest point is beyond the largest double, 1.8e308; scale both bodies down by a power of two", ()
             ) from None
-        points = np.array(ends)[:, :dimension]
-        points.setflags(write=False)
-        return Clearance(distance, points, features)
 
     def distance(self) -> float:
         """Return the double nearest to the distance; the smallest denormal instead of 0. Times scale the distance is
@@ -83,6 +86,11 @@ class ScaledGap(NamedTuple):
         """Return whether the distance is at least `least`: top / bottom >= (radii + least scale)^2."""
         reach = sum(self.radii) * least.denominator + least.numerator * self.scale
         return self.gap.top * least.denominator**2 >= reach * reach * self.gap.bottom
+
+    def is_at_most(self, most: Fraction) -> bool:
+        """Return whether the distance is at most `most`."""
+        reach = sum(self.radii) * most.denominator + most.numerator * self.scale
+        return self.gap.top * most.denominator**2 <= reach * reach * self.gap.bottom
 
     def _toward(self, p: Rational, q: Rational, radius: int) -> list[float]:
         """Return the doubles nearest to the point at distance `radius` from p toward q: p + radius (q - p) / |q - p|.

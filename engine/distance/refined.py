@@ -22,7 +22,7 @@ that of the vector between their starts:
 `ends_of` counts in these units: the margin of all weights times their denominators above 0, so that the exact points
 lie within both features, and the amplification of weight errors to the point, times the lengths of the edges over the
 denominator (`steepness`): `error`, with room for the errors of denominators and for sums of three. If all other corners
-of both triangles lie strictly beyond the planes across the exact connection, no other points of the triangles are as
+of all candidates lie strictly beyond the planes across the exact connection, no other points of these triangles are as
 near. A direction off by 2 `error` changes a height, of lengths below 4, by less than 16 `error`.
 """
 
@@ -212,7 +212,7 @@ def height_above(n: Wide3, p: Wide3, base: Wide3) -> Wide:
 
 
 @called
-def _bounds(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
+def bounds_of_features(s: Facet, t: Facet, first: int, second: int) -> tuple[Wide, float]:
     """Return the distance of the closest points of two features, and a bound on how much nearer points of the triangles
     may be; 0, 0 where the distance is too small."""
     p, q, _, _ = ends_of(s, t, first, second)
@@ -259,7 +259,7 @@ def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, 
     for k in range(n):
         i, j, first, second = candidates.pairs[k]
         t, u = corners_of(s.a, i, Wide3(origin, origin, origin)), corners_of(s.b, j, shift)
-        size, beyond = _bounds(t, u, first, second)
+        size, beyond = bounds_of_features(t, u, first, second)
         low, first_size = less(size, Wide(beyond, 0.0)), size if k == 0 else first_size
         more = less(low, first_size).h
         candidates.bounds[k] = more - 2.0**-50 * abs(more) - ROUNDING
@@ -274,12 +274,13 @@ def refine(s: Search, start: FloatArray, other: FloatArray, radii: tuple[float, 
     return value if is_proven else -1.0, n
 
 
-_SLACK: Final = 2.0**-86
+CERTAIN: Final = 2.0**-86
 
 
 @inline
-def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3,
-               slack: float) -> bool:  # fmt: skip
+def are_strictly_beyond(
+    view: View, triangle: int, known: tuple[int, int, int], t: Facet, n: Wide3, base: Wide3, slack: float
+) -> bool:
     """Return whether all corners of a triangle, placed as t, but the vertices `known` lie strictly behind the plane at
     base across n, by more than slack."""
     for k in range(3):
@@ -291,7 +292,7 @@ def _are_strictly_beyond(view: View, triangle: int, known: tuple[int, int, int],
 
 
 @inline
-def _write_offset_point(
+def write_offset_point(
     view: View, known: tuple[int, int, int], p: Wide3, n: Wide3, radius: float, start: FloatArray, move: FloatArray,
     error: float, point: FloatArray,
 ) -> bool:  # fmt: skip
@@ -336,13 +337,16 @@ def certify(
     t = corners_of(s.a, pairs[0, 0], Wide3(none, none, none))
     u = corners_of(s.b, pairs[0, 1], shift_of(s, start, other))
     p, q, inside, steepness = ends_of(t, u, pairs[0, 2], pairs[0, 3])
-    error = _SLACK * steepness + 2.0**-92
-    slack, way, back = _SLACK + 16.0 * error, less3(q, p), less3(p, q)
-    if not (inside > _SLACK and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
+    error = CERTAIN * steepness + 2.0**-92
+    slack, way, back = CERTAIN + 16.0 * error, less3(q, p), less3(p, q)
+    if not (inside > CERTAIN and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
         return False
-    if not _are_strictly_beyond(s.a, pairs[0, 0], here, t, way, p, slack):
-        return False
-    if not _are_strictly_beyond(s.b, pairs[0, 1], there, u, back, q, slack):
-        return False
-    is_proven = _write_offset_point(s.a, here, p, way, radii[0], start, start, error, points[0])
-    return _write_offset_point(s.b, there, q, back, radii[1], start, other, error, points[1]) and is_proven
+    for k in range(n):
+        t = corners_of(s.a, pairs[k, 0], Wide3(none, none, none))
+        if not are_strictly_beyond(s.a, pairs[k, 0], here, t, way, p, slack):
+            return False
+        u = corners_of(s.b, pairs[k, 1], shift_of(s, start, other))
+        if not are_strictly_beyond(s.b, pairs[k, 1], there, u, back, q, slack):
+            return False
+    is_proven = write_offset_point(s.a, here, p, way, radii[0], start, start, error, points[0])
+    return write_offset_point(s.b, there, q, back, radii[1], start, other, error, points[1]) and is_proven

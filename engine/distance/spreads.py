@@ -58,9 +58,12 @@ class SpreadPair:
     """Two bodies as triangles and radii, the second under n poses, the first under one or n; used by one thread at a
     time."""
 
-    def __init__(self, first: Solid, second: Solid, own: PoseArrays, second_poses: PoseArrays, budget: Budget) -> None:
+    def __init__(
+        self, first: Solid, second: Solid, own: PoseArrays, second_poses: PoseArrays, budget: Budget,
+        meshes: tuple[MeshBody, MeshBody] | None = None,
+    ) -> None:  # fmt: skip
         self.solids = first, second
-        self.meshes = spread_of(first), spread_of(second)
+        self.meshes = (spread_of(first), spread_of(second)) if meshes is None else meshes
         self.poses = own, second_poses
         self.budget = budget
         self.n_exact = 0  # poses decided by the exact stage
@@ -71,16 +74,30 @@ class SpreadPair:
 
     def clearance(self, item: int) -> Clearance:
         """Return distance, nearest points and features of two disjoint bodies under pose `item`."""
-        query, answers = Query(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
-        how, _, pairs = next(self._unanswered(item, item + 1, answers, query))
-        d = self.solids[0].dimension
-        if how != ANSWERED:
-            gap, triangles = self._least(item, pairs)
-            return gap.clearance(self._features(triangles, (gap.gap.first, gap.gap.second)), d)
-        i, j, *codes = next(iter(pairs))
+        distance, triangles, codes, gap = self.nearest(item)
+        d, features = self.solids[0].dimension, self._features(triangles, codes)
+        if gap is not None:
+            return gap.clearance(features, d)
         points = self._room.points[:, :d].copy()
         points.setflags(write=False)
-        return Clearance(float(answers[item]), points, self._features((i, j), codes))
+        return Clearance(distance, points, features)
+
+    def nearest(self, item: int) -> tuple[float, Sequence[int], Sequence[int], ScaledGap | None]:
+        """Return (distance, triangles, codes, gap) of pose `item`: the nearest triangles of each and the codes of their
+        features. gap: if integers decided, with the distance and the points; None if the search did: then `points` has
+        these."""
+        query, answers = Query(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
+        how, _, pairs = next(self._unanswered(item, item + 1, answers, query))
+        if how != ANSWERED:
+            gap, triangles = self.least(item, pairs)
+            return gap.distance(), triangles, (gap.gap.first, gap.gap.second), gap
+        i, j, *codes = next(iter(pairs))
+        return float(answers[item]), (i, j), codes, None
+
+    @property
+    def points(self) -> FloatArray:
+        """The nearest points (2, 3) that `nearest` found without integers; valid until the next search."""
+        return self._room.points
 
     def _features(self, triangles: Sequence[int], codes: Sequence[int]) -> tuple[Feature, Feature]:
         """Return the caller's features for a triangle of each body and a feature code of each."""
@@ -92,7 +109,7 @@ class SpreadPair:
         bodies' triangles do not meet. least: if given, 0.0 for nearer bodies, infinity for others instead."""
         limits = (np.inf, -1.0) if least is None else _around(least + sum(map(Fraction, self._radii)))
         for _, item, pairs in self._unanswered(start, stop, answers, Query(*limits, *self._radii, self._reach, False)):
-            gap, _ = self._least(item, pairs)
+            gap, _ = self.least(item, pairs)
             answers[item] = gap.distance() if least is None else (np.inf if gap.is_at_least(least) else 0.0)
 
     def _unanswered(
@@ -135,7 +152,7 @@ class SpreadPair:
         own, poses = self.poses
         return _pose_at(own, min(item, len(own.rotations) - 1)), _pose_at(poses, item)
 
-    def _least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
+    def least(self, item: int, pairs: Iterable[Sequence[int]]) -> tuple[ScaledGap, tuple[int, int]]:
         """Return the smallest gap of the candidates of pose number `item`, ties by the lowest faces, and its two
         triangles; exact. pairs: rows of two triangles and a feature code of each."""
         self.n_exact += 1

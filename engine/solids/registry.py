@@ -82,6 +82,8 @@ class Row:
     """(solid) -> the clipping `Plan`; without it `clip_segments` refuses the type."""
     planes: Callable[[Any, Any], Any] | None = None
     """(solid, check) -> integer plane rows, to which polygons are clipped."""
+    measure: Callable[[Any, Any], Any] | None = None
+    """(solid, pose) -> `distance.point_measures.Measure`: distances of points."""
     kind: BodyKind = BodyKind.OTHER
     """The table of a scene in which kernels find a body of this type."""
     meets: Mapping[int, str] = field(default_factory=dict)

@@ -1,0 +1,87 @@
+"""Distances of many points from the surface of a ball, and from planes, in double-doubles; what they leave open stays
+NaN for rational arithmetic.
+
+**Bounds** (u^2 = 2^-106). A difference of two doubles is exact; squares, their sum and its root are off by less than
+2^-99 of the root, the difference of root and radius by 2^-99 of both. A height over a plane is a sum of d exact
+products and the offset, off by 2^-101 of the sum of magnitudes; the quotient by the length of the normal by 2^-99 of
+itself.
+Coordinates are zero or within `SMALLEST` .. `LARGEST`, else the point is left open.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from engine.compiling.jit import inline, kernel
+from engine.distance.closed_forms import Wide, less, over, plus, product, root, times
+from engine.predicates.error_free import is_correctly_rounded, two_diff
+from engine.predicates.expansion import is_safe
+from engine.types import FlagArray, FloatArray
+
+_BOUND: Final = 2.0**-99
+
+
+@inline
+def _answer(distance: Wide, error: float, most: float) -> float:
+    """Return the double nearest to |distance|, NaN if unproven; given a finite `most`, 0.0 or infinity for distances
+    within or beyond it."""
+    value = abs(distance.h)
+    if not (value > 2.0**-500 and is_correctly_rounded(distance.h, distance.low, error)) or value == most:
+        return np.nan
+    return value if most == np.inf else (0.0 if value < most else np.inf)
+
+
+@kernel
+def fill_from_ball(
+    points: FloatArray, span: tuple[int, int], centre: FloatArray, radius: float, most: float, distance: FloatArray,
+    flag: FlagArray,
+) -> None:  # fmt: skip
+    """Fill the NaN entries of distance (n,) for points (n, d) number span[0] .. span[1] - 1: from the sphere about a
+    centre (d,). most: see `_answer`."""
+    for item in range(span[0], span[1]):
+        if distance[item] == distance[item] or flag[0] != 0:
+            continue
+        square, is_usable = Wide(0.0, 0.0), is_safe(radius)
+        for k in range(points.shape[1]):
+            x = Wide(*two_diff(points[item, k], centre[k]))
+            is_usable = is_usable and is_safe(points[item, k]) and is_safe(centre[k])
+            square = plus(square, times(x, x))
+        if is_usable and square.h > 0.0:
+            size = root(square)
+            distance[item] = _answer(less(size, Wide(radius, 0.0)), _BOUND * (size.h + radius), most)
+
+
+@kernel
+def fill_from_planes(
+    points: FloatArray, span: tuple[int, int], rows: FloatArray, most: float, distance: FloatArray, flag: FlagArray
+) -> None:
+    """Fill the NaN entries of distance (n,) for points (n, d) number span[0] .. span[1] - 1: from the nearest of planes
+    (m, d + 1), if there is one or the point lies on the inner side of all. most: see `_answer`."""
+    d = points.shape[1]
+    for item in range(span[0], span[1]):
+        if distance[item] == distance[item] or flag[0] != 0:
+            continue
+        least, lowest, is_usable = Wide(np.inf, 0.0), np.inf, True
+        error = 0.0
+        for row in range(rows.shape[0]):
+            height, terms, square = Wide(rows[row, d], 0.0), abs(rows[row, d]), Wide(0.0, 0.0)
+            is_usable = is_usable and is_safe(rows[row, d])
+            for k in range(d):
+                is_usable = is_usable and is_safe(rows[row, k]) and is_safe(points[item, k])
+                height = plus(height, product(rows[row, k], points[item, k]))
+                terms += abs(rows[row, k] * points[item, k])
+                square = plus(square, product(rows[row, k], rows[row, k]))
+            if not is_usable or not square.h > 0.0 or (rows.shape[0] > 1 and not height.h > 2.0**-101 * terms):
+                is_usable = False
+                break
+            height = height if height.h >= 0.0 else Wide(-height.h, -height.low)
+            size = root(square)
+            here = over(height, size)
+            bound = 2.0**-100 * terms / size.h + _BOUND * here.h
+            lowest = min(lowest, here.h - bound)
+            if less(here, least).h < 0.0 or row == 0:
+                least, error = here, bound
+        if is_usable:  # several nearly as near: within their errors they round alike, or stay open
+            distance[item] = _answer(least, max(error, least.h - lowest) if lowest < least.h else error, most)

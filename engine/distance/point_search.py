@@ -1,0 +1,531 @@
+"""The nearest triangle of a mesh to each of many points.
+
+1. Depth first through the tree, the nearest child first, boxes and triangles bounded eight at a time in float32
+   (`lanes/points.py`): the triangles that may be the nearest are the candidates.
+2. Each is bounded in float64 (`_measure`). One that may contain the point is decided by exact signs: 0.
+3. If all candidates left name one feature, and it certainly is the nearest of each (`_is_certain`), the distance is
+   that of a vertex, a line or a plane: in double-doubles of the point's exact differences from the corners, scaled so
+   that the longest is near 1 (`_distance_to`).
+4. Else the candidates are bounded in double-doubles (`_refine`; the bound is that of `refined.py`), which decides the
+   distance of ties too, and the feature if every corner of every candidate that is not of it lies strictly behind the
+   plane at the foot across the connection (`_certify`; the margins are those of `refined.certify`).
+5. What none of these proves is left open, for integers (`points.py`).
+
+The face is the least of the candidates'.
+
+Source: N. Roussopoulos, S. Kelley, F. Vincent, Nearest neighbor queries, 1995 (the order of the search).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.bounding.bvh import STACK
+from engine.collision.meshes.mesh_arrays import STILL, MeshArrays, triangle_of
+from engine.collision.meshes.near_triangles import FACE, relative_to
+from engine.collision.meshes.placement import as_placement
+from engine.collision.meshes.triangle_triangle import Facet, corner, projected
+from engine.compiling.jit import called, inline, kernel
+from engine.distance.closed_forms import Wide, Wide3, dot3, less, less3, over, root, times
+from engine.distance.refined import (
+    CERTAIN,
+    ROUNDING,
+    Candidates,
+    View,
+    are_strictly_beyond,
+    bounds_of_features,
+    ends_of,
+    named,
+    retain_below,
+    write_offset_point,
+)  # fmt: skip
+from engine.distance.traversal import BEYOND, CLOSER, DONE, FULL, INTERRUPTED
+from engine.lanes.boxes import EMPTY
+from engine.lanes.lanes import lowest_bit
+from engine.lanes.points import BOUND_ROWS, MARGIN, SLACK, boxes_within, triangle_bounds
+from engine.lanes.tracing import LANES
+from engine.predicates.error_free import is_correctly_rounded, two_diff, workspace
+from engine.predicates.expansion import add_scaled, compress
+from engine.predicates.orientation import orient2d, orient3d
+from engine.predicates.parameters import minor
+from engine.predicates.vectors import as_point3, cross, dot, largest_of, minus
+from engine.types import UNDECIDED, FlagArray, Float32Array, FloatArray, Int32Array, IntArray, Point3
+
+FAR: Final = 6
+"""Outcome of a search: the point is so far away that float32 cannot tell the triangles apart."""
+_LARGEST: Final = 1e300
+_FARTHEST: Final = 4096.0
+_ABOVE_ONE: Final = 1.0 + 2.0**-20
+_ROUNDING: Final = 2.0**-47
+"""Bound on the rounding of `_measure`, of coordinates below 1: one rounding of each, 12 of a combination of corners,
+its length and products with corners, each less than 16 u in all."""
+_SMALLEST: Final = 2.0**-300
+"""Least magnitude whose products of three are exact with tails."""
+
+
+class PointRoom(NamedTuple):
+    """Work space of one search at a time: candidates, of which the first and third columns are used; stack (STACK,) of
+    nodes with the least squared distance of each, bounds (STACK,); work of `lanes/points.py`; origin (3,) zeros."""
+
+    candidates: Candidates
+    stack: Int32Array
+    bounds: FloatArray
+    work: Float32Array
+    origin: FloatArray
+
+
+def new_point_room(room: int) -> PointRoom:
+    """Allocate work space for `room` candidates."""
+    candidates = Candidates(np.empty((room, 4), np.int64), np.empty(room))
+    work = np.empty((BOUND_ROWS, LANES), np.float32)
+    return PointRoom(candidates, np.empty(STACK, np.int32), np.empty(STACK), work, np.zeros(3))
+
+
+class Goal(NamedTuple):
+    """What is asked of each point. most: points farther away do not count; enough: a distance below it ends the search;
+    limit: the distance compared with, infinity for none; is_named: the nearest point and its feature too."""
+
+    most: float
+    enough: float
+    limit: float
+    is_named: bool
+
+
+@inline
+def _push_children(mesh: MeshArrays, node: int, at: Point3, reach: float, most: float, room: PointRoom, n: int) -> int:
+    """Push a node's children that may be within `most` of a point on the stack of n nodes, the farthest first; return
+    its new size. at: the point, in tree coordinates; reach: S of `lanes/points.py`."""
+    square = most * most * _ABOVE_ONE + 1e-37
+    bits = boxes_within(mesh.boxes, node, at.x, at.y, at.z, MARGIN * reach, square, room.work)
+    first = n
+    while bits != 0:  # bound: each turn takes a bit
+        lane = lowest_bit(bits)
+        bits &= bits - 1
+        child, bound = mesh.child[node, lane], room.work[0, lane]
+        if child == EMPTY:
+            break
+        place = n
+        while place > first and room.bounds[place - 1] < bound:  # bound: eight children
+            room.bounds[place], room.stack[place] = room.bounds[place - 1], room.stack[place - 1]
+            place -= 1
+        room.bounds[place], room.stack[place] = bound, child
+        n += 1
+    return n
+
+
+@called
+def _search(
+    mesh: MeshArrays, at: Point3, reach: float, most: float, enough: float, room: PointRoom, flag: FlagArray
+) -> tuple[int, int]:
+    """Fill the candidates; return (outcome, number). CLOSER: a triangle is nearer than `enough`; INTERRUPTED;
+    FULL. at: the point; lengths in tree coordinates."""
+    candidates, n_candidates, n = room.candidates, 0, 1
+    room.stack[0], room.bounds[0] = 0, 0.0
+    while n > 0:  # bound: each node enters once
+        n -= 1
+        node = int(room.stack[n])
+        if room.bounds[n] > most * most * _ABOVE_ONE + 1e-37:
+            continue
+        if mesh.child[node, 0] >= 0:
+            n = _push_children(mesh, node, at, reach, most, room, n)
+            continue
+        if flag[0] != 0:
+            return INTERRUPTED, 0
+        triangle_bounds(mesh.blocks, node, at.x, at.y, at.z, SLACK * reach, room.work)
+        for lane in range(LANES):
+            child, low = mesh.child[node, lane], float(room.work[0, lane])
+            if child == EMPTY:
+                break
+            if low > most:
+                continue
+            most = min(most, float(room.work[1, lane]))
+            if most < enough:
+                return CLOSER, 0
+            if n_candidates == len(candidates.bounds):
+                n_candidates = retain_below(candidates, n_candidates, most)
+                if 2 * n_candidates > len(candidates.bounds):
+                    return FULL, n_candidates
+            candidates.pairs[n_candidates, 0], candidates.bounds[n_candidates] = -1 - child, low
+            n_candidates += 1
+    return DONE, retain_below(candidates, n_candidates, most)
+
+
+class Closest(NamedTuple):
+    """The point of a triangle that is nearest to the origin, as floats have it: a combination of the corners with
+    weights from 0 to 1, up to rounding. code: of the feature it lies on; inside: how far the weights that are not 0 are
+    from 0 and 1, times the denominator of the weights, of a vertex infinite."""
+
+    p: Point3
+    code: int
+    inside: float
+
+
+@inline
+def _closest(t: Facet) -> Closest:
+    best, least = Closest(t.p, 0, np.inf), np.inf
+    for k in range(3):
+        a, b = corner(t, k), corner(t, k + 1)
+        u = minus(b, a)
+        uu, along = dot(u, u), -dot(a, u)
+        x = min(max(along / uu, 0.0), 1.0) if uu > 0.0 else 0.0
+        p = b if x == 1.0 else Point3(a.x + x * u.x, a.y + x * u.y, a.z + x * u.z)
+        square = dot(p, p)
+        if square < least:
+            is_end, end = x <= 0.0 or x >= 1.0, k if x <= 0.0 else (k + 1) % 3
+            best = Closest(p, end if is_end else 3 + k, np.inf if is_end else min(along, uu - along))
+            least = square
+    u, v = minus(t.q, t.p), minus(t.r, t.p)
+    n = cross(u, v)
+    nn, a = dot(n, n), t.p
+    if nn > 0.0:
+        top, other = dot(cross(v, a), n), dot(cross(a, u), n)
+        x, y = top / nn, other / nn
+        p = Point3(a.x + x * u.x + y * v.x, a.y + x * u.y + y * v.y, a.z + x * u.z + y * v.z)
+        if x >= 0.0 and y >= 0.0 and x + y <= 1.0 and dot(p, p) < least:
+            best = Closest(p, FACE, min(top, other, nn - top - other))
+    return best
+
+
+@inline
+def _is_certain(t: Facet, closest: Closest) -> bool:
+    """Return whether the feature is proven to be that of the exact nearest point. With coordinates below 1, edges E at
+    most, and u = 2^-53, an edge is off by 3 u, and
+
+    | quantity | error | allowed |
+    |---|---|---|
+    | a face's `inside`: three products, of E^2 and E | 160 u E^2 | 2^-44 E^2 |
+    | an edge's `inside`: of two vectors, below 1 and E | 20 u | 2^-47 |
+    | p . (c - p), p a vertex | 20 u | 2^-47 |
+    | the same, p on an edge, off by 20 u / E along it | 80 u / E + 20 u | 2^-44 / E |
+
+    All corners c beyond the plane at p across p, but those of the feature: no point of the triangle is as near."""
+    p, code = closest.p, closest.code
+    if code == FACE:
+        u, v = minus(t.q, t.p), minus(t.r, t.p)
+        size = max(largest_of(u), largest_of(v))
+        return closest.inside > 2.0**-44 * size * size
+    margin = 2.0**-47
+    if code >= 3:
+        margin = 2.0**-44 / min(largest_of(minus(corner(t, code - 2), corner(t, code - 3))), 1.0)
+    is_certain = closest.inside > 2.0**-47
+    for k in range(3):
+        if k == code % 3 or (code >= 3 and k == (code + 1) % 3):
+            continue
+        is_certain = is_certain and dot(p, minus(corner(t, k), p)) > margin
+    return is_certain
+
+
+@called
+def _measure(t: Facet) -> tuple[float, float, int, bool]:
+    """Return a lower and an upper bound on the distance of a triangle from the origin, the code of the feature that is
+    probably the nearest, and whether it certainly is."""
+    largest = max(largest_of(t.p), largest_of(t.q), largest_of(t.r))
+    if largest == 0.0:
+        return 0.0, 0.0, 0, False
+    unit = math.ldexp(1.0, min(-math.frexp(largest)[1], 1000))
+    s = Facet(
+        Point3(t.p.x * unit, t.p.y * unit, t.p.z * unit),
+        Point3(t.q.x * unit, t.q.y * unit, t.q.z * unit),
+        Point3(t.r.x * unit, t.r.y * unit, t.r.z * unit),
+    )
+    closest = _closest(s)
+    p = closest.p
+    size = np.sqrt(dot(p, p))
+    low = min(dot(p, s.p), dot(p, s.q), dot(p, s.r)) / size - _ROUNDING if size > 0.0 else 0.0
+    return max(low, 0.0) / unit, (size + _ROUNDING) / unit, closest.code, _is_certain(s, closest)
+
+
+@inline
+def _is_on_edge(a: Point3, b: Point3, q: Point3) -> int:
+    """Return 1 if q lies on the closed segment a b, 0 if not, or UNDECIDED."""
+    if not (
+        min(a.x, b.x) <= q.x <= max(a.x, b.x)
+        and min(a.y, b.y) <= q.y <= max(a.y, b.y)
+        and min(a.z, b.z) <= q.z <= max(a.z, b.z)
+    ):
+        return 0
+    result = 1
+    for axis in range(3):
+        side = orient2d(projected(a, axis), projected(b, axis), projected(q, axis))
+        if side == UNDECIDED:
+            result = UNDECIDED
+        elif side != 0:
+            return 0
+    return result
+
+
+_NOWHERE: Final = -1
+_UNSURE: Final = -2
+
+
+@called
+def _feature_under(mesh: MeshArrays, item: int, q: Point3) -> int:
+    """Return the code of the feature of a triangle that a point lies on, _NOWHERE off it, or _UNSURE; exact."""
+    t, axis = triangle_of(mesh, item), mesh.axis[item]
+    for k in range(3):
+        p = corner(t, k)
+        if p.x == q.x and p.y == q.y and p.z == q.z:
+            return k
+    is_unsure = axis < -1  # UNKNOWN_AXIS
+    for k in range(3):
+        on = _is_on_edge(corner(t, k), corner(t, k + 1), q)
+        if on == 1:
+            return 3 + k
+        is_unsure = is_unsure or on == UNDECIDED
+    if axis < 0 or is_unsure:
+        return _UNSURE if is_unsure else _NOWHERE
+    side = orient3d(t.p, t.q, t.r, q)
+    if side != 0:
+        return _UNSURE if side == UNDECIDED else _NOWHERE
+    at, turn = projected(q, axis), orient2d(projected(t.p, axis), projected(t.q, axis), projected(t.r, axis))
+    for k in range(3):
+        side = orient2d(projected(corner(t, k), axis), projected(corner(t, k + 1), axis), at)
+        if side == UNDECIDED:
+            return _UNSURE
+        if side != turn:
+            return _NOWHERE
+    return FACE
+
+
+@inline
+def _seen_from(view: View, item: int, q: Point3) -> Facet:
+    """Return the corners of a triangle relative to a point, in double-doubles, times the unit of the view."""
+    t, unit = triangle_of(view.mesh, item), view.unit
+    x, y, z = q.x * unit, q.y * unit, q.z * unit
+    return Facet(
+        Wide3(Wide(*two_diff(t.p.x * unit, x)), Wide(*two_diff(t.p.y * unit, y)), Wide(*two_diff(t.p.z * unit, z))),
+        Wide3(Wide(*two_diff(t.q.x * unit, x)), Wide(*two_diff(t.q.y * unit, y)), Wide(*two_diff(t.q.z * unit, z))),
+        Wide3(Wide(*two_diff(t.r.x * unit, x)), Wide(*two_diff(t.r.y * unit, y)), Wide(*two_diff(t.r.z * unit, z))),
+    )
+
+
+@inline
+def _add_minor(e: Any, n: int, m: Any, z: Wide, a: tuple[Wide, Wide], b: tuple[Wide, Wide]) -> int:
+    """Add z times the determinant of two rows to the expansion e of n components; return the new length."""
+    size = minor(m, a[0].h, a[0].low, a[1].h, a[1].low, b[0].h, b[0].low, b[1].h, b[1].low)
+    return add_scaled(e, add_scaled(e, n, m, size, z.low), m, size, z.h)
+
+
+@inline
+def _reach(u: Wide3) -> float:
+    return max(abs(u.x.h), abs(u.y.h), abs(u.z.h))
+
+
+@inline
+def _cross3(u: Wide3, v: Wide3) -> Wide3:
+    return Wide3(
+        less(times(u.y, v.z), times(u.z, v.y)), less(times(u.z, v.x), times(u.x, v.z)),
+        less(times(u.x, v.y), times(u.y, v.x)),
+    )  # fmt: skip
+
+
+@called
+def _determinant(t: Facet) -> Wide:
+    """Return |det| of the corners of a triangle, computed exactly, then rounded to 2^-104 of itself; 0 if out of
+    range."""
+    for k in range(3):
+        p = corner(t, k)
+        for x in (p.x, p.y, p.z):
+            if (x.h != 0.0 and abs(x.h) < _SMALLEST) or (x.low != 0.0 and abs(x.low) < _SMALLEST):
+                return Wide(0.0, 0.0)
+    e, m = workspace(192), workspace(16)
+    n = _add_minor(e, 0, m, t.p.z, (t.q.x, t.q.y), (t.r.x, t.r.y))
+    n = _add_minor(e, n, m, t.q.z, (t.r.x, t.r.y), (t.p.x, t.p.y))
+    n = compress(e, _add_minor(e, n, m, t.r.z, (t.p.x, t.p.y), (t.q.x, t.q.y)))
+    det = Wide(e[n - 1] if n > 0 else 0.0, e[n - 2] if n > 1 else 0.0)
+    return det if det.h >= 0.0 else Wide(-det.h, -det.low)
+
+
+@called
+def _distance_to(t: Facet, code: int) -> tuple[Wide, float]:
+    """Return the distance of the vertex, or of the line or plane of an edge or a face, of a triangle from the origin,
+    and a bound on its error: |a|, |a x e| / |e|, |a . n| / |n|. With A, U, V the longest coordinates of a and of the
+    edges: a component of a product of two vectors is off by less than 2^-101 of the product of these; the length of
+    one, root and quotient together by 2^-99 of itself. What 2^-98 A U V / |n| does not decide, the exact determinant
+    does."""
+    a = corner(t, code % 3)
+    if code < 3:
+        size = root(dot3(a, a))
+        return size, 2.0**-99 * size.h
+    u = less3(corner(t, code % 3 + 1), a)
+    if code < FACE:
+        normal, size = _cross3(a, u), root(dot3(u, u))
+        distance = over(root(dot3(normal, normal)), size)
+        return distance, 2.0**-98 * _reach(a) * _reach(u) / size.h + 2.0**-98 * distance.h
+    v = less3(t.r, a)
+    normal, lengths = _cross3(u, v), _reach(u) * _reach(v)
+    size = root(dot3(normal, normal))
+    distance, share = over(dot3(a, normal), size), 2.0**-98 * (lengths / size.h + 1.0)
+    distance = distance if distance.h >= 0.0 else Wide(-distance.h, -distance.low)
+    error = _reach(a) * share + distance.h * share
+    if not is_correctly_rounded(distance.h, distance.low, error):
+        distance = over(_determinant(t), size)
+        error = distance.h * share if distance.h > 0.0 else np.inf
+    return distance, error
+
+
+@inline
+def _rounded(distance: Wide, error: float, unit: float) -> float:
+    """Return the double nearest to a distance over the unit; -1.0 if the error leaves it open."""
+    value = distance.h / unit
+    is_proven = 2.0**-1000 < value < 2.0**1000 and is_correctly_rounded(distance.h, distance.low, error)
+    return value if is_proven else -1.0
+
+
+@called
+def _refine(view: View, q: Point3, n: int, candidates: Candidates) -> tuple[float, int]:
+    """Return the distance of a point from the first n candidates, which is not 0, as the nearest double, -1.0 if
+    unproven; and n less those that are farther."""
+    none = Wide(0.0, 0.0)
+    origin = Wide3(none, none, none)
+    least, lowest, spot = Wide(np.inf, 0.0), Wide(np.inf, 0.0), Facet(origin, origin, origin)
+    for k in range(n):
+        size, beyond = bounds_of_features(_seen_from(view, candidates.pairs[k, 0], q), spot, candidates.pairs[k, 2], 0)
+        low = less(size, Wide(beyond, 0.0))
+        candidates.bounds[k] = low.h - ROUNDING
+        least = size if k == 0 or less(size, least).h < 0.0 else least
+        lowest = low if k == 0 or less(low, lowest).h < 0.0 else lowest
+    n = retain_below(candidates, n, least.h + ROUNDING)
+    error = less(least, lowest).h + ROUNDING
+    return _rounded(least, error, view.unit), n
+
+
+@called
+def _certify(
+    view: View, q: Point3, n: int, is_certain: bool, room: PointRoom, start: FloatArray, foot: FloatArray
+) -> bool:
+    """Write the nearest point to foot (d,) if the first n candidates prove it (see the module), and return whether they
+    do; the candidate of the least face moves to row 0. start: the point (3,). is_certain: all name one feature, and it
+    is the nearest of each."""
+    pairs, best, faces = room.candidates.pairs, 0, view.mesh.faces
+    here = named(view, pairs[0, 0], pairs[0, 2])
+    none = Wide(0.0, 0.0)
+    origin = Wide3(none, none, none)
+    spot = Facet(origin, origin, origin)
+    p, _, inside, steepness = ends_of(_seen_from(view, pairs[0, 0], q), spot, pairs[0, 2], 0)
+    error = CERTAIN * steepness + 2.0**-92
+    way = less3(origin, p)
+    size = way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h
+    if not (inside > CERTAIN and size > 2.0**-300):
+        return False
+    for k in range(n):
+        if not is_certain:
+            if named(view, pairs[k, 0], pairs[k, 2]) != here:
+                return False
+            t = _seen_from(view, pairs[k, 0], q)
+            if not are_strictly_beyond(view, pairs[k, 0], here, t, way, p, CERTAIN + 16.0 * error):
+                return False
+        best = k if faces[pairs[k, 0]] < faces[pairs[best, 0]] else best
+    pairs[0, 0], pairs[0, 2] = pairs[best, 0], pairs[best, 2]
+    return write_offset_point(view, here, p, way, 0.0, start, room.origin, error, foot)
+
+
+@called
+def _decide(
+    mesh: MeshArrays, start: FloatArray, unit: float, n: int, goal: Goal, room: PointRoom, foot: FloatArray
+) -> tuple[float, int, bool]:
+    """Return (distance, n, is_named): the nearest double, -1.0 if unproven (with a limit: 0.0 within it, infinity
+    beyond), the number of candidates left, and whether row 0 and `foot` name the nearest point. start: the point (3,);
+    unit: power of two that brings all coordinates below 1."""
+    candidates, q = room.candidates, as_point3(start, 0)
+    pairs = candidates.pairs
+    scaled_q = Point3(q.x * unit, q.y * unit, q.z * unit)
+    most, largest, on, is_unsure = goal.most * unit, 0.0, -1, False
+    for k in range(n):
+        t = triangle_of(mesh, pairs[k, 0])
+        t = relative_to(scaled_q, Facet(
+            Point3(t.p.x * unit, t.p.y * unit, t.p.z * unit), Point3(t.q.x * unit, t.q.y * unit, t.q.z * unit),
+            Point3(t.r.x * unit, t.r.y * unit, t.r.z * unit),
+        ))  # fmt: skip
+        low, high, code, is_certain = _measure(t)
+        if low <= 0.0:
+            under = _feature_under(mesh, pairs[k, 0], q)
+            is_unsure = is_unsure or under == _UNSURE
+            if under >= 0:
+                if on < 0 or mesh.faces[pairs[k, 0]] < mesh.faces[pairs[on, 0]]:
+                    on = k
+                code = under
+        candidates.bounds[k], pairs[k, 1], pairs[k, 2], most = low, int(is_certain), code, min(most, high)
+    if on >= 0 and not is_unsure:
+        pairs[0, 0], pairs[0, 2] = pairs[on, 0], pairs[on, 2]
+        for k in range(foot.shape[0]):
+            foot[k] = start[0, k]
+        return 0.0, 1, True
+    n = retain_below(candidates, n, most)
+    if is_unsure or n == 0:
+        return (np.inf if n == 0 and goal.limit < np.inf else -1.0), n, False
+    if goal.limit < np.inf:
+        if most < goal.enough * unit:
+            return 0.0, n, False
+        if goal.limit == 0.0:
+            return np.inf, n, False
+    view, is_certain = View(mesh, as_placement(STILL, 0, Point3(0.0, 0.0, 0.0), 0.0), 1.0), True
+    here = named(view, pairs[0, 0], pairs[0, 2])
+    for k in range(n):
+        t = triangle_of(mesh, pairs[k, 0])
+        for turn in range(3):
+            p = corner(t, turn)
+            largest = max(largest, abs(p.x - q.x), abs(p.y - q.y), abs(p.z - q.z))
+        is_certain = is_certain and pairs[k, 1] == 1 and named(view, pairs[k, 0], pairs[k, 2]) == here
+    view = View(mesh, view.place, math.ldexp(1.0, _power(largest)))
+    if is_certain:
+        distance, error = _distance_to(_seen_from(view, pairs[0, 0], q), pairs[0, 2])
+        value = _rounded(distance, error, view.unit)
+    else:
+        value, n = _refine(view, q, n, candidates)
+    if goal.limit < np.inf:
+        if value < 0.0 or value == goal.limit:
+            return -1.0, n, False
+        return (0.0 if value < goal.limit else np.inf), n, False
+    is_named = goal.is_named and value >= 0.0 and _certify(view, q, n, is_certain, room, start[0], foot)
+    return value, n, is_named
+
+
+@inline
+def _power(size: float) -> int:
+    """Return the power of two that brings a number below 1, between -1000 and 1000."""
+    return -min(max(math.frexp(size)[1], -1000), 1000)
+
+
+@kernel
+def find_nearest_on_mesh(
+    mesh: MeshArrays, points: FloatArray, span: tuple[int, int], goal: Goal, answers: FloatArray, codes: IntArray,
+    feet: FloatArray, room: PointRoom, flag: FlagArray,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Fill the NaN entries of answers (n,) for points (n, 3) span[0] .. span[1] - 1: the double nearest to the distance
+    from the triangles of a mesh, or with a limit 0.0 within it, infinity beyond. If the goal says so, also codes
+    (n, 2), triangle and feature code (`near_triangles.py`), and feet (n, d), the nearest doubles to the nearest point.
+
+    Returns (item, outcome, n): the first point left open, the outcome of its search, and the number of candidates; item
+    span[1] if none is left."""
+    o = mesh.origin
+    for item in range(span[0], span[1]):
+        if answers[item] == answers[item]:
+            continue
+        q = as_point3(points, item)
+        size = 4.0 * (mesh.extent.reach + largest_of(q))
+        if not size < _LARGEST:
+            return item, BEYOND, 0
+        unit = math.ldexp(1.0, _power(size))
+        at = Point3((q.x - o[0]) / mesh.scale, (q.y - o[1]) / mesh.scale, (q.z - o[2]) / mesh.scale)
+        reach = largest_of(at) + 2.0
+        if not reach < _FARTHEST:
+            return item, FAR, 0
+        most, enough = goal.most / mesh.scale * _ABOVE_ONE, goal.enough / mesh.scale / _ABOVE_ONE
+        how, n = _search(mesh, at, reach, most, enough if goal.enough > 0.0 else -1.0, room, flag)
+        if how == CLOSER:
+            answers[item] = 0.0
+            continue
+        if how != DONE:
+            return item, how, n
+        foot = feet[item] if goal.is_named else room.origin[:0]
+        value, n, is_named = _decide(mesh, points[item : item + 1], unit, n, goal, room, foot)
+        if value < 0.0 or (goal.is_named and not is_named):
+            return item, DONE, n
+        answers[item] = value
+        if goal.is_named:
+            codes[item, 0], codes[item, 1] = room.candidates.pairs[0, 0], room.candidates.pairs[0, 2]
+    return span[1], DONE, 0

@@ -1,0 +1,84 @@
+"""Bounds on the distances of one point from eight boxes of a tree, and from eight triangles of a block.
+
+The point is given in tree coordinates (`bvh.py`); S >= 2 bounds its coordinates and those of the tree, u = 2^-24.
+
+**Boxes.** The point is rounded (u S), subtracted from a centre (2 u S) and compared with a half width plus `margin`
+(u S more): `margin` = 2^-21 S is greater. What is left out of the sum of squares exceeds its rounding.
+
+**Triangles.** A corner is rounded (u S), so is the point (u S), so is their difference (2 u S): 4 u S a coordinate, 7 u
+S in length. A point of an edge or of the triangle is a combination of the rounded corners with weights in [0, 1] that
+sum up to at most 1, whose three products and sums round by less than 9 u S a coordinate, 16 u S in length; its length
+takes 6 u S more. So the triangle has a point within `slack` = 64 u S of that length. For every direction p, however it
+was found, all corners c have c . p / |p| >= their least, computed within 7 u S + 8 u S: the slab bounds the distance of
+the triangle from below, and from a point that is nearly the nearest the two bounds nearly meet. What is no number,
+where p is too short to have a direction, bounds by 0. What underflows is far below u.
+
+Source: C. Ericson, Real-Time Collision Detection, 2005, 5.1.5 (the closest point of a triangle).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from engine.lanes.boxes import BOX_ROWS
+from engine.lanes.faces import CORNER_ROWS
+from engine.lanes.lanes import bits_of, dot, greater, lesser, load, root, select, store
+from engine.lanes.tracing import Lanes, Number, Rows, traced
+
+MARGIN: Final = 2.0**-21
+SLACK: Final = 2.0**-18
+"""Over S: `margin` of boxes and `slack` of triangles."""
+BOUND_ROWS: Final = 2
+"""Rows of the work space: a lower and an upper bound."""
+_BELOW_ONE: Final = 1.0 - 2.0**-20
+
+
+@traced
+def boxes_within(
+    boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, most: Number, work: Rows
+) -> int:
+    """Return the mask of a node's children whose boxes may be within a distance of a point; write lower bounds on their
+    squared distances to row 0 of work. most: the square of that distance."""
+    box = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
+    gaps = [greater(abs(box[k] - at) - (box[3 + k] + margin), 0.0) for k, at in enumerate((x, y, z))]
+    square = dot(gaps, gaps) * _BELOW_ONE
+    store(work, 0, square)
+    return bits_of(~(square > most))
+
+
+def _nearest_of_edge(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
+    """Return the point of the edge a b that is nearest to the origin."""
+    u = [b[k] - a[k] for k in range(3)]
+    t = lesser(greater(-dot(a, u) / dot(u, u), 0.0), 1.0)  # of an edge without length: 0
+    return [a[k] + t * u[k] for k in range(3)]
+
+
+@traced
+def triangle_bounds(blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, work: Rows) -> None:
+    """Write lower bounds on the distances of a point from the eight triangles of a block to row 0 of work, and upper
+    bounds to row 1; what it writes for unused lanes means nothing."""
+    a, b, c = (
+        [load(blocks, CORNER_ROWS * node + 3 * corner + k) - at for k, at in enumerate((x, y, z))]
+        for corner in range(3)
+    )
+    nearest = _nearest_of_edge(a, b)
+    square = dot(nearest, nearest)
+    for start, end in ((b, c), (c, a)):
+        other = _nearest_of_edge(start, end)
+        other_square = dot(other, other)
+        is_nearer = other_square < square
+        nearest = [select(is_nearer, other[k], nearest[k]) for k in range(3)]
+        square = select(is_nearer, other_square, square)
+    u, v = [b[k] - a[k] for k in range(3)], [c[k] - a[k] for k in range(3)]
+    uu, uv, vv, au, av = dot(u, u), dot(u, v), dot(v, v), dot(a, u), dot(a, v)
+    size = uu * vv - uv * uv
+    s, t = (uv * av - vv * au) / size, (uv * au - uu * av) / size
+    foot = [a[k] + s * u[k] + t * v[k] for k in range(3)]
+    foot_square = dot(foot, foot)
+    is_nearer = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0) & (foot_square < square)
+    p = [select(is_nearer, foot[k], nearest[k]) for k in range(3)]
+    length = root(select(is_nearer, foot_square, square))
+    least = lesser(dot(p, a), lesser(dot(p, b), dot(p, c))) / length
+    store(work, 0, greater(least - slack, 0.0))
+    store(work, 1, length + slack)
