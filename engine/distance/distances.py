@@ -11,6 +11,7 @@ import numpy as np
 
 from engine.collision.collide import posed
 from engine.collision.result import Feature
+from engine.containment.locate import SMALL_BATCH, locate_small_batch
 from engine.containment.locators import Locator
 from engine.containment.posed_locators import posed_locator
 from engine.distance.clearance import checked_distance
@@ -24,11 +25,11 @@ from engine.distance.point_measures import (
     TriangleMeasure,
 )  # fmt: skip
 from engine.errors import EmptyGeometryError, InvalidOperationError
-from engine.running.budget import Budget, Cancel, reading
-from engine.running.parallel import Progress, check_options, run_chunks
+from engine.running.budget import UNLIMITED, Budget, Cancel, reading
+from engine.running.parallel import Progress, check_options, is_unlimited, run_chunks
 from engine.solids.accepted import LinesLike, PointsLike, PoseLike, SolidLike
 from engine.solids.base import Solid
-from engine.solids.checks import as_points, shown
+from engine.solids.checks import as_points, is_ready, shown
 from engine.solids.columns import Columns
 from engine.solids.geometries import geometry_of, lines_in
 from engine.solids.pose import Pose
@@ -38,6 +39,8 @@ from engine.solids.shapes import as_solid
 from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, read_only
 
 _TO: Final = ("solid", "boundary")
+_NO_FEET: Final = np.empty((0, 3))
+_NO_CODES: Final = np.empty((0, 2), np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -250,6 +253,10 @@ def distances(
     >>> distances([[3, 1, 1], [5, 6, 1]], box, within=1).tolist()
     [True, False]
     """
+    if pose is None and report is False and nearest is False and is_unlimited(workers, deadline, cancel, progress):
+        few = _few(points, solid, to, signed, within)
+        if few is not None:
+            return few
     check_options(workers, progress, report=report, signed=signed, nearest=nearest)
     if not isinstance(to, str) or to not in _TO:
         raise InvalidOperationError(f"to must be solid or boundary, got {shown(to)}", ("to",))
@@ -277,6 +284,36 @@ def distances(
     return answer, Accuracy(
         "exact", None if within is not None else 0.5, len(array), query.n_exact, query.n_exact, body.type
     )
+
+
+def _few(points: Any, solid: Any, to: Any, signed: Any, within: Any) -> FloatArray | BoolArray | None:
+    """Return the answer for few points and a solid whose measure is there, without a budget and chunks; None where the
+    general path has to answer."""
+    measure = solid.cached("measure") if isinstance(solid, Solid) else None
+    if measure is None or not (signed is False or signed is True) or not isinstance(to, str) or to not in _TO:
+        return None
+    if within is not None and (signed or type(within) is not float or not 0.0 <= within < np.inf):
+        return None
+    array: Any = points if is_ready(points, solid.dimension) else as_points(points, solid.dimension)
+    n, locations = len(array), None
+    if not 0 < n <= SMALL_BATCH:
+        return None
+    distance = np.empty(n)
+    distance.fill(np.nan)
+    if (signed or to == "solid") and has_inside(solid):
+        located = locate_small_batch(array, solid)
+        if located is None:
+            return None
+        locations = located[0]
+        distance[locations == 0 if signed else locations >= 0] = 0.0
+    elif signed:
+        return None
+    measure.fill(array, 0, n, Answers(distance, _NO_FEET, _NO_CODES), within, UNLIMITED)
+    if within is not None:
+        return distance == 0.0
+    if signed and locations is not None:
+        distance[locations > 0] *= -1.0
+    return distance
 
 
 def _lines_or_solid(value: Any) -> Any:

@@ -26,6 +26,7 @@ from engine.errors import EmptyGeometryError, NotRepresentableError
 from engine.predicates.rational import dot, nearest_with_root
 from engine.running.budget import Budget
 from engine.solids.base import Preparing, Solid
+from engine.solids.checks import check_finite
 from engine.solids.mesh import Mesh
 from engine.solids.pose import Pose
 from engine.solids.primitives import Convex, HalfSpace, Sphere, Triangle
@@ -49,7 +50,7 @@ class Answers(NamedTuple):
     @property
     def is_named(self) -> bool:
         """Whether the nearest points are wanted."""
-        return len(self.feet) == len(self.distance)
+        return len(self.feet) > 0
 
 
 class Measure(Protocol):
@@ -94,6 +95,9 @@ def _spread(solid: Any) -> MeshBody:
     return spread_of(solid)
 
 
+_ANY: Final = Goal(np.inf, -1.0, np.inf, False)
+_NAMED: Final = Goal(np.inf, -1.0, np.inf, True)
+
 _rooms = threading.local()
 
 
@@ -131,7 +135,7 @@ class TriangleMeasure:
     ) -> int:  # fmt: skip
         """Do so for the points number span[0] .. span[1] - 1 of `placed`, which holds those from number `shift` on, in
         space."""
-        goal = Goal(np.inf, -1.0, np.inf, answers.is_named)
+        goal = _NAMED if answers.is_named else _ANY
         if limit is not None:
             goal = Goal(limit * (1.0 + 2.0**-50) + 5e-324, limit * (1.0 - 2.0**-50), limit, False)
         rows = [array[shift:] if goal.is_named else array for array in (answers.codes, answers.feet)]
@@ -147,6 +151,7 @@ class TriangleMeasure:
                 self._by_integers(points, shift + item, room.candidates.pairs[:n], answers, limit, budget)
                 n_exact += 1
             elif how in (FAR, BEYOND):
+                check_finite(points, ("points",))
                 n_exact += self._by_pair(points, shift + item, answers, limit, budget)
             else:
                 room = new_point_room(2 * len(room.candidates.bounds))
@@ -277,6 +282,8 @@ class _ByFormula:
                 entry_of(kernel)(points, (start, stop), *numbers, most, answers.distance, budget.flag)
                 budget.check()
         left = (start + np.flatnonzero(np.isnan(answers.distance[start:stop]))).tolist()
+        if left:
+            check_finite(points, ("points",))
         for item in left:
             budget.check()
             value, foot, plane = self.measured([Fraction(x) for x in points[item].tolist()])

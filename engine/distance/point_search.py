@@ -507,7 +507,7 @@ def find_nearest_on_mesh(
             continue
         q = as_point3(points, item)
         size = 4.0 * (mesh.extent.reach + largest_of(q))
-        if not size < _LARGEST:
+        if not (size < _LARGEST and 0.0 * (q.x + q.y + q.z) == 0.0):  # NaN is lost in `largest_of`
             return item, BEYOND, 0
         unit = math.ldexp(1.0, _power(size))
         at = Point3((q.x - o[0]) / mesh.scale, (q.y - o[1]) / mesh.scale, (q.z - o[2]) / mesh.scale)
