@@ -48,6 +48,7 @@ from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of soli
 from engine.running.budget import Cancel
 from engine.running.parallel import default_workers
 from engine.scenes.collide_scene import ScenePairs, collide_scene
+from engine.scenes.distances import SceneDistances
 from engine.scenes.ends import ScenePieces
 from engine.scenes.locate import SceneLocations
 from engine.scenes.locate_scene import locate_scene
@@ -79,8 +80,8 @@ __all__ = [
     "Location", "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
     "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece", "PointsLike", "Polygon", "PolygonStatus", "Polyhedron",
     "Pose", "PoseLike", "Poses", "Rcc8", "Relation", "RepeatedIndexError", "RingTooShortError", "Scene",
-    "SceneLocations", "ScenePairs", "ScenePieces", "SegmentPieces", "Solid", "SolidLike", "Sphere", "Surface",
-    "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
+    "SceneDistances", "SceneLocations", "ScenePairs", "ScenePieces", "SegmentPieces", "Solid", "SolidLike", "Sphere",
+    "Surface", "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness",
     "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
     "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
     "contains", "default_workers", "distances", "filled", "inspect", "layers", "locate", "locate_scene", "overlay",

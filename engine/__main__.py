@@ -1,5 +1,5 @@
-"""The command line ``python -m engine contains | collide | clearance | clip | bounds | overlay | union | join``:
-for files; the last three are for layers.
+"""The command line ``python -m engine contains | collide | clearance | distances | clip | bounds | overlay | union |
+join`` for files; the last three are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
 ``python -m engine audit`` compares other packages with the exact answers on your data.
@@ -33,6 +33,7 @@ from engine.collision.collide_poses import collide_poses
 from engine.compiling.kernel_cache import cache_folder, check_owner, seal, seed
 from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
+from engine.distance.distances import Distances, distances
 from engine.errors import EngineError, InvalidInputError
 from engine.files.octets import in_words
 from engine.files.solids import read_features, read_rows, read_solid, read_solids, write_geojson, write_table
@@ -115,6 +116,21 @@ def _clearance(options: Options) -> None:
     with _bar(len(pair[2]), "poses", options) as progress:
         answer: Any = clearance_poses(*pair, at_least=options.at_least, progress=progress, deadline=options.deadline)
     write_table(options.output, {"distance" if options.at_least is None else "clear": answer})
+
+
+def _distances(options: Options) -> None:
+    solid = read_solid(options.solid, _note(options))
+    points = read_rows(options.points, (solid.dimension,))
+    asked: Any = {"to": "boundary" if options.boundary else "solid", "signed": options.signed, "within": options.within}
+    with _bar(len(points), "points", options) as progress:
+        answer: Any = distances(
+            points, solid, **asked, nearest=options.nearest, progress=progress, deadline=options.deadline
+        )
+    if isinstance(answer, Distances):
+        names = ("distance", "point", "face", "kind", "index")
+        write_table(options.output, {name: getattr(answer, name) for name in names})
+    else:
+        write_table(options.output, {"distance" if options.within is None else "within": answer})
 
 
 def _clip(options: Options) -> None:
@@ -271,6 +287,8 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
                  SOLID | {"points": ROWS + "2 or 3 coordinates"}),
     "collide": (_collide, "decide how two solids relate, for one or many poses of the second", PAIR),
     "clearance": (_clearance, "compute the distance of two solids, for one or many poses of the second", PAIR),
+    "distances": (_distances, "compute how far points are from a solid",
+                  SOLID | {"points": ROWS + "2 or 3 coordinates"}),
     "clip": (_clip, "clip segments to a solid, or polygons to a convex one",
              {"region": FORMATS, "items": ROWS + "two positions; with --polygons a .geojson file"}),
     "overlay": (_overlay, "Boolean operation on two layers, every feature with every one that it meets",
@@ -304,6 +322,10 @@ def _parser() -> argparse.ArgumentParser:
     made["clearance"].add_argument(
         "--at-least", type=float, metavar="DISTANCE", help="decide only: at least so far apart?"
     )
+    made["distances"].add_argument("--boundary", action="store_true", help="from the boundary, inside too")
+    made["distances"].add_argument("--signed", action="store_true", help="from the boundary, negative inside")
+    made["distances"].add_argument("--within", type=float, metavar="DISTANCE", help="decide only: at most so far away?")
+    made["distances"].add_argument("--nearest", action="store_true", help="the nearest points too, and their faces")
     made["clip"].add_argument("--polygons", action="store_true", help="clip polygons of .geojson (Sutherland-Hodgman)")
     made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
     made["union"].add_argument("--by", nargs="+", metavar="NAME", help="unite features that agree in these properties")

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import dask.config
 import numpy as np
@@ -24,6 +24,7 @@ from distributed import Client, Future, as_completed
 from engine.collision import collide_poses as poses
 from engine.containment import locate as containment
 from engine.distance import clearance as clearances
+from engine.distance import distances as point_distances
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
@@ -73,6 +74,18 @@ def clearance_poses(
     function = partial(_about_solids, clearances.clearance_poses, at_least=least)
     answers = _answers(client, function, (first, second), (turns, moves), part, progress)
     return _filled(np.float64 if least is None else np.bool_, answers, len(turns))
+
+
+def distances(
+    client: Client, points: object, solid: Solid, *, to: Literal["solid", "boundary"] = "solid", signed: bool = False,
+    within: float | None = None, part: int = 100_000, progress: Progress | None = None,
+) -> FloatArray | BoolArray:  # fmt: skip
+    """Say how far points are from a solid, or whether within a distance, see `engine.distances`."""
+    rows = as_points(points, solid.dimension)
+    options: Any = {"to": to, "signed": signed, "within": within}
+    none: Any = point_distances.distances(rows[:0], solid, **options)  # checks the options here, not on a worker
+    function = partial(_about_rows, point_distances.distances, **options)
+    return _filled(none.dtype, _answers(client, function, (solid,), (rows,), part, progress), len(rows))
 
 
 def clip_segments(

@@ -23,6 +23,7 @@ from engine.containment.locate import locate
 from engine.containment.methods.rational_locate import rational_location
 from engine.containment.posed_locators import posed_locator
 from engine.distance.clearance import clearance
+from engine.distance.distances import distances
 from engine.errors import InvalidInputError
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.planes import orientations
@@ -265,6 +266,11 @@ def _warm_overlay_rest() -> None:
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")
 
 
+def _warm_distances() -> None:
+    for solid in (_cube(), Sphere([0, 0, 0], 1), HalfSpace([1, 0, 0], -9)):
+        distances([[3.0, 0.25, 0.5]], solid)
+
+
 def _warm_bounds() -> None:
     for dimension in (2, 3):
         for solid in _regions(dimension):
@@ -285,14 +291,15 @@ STEPS = (
     _warm_clipping_3d,
     _warm_scenes,
     _warm_bounds,
+    _warm_distances,
     _warm_containment,
     _warm_overlay_rest,
     _warm_cells,
 )
 """Parts of the work, long ones first; a kernel that several need is compiled by the first, or in several processes."""
-SHARES = (19, 15, 14, 13, 8, 10, 10, 4, 3, 3, 1)
+SHARES = (19, 15, 14, 13, 8, 10, 9, 3, 3, 2, 3, 1)
 """Duration of each of `STEPS`, in per cent."""
-GROUPS = ((1, 4, 6, 2, 7, 8, 10), (0, 3, 5, 9))
+GROUPS = ((1, 4, 6, 2, 7, 8, 9, 11), (0, 3, 5, 10))
 """Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
 decides symbols and inlining. What both compile is that of the first."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)
@@ -304,6 +311,7 @@ OPERATIONS = {
     "collide_poses": (_warm_poses, _warm_collision),
     "collide_scene": (_warm_collision, _warm_scenes),
     "clearance": (_warm_scenes, _warm_bounds),
+    "distances": (_warm_distances,),
     "clip_segments": _CLIPPING,
     "clip_lines": _CLIPPING,
     "clip_polygons": _CLIPPING,

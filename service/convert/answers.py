@@ -32,6 +32,9 @@ from service.schemas.points import (
     CompareResponse,
     ContainsResponse,
     ContainsSceneResponse,
+    DistancesResponse,
+    NearestFeature,
+    SceneDistancesResponse,
     SphereBounds,
 )
 from service.schemas.solids import InspectResponse, MeshAdvice, StoredSolidSummary
@@ -266,6 +269,35 @@ def _clearance(clearance: engine.Clearance) -> ClearanceAnswer:
         ClearanceFeature.made(kind=feature.kind, indices=list(feature.indices)) for feature in clearance.features
     ]
     return ClearanceAnswer.made(distance=clearance.distance, points=clearance.points, features=features)
+
+
+def from_distances(measured: Any, accuracy: engine.Accuracy) -> DistancesResponse:
+    """Return the answer of `distances`: numbers, bools, or `engine.Distances`."""
+    if not isinstance(measured, engine.Distances):
+        name = "within" if measured.dtype == np.bool_ else "distances"
+        return DistancesResponse.made(**{name: measured}, accuracy=from_accuracy(accuracy))
+
+    def features(start: int, stop: int) -> list[Any]:
+        some = [measured.feature(item) for item in range(start, stop)]
+        return [
+            NearestFeature.made(kind=each.kind if each else "inside", indices=list(each.indices) if each else [])
+            for each in some
+        ]
+
+    return DistancesResponse.made(
+        distances=measured.distance,
+        nearest=measured.point,
+        faces=measured.face,
+        features=Series(len(measured), features, weight=2),
+        accuracy=from_accuracy(accuracy),
+    )
+
+
+def from_scene_distances(measured: Any, accuracy: engine.Accuracy) -> SceneDistancesResponse:
+    """Return the answer of `scenes/{id}/distances`."""
+    return SceneDistancesResponse.made(
+        distances=measured.distance, bodies=measured.body, nearest=measured.point, accuracy=from_accuracy(accuracy)
+    )
 
 
 def from_scene_pairs(pairs: engine.ScenePairs, accuracy: engine.Accuracy) -> CollideSceneResponse:

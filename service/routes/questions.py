@@ -43,6 +43,8 @@ from service.schemas.points import (
     ContainsResponse,
     ContainsSceneRequest,
     ContainsSceneResponse,
+    DistancesRequest,
+    DistancesResponse,
 )
 from service.work import CallOf
 
@@ -128,6 +130,19 @@ def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
             result, accuracy = call.compute(engine.clearance, first, second, second_pose=pose)
             result = [result]
     return answers.from_clearances(result, accuracy, question.at_least is not None)
+
+
+@router.post("/v1/distances", operation_id="distances", tags=["clearance"])
+def distances(question: DistancesRequest, call: CallOf) -> DistancesResponse:
+    """Tell for each point how far it is from the solid, with a sign if wanted; whether at most a distance; or the
+    nearest points too."""
+    solid = questions.to_solid(question.solid, call, ("solid",))
+    points = questions.to_items(question.points, solid.dimension, call)
+    options: dict[str, Any] = {"to": question.to or "solid", "within": question.within}
+    options |= {"signed": bool(question.signed), "nearest": bool(question.nearest)}
+    if question.pose is not None:
+        options["pose"] = questions.to_pose(question.pose, solid.dimension)
+    return answers.from_distances(*call.compute(engine.distances, points, solid, **options))
 
 
 @router.post("/v1/clip/segments", operation_id="clip_segments", tags=["clipping"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
+import numpy as np
 from fastapi import Body, Path, Query
 from pydantic import WithJsonSchema
 from starlette.responses import Response
@@ -26,7 +27,7 @@ from service.schemas.bodies import (
     StoredSceneSummary,
 )
 from service.schemas.geojson import ALSO
-from service.schemas.points import ContainsSceneResponse
+from service.schemas.points import ContainsSceneResponse, SceneDistancesResponse
 from service.schemas.solids import InspectRequest, InspectResponse, Solid, StoredSolidSummary
 from service.store import Stored
 from service.work import Call, CallOf
@@ -46,6 +47,11 @@ WeldQuery = Annotated[
     ),
 ]
 MendQuery = Annotated[bool, Query(description="For a file: as the field of this name in JSON.")]
+ToQuery = Annotated[Literal["solid", "boundary"], Query(description="solid: points in it are 0 away.")]
+SignedQuery = Annotated[bool, Query(description="From the boundary, negative inside.")]
+WithinQuery = Annotated[
+    float, Query(description="A distance to compare with, decided exactly.", json_schema_extra={"format": "double"})
+]
 Id = Annotated[str, Path(description="Name of a stored solid, from `POST /v1/solids`.")]
 
 
@@ -178,6 +184,23 @@ def contains_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
 
 
 @binary.post(
+    "/v1/solids/{solid_id}/distances",
+    operation_id="distances_stored",
+    response_class=octets.Response,
+    responses=answers_with("N float64: the distances. With `within` N int8: 1 for at most that distance, else 0."),
+)
+def distances_stored(
+    solid_id: Id, question: Octets, call: CallOf, to: ToQuery = "solid", signed: SignedQuery = False,
+    within: WithinQuery = _LEFT_OUT,
+) -> Any:  # fmt: skip
+    """Tell how far points, N x dimension little-endian float64, are from a stored solid."""
+    solid = call.store.get(solid_id)
+    points = octets.to_rows(question, (solid.dimension,))
+    result, accuracy = call.compute(engine.distances, points, solid, to=to, signed=signed, within=within)
+    return octets.answer(call, result if within is None else result.astype(np.int8), accuracy)
+
+
+@binary.post(
     "/v1/solids/{solid_id}/clip/segments",
     operation_id="clip_segments_stored",
     response_class=octets.Response,
@@ -251,6 +274,14 @@ def contains_stored_scene(scene_id: SceneId, question: SceneContainsRequest, cal
     return answers.from_scene_locations(*call.compute(scene.locate, points))
 
 
+@router.post("/v1/scenes/{scene_id}/distances", operation_id="distances_stored_scene", tags=["scenes"])
+def distances_stored_scene(scene_id: SceneId, question: SceneContainsRequest, call: CallOf) -> SceneDistancesResponse:
+    """Tell for each point the nearest body of a stored scene, how far it is, and the nearest point of it."""
+    scene = questions.to_moved(call.store.get_scene(scene_id), question.moved, call)
+    points = questions.to_items(question.points, scene.solids[0].dimension, call)
+    return answers.from_scene_distances(*call.compute(scene.distances, points))
+
+
 @router.post("/v1/scenes/{scene_id}/collide", operation_id="collide_stored_scene", tags=["scenes"])
 def collide_stored_scene(scene_id: SceneId, question: SceneCollideRequest, call: CallOf) -> CollideSceneResponse:
     """List the pairs of bodies of a stored scene with a common point, and how each lies to the other."""
@@ -288,6 +319,20 @@ def contains_stored_scene_binary(scene_id: SceneId, question: Octets, call: Call
     points = octets.to_rows(question, (scene.solids[0].dimension,))
     result, accuracy = call.compute(scene.locate, points)
     return octets.answer(call, octets.from_locations(result, call), accuracy)
+
+
+@scene_binary.post(
+    "/v1/scenes/{scene_id}/binary/distances",
+    operation_id="distances_stored_scene_binary",
+    response_class=octets.Response,
+    responses=answers_with("Rows of 2 + dimension float64: the distance, the nearest body, its nearest point."),
+)
+def distances_stored_scene_binary(scene_id: SceneId, question: Octets, call: CallOf, moved: MovedText = "[]") -> Any:
+    """Tell for each point, N x dimension little-endian float64, the nearest body of a stored scene."""
+    scene = questions.to_moved(call.store.get_scene(scene_id), questions.read_moved(moved, call), call)
+    points = octets.to_rows(question, (scene.solids[0].dimension,))
+    result, accuracy = call.compute(scene.distances, points)
+    return octets.answer(call, np.column_stack([result.distance, result.body, result.point]), accuracy)
 
 
 @scene_binary.post(

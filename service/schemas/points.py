@@ -7,8 +7,23 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
-from service.schemas.base import Accuracy, AtMost, Schema, optional, with_example
-from service.schemas.solids import Body, Booleans, IndexLists, Indices, Number, Points, Position, Segments, Solid
+from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
+from service.schemas.solids import (
+    Body,
+    Booleans,
+    IndexLists,
+    Indices,
+    Number,
+    Points,
+    Position,
+    RigidPose,
+    Segments,
+    Solid,
+)
+
+Doubles = Annotated[Array, Numbers(Axis(0, None))]
+Positions = Annotated[Array, Numbers(Axis(0, None), DIMENSION)]
+Integers = Annotated[Array, Numbers(Axis(0, None), kind="integer")]
 
 
 class ContainsRequest(Schema):
@@ -62,6 +77,58 @@ class ContainsSceneResponse(Schema):
 
     bodies: IndexLists = Field(description="For each point the indices of the bodies that hold it, ascending.")
     boundary: IndexLists = Field(description="For each point those of them on whose boundary it lies.")
+    accuracy: Accuracy
+
+
+class DistancesRequest(Schema):
+    """How far are these points from this solid?"""
+
+    model_config = with_example(
+        {
+            "solid": {"type": "aabb", "min": [0, 0, 0], "max": [2, 2, 2]},
+            "points": [[3, 1, 1], [1, 1, 0.5], [5, 6, 1]],
+            "signed": True,
+        },
+        {"solid": {"type": "sphere", "center": [0, 0], "radius": 5}, "points": [[3, 4], [6, 8]], "within": 5},
+    )
+
+    solid: Solid = Field(description="Neither implicit nor csg; a triangle of space is flat here.")
+    points: Points = Field(description="Positions of the solid's dimension, or GeoJSON of points.")
+    pose: RigidPose = optional("Where the solid is; where its coordinates have it, unless given.")
+    to: Literal["solid", "boundary"] = optional("solid, unless given: points in it are 0 away.")
+    signed: bool = optional("Distances from the boundary, negative inside.")
+    within: Annotated[float, Numbers(minimum=0)] = optional(
+        "A distance: the answer is then for each point whether it is at most so far away, decided exactly."
+    )
+    nearest: bool = optional("Also the nearest points, and what of the solid they lie on.")
+
+
+class NearestFeature(Schema):
+    """What of a solid a nearest point lies on."""
+
+    kind: Literal["vertex", "edge", "face", "ball", "plane", "inside"] = Field(
+        description="inside: the point itself lies in the solid."
+    )
+    indices: list[Count] = Field(description="Of a vertex, an edge's two, a face or a plane; else none.")
+
+
+class DistancesResponse(Schema):
+    """One answer for each point."""
+
+    distances: Doubles = optional("Without `within`: each the nearest double.")
+    within: Booleans = optional("With `within`.")
+    nearest: Positions = optional("With `nearest`: the nearest point of the solid, each coordinate the nearest double.")
+    faces: Integers = optional("With `nearest`: the face it is on, of several the least; -1 for none.")
+    features: list[NearestFeature] = optional("With `nearest`: what of the solid it is.")
+    accuracy: Accuracy
+
+
+class SceneDistancesResponse(Schema):
+    """Of each point the nearest body."""
+
+    distances: Doubles = Field(description="From the nearest body, each the nearest double; 0 within it.")
+    bodies: Indices = Field(description="That body; of several at one double the first.")
+    nearest: Positions = Field(description="The nearest point of it.")
     accuracy: Accuracy
 
 
