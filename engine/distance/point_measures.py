@@ -24,7 +24,7 @@ from engine.distance.spreads import SpreadPair, feature_of, in_space, spread_of
 from engine.distance.traversal import BEYOND, DONE
 from engine.errors import EmptyGeometryError, NotRepresentableError
 from engine.predicates.rational import dot, nearest_with_root
-from engine.running.budget import Budget
+from engine.running.budget import Budget, poll
 from engine.solids.base import Preparing, Solid
 from engine.solids.checks import check_finite
 from engine.solids.mesh import Mesh
@@ -352,6 +352,7 @@ class PlanesMeasure(_ByFormula):
         below = [k for k, (h, _) in enumerate(heights) if h < 0]
         for n_planes in range(1, self.d + 1):
             for some in combinations(range(len(self.rows)), n_planes):
+                poll()
                 if not any(k in below for k in some):
                     continue
                 foot_ = self._foot(point, some, heights)

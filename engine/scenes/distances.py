@@ -56,7 +56,12 @@ def measure_all(
     solids, poses = placements.base.solids, placements.poses
     boxes, n = placements.boxes(budget), len(points)
     best, body = np.full(n, np.inf), np.full(n, -1)
-    rows = np.empty_like(points), np.empty(n, np.int64), np.empty(n, np.int8), np.empty((n, 2), np.int64)
+    rows: tuple[Any, ...] = (
+        np.empty_like(points),
+        np.empty(n, np.int64),
+        np.empty(n, np.int8),
+        np.empty((n, 2), np.int64),
+    )
     n_exact = [0]
 
     def task(start: int, stop: int) -> None:
@@ -68,7 +73,8 @@ def measure_all(
             answer: Distances = query.result()
             n_exact[0] += query.n_exact
             is_less = (answer.distance < best[some]) | ((answer.distance == best[some]) & (number < body[some]))
-            some, columns = some[is_less], (answer.point, answer.face, answer.kind, answer.index)
+            some = some[is_less]
+            columns: tuple[Any, ...] = answer.point, answer.face, answer.kind, answer.index
             best[some], body[some] = answer.distance[is_less], number
             for row, column in zip(rows, columns):
                 row[some] = column[is_less]

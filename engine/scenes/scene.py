@@ -12,7 +12,6 @@ from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import posed
 from engine.distance.clearance import checked_distance
 from engine.errors import (
-    EmptyGeometryError,
     EngineError,
     IndexOutOfRangeError,
     InvalidArrayError,
@@ -24,14 +23,13 @@ from engine.running.parallel import Options, Progress, check_options, is_unlimit
 from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, meets_any
 from engine.scenes.collide_scene import PairQuery, ScenePairs, collide_bodies, pair_keys
-from engine.scenes.distances import SceneDistances, measure_all
 from engine.scenes.ends import ScenePieces, merge_parts, sort_pieces
-from engine.scenes.locate import SceneLocations, locate_all
 from engine.scenes.placements import Placements
+from engine.scenes.point_queries import PointQueries
 from engine.segment_clipping.exact_pieces import ONE, ZERO
 from engine.solids.accepted import PosesLike, SolidsLike
-from engine.solids.base import Immutable, Solid, _collect_arrays
-from engine.solids.checks import as_point_groups, as_points, shown
+from engine.solids.base import Solid, _collect_arrays
+from engine.solids.checks import as_point_groups, shown
 from engine.solids.pose import Pose
 from engine.solids.poses import Poses
 from engine.solids.shapes import as_solid
@@ -41,7 +39,7 @@ _BYTES_OF_POSE: Final = 1000
 Keep = Literal["all", "first", "any"]
 
 
-class Scene(Immutable):
+class Scene(PointQueries):
     """Many bodies, queried repeatedly: which contain a point, which collide, what of a segment lies in which.
 
     Parameters
@@ -73,10 +71,9 @@ class Scene(Immutable):
     (0, 1)
     """
 
-    __slots__ = ("_placements",)
+    __slots__ = ()
 
     type: ClassVar[str] = "scene"
-    _placements: Placements
 
     def __init__(self, solids: SolidsLike, poses: PosesLike | None = None) -> None:
         bodies = Bodies(*checked_bodies(solids, poses))
@@ -151,84 +148,6 @@ class Scene(Immutable):
         scene = object.__new__(Scene)
         object.__setattr__(scene, "_placements", self._placements.after(given))
         return scene
-
-    def locate(
-        self,
-        points: object,
-        *,
-        workers: int | None = None,
-        deadline: float | None = None,
-        cancel: Cancel | None = None,
-        progress: Progress | None = None,
-        report: bool = False,
-    ) -> SceneLocations | tuple[SceneLocations, Accuracy]:
-        """Find for each point the bodies that contain it; as `locate_scene`, with what is prepared cached.
-
-        Parameters
-        ----------
-        points, workers, deadline, cancel, progress, report
-            As for `locate_scene`.
-
-        Returns
-        -------
-        SceneLocations
-            With ``report=True`` a pair of it and an `Accuracy`.
-        """
-        check_options(workers, progress, report=report)
-        array = as_points(points, self.solids[0].dimension if len(self) else None)
-        with Budget(deadline, cancel) as budget:
-            answer = locate_all(array, self._placements, budget, workers, progress)
-        return answer if report else answer[0]
-
-    def distances(
-        self,
-        points: object,
-        *,
-        workers: int | None = None,
-        deadline: float | None = None,
-        cancel: Cancel | None = None,
-        progress: Progress | None = None,
-        report: bool = False,
-    ) -> SceneDistances | tuple[SceneDistances, Accuracy]:
-        """Find for each point the nearest body, its distance, and the nearest point; as `engine.distances`.
-
-        Parameters
-        ----------
-        points, workers, deadline, cancel, progress, report
-            As for `locate_scene`.
-
-        Returns
-        -------
-        SceneDistances
-            With ``report=True`` a pair of it and an `Accuracy`.
-
-        Raises
-        ------
-        EmptyGeometryError
-            The scene has no body, or a body that counts has no point.
-        EngineError
-            As `engine.distances`.
-
-        Notes
-        -----
-        Bodies are closed sets: a point in one is 0 away. Accuracy is that of `engine.distances`. Cost: a distance from
-        the box of every body for each point, then `engine.distances` from those that may be the nearest.
-
-        Examples
-        --------
-        >>> from engine import Aabb, Scene, Sphere
-        >>> scene = Scene([Sphere([5, 0], 1), Aabb([1, -1], [2, 1])])
-        >>> near = scene.distances([[0, 0], [3.5, 0]])
-        >>> near.body.tolist(), near.distance.tolist()
-        ([1, 0], [1.0, 0.5])
-        """
-        check_options(workers, progress, report=report)
-        if not len(self):
-            raise EmptyGeometryError("a scene without bodies has no point to be near", ("bodies",))
-        array = as_points(points, self.solids[0].dimension)
-        with Budget(deadline, cancel) as budget:
-            answer = measure_all(array, self._placements, budget, workers, progress)
-        return answer if report else answer[0]
 
     def collide(
         self,

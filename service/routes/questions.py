@@ -141,7 +141,7 @@ def distances(question: DistancesRequest, call: CallOf) -> DistancesResponse:
     options: dict[str, Any] = {"to": question.to or "solid", "within": question.within}
     options |= {"signed": bool(question.signed), "nearest": bool(question.nearest)}
     if question.pose is not None:
-        options["pose"] = questions.to_pose(question.pose, solid.dimension)
+        options["pose"] = questions.to_pose(question.pose, ("pose",))
     return answers.from_distances(*call.compute(engine.distances, points, solid, **options))
 
 

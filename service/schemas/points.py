@@ -90,6 +90,13 @@ class DistancesRequest(Schema):
             "signed": True,
         },
         {"solid": {"type": "sphere", "center": [0, 0], "radius": 5}, "points": [[3, 4], [6, 8]], "within": 5},
+        {
+            "solid": {"type": "polygon", "rings": [[[0, 0], [4, 0], [4, 4]]]},
+            "points": [[9, 0]],
+            "pose": {"rotation": [[0, -1], [1, 0]], "translation": [2, 0]},
+            "to": "boundary",
+            "nearest": True,
+        },
     )
 
     solid: Solid = Field(description="Neither implicit nor csg; a triangle of space is flat here.")

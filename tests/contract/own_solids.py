@@ -86,6 +86,10 @@ def engine_questions(solid: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
         yield name, lambda name=name: getattr(engine, name)(points, solid)
         yield f"{name} report", lambda name=name: getattr(engine, name)(np.zeros((2000, d)), solid, report=True)
     yield "bounds", lambda: engine.bounds(solid)
+    for its_pose in (None, pose):
+        yield f"distances {its_pose}", lambda p=its_pose: engine.distances(points, solid, pose=p)
+    yield "distances nearest", lambda: engine.distances(points, solid, nearest=True)
+    yield "distances within", lambda: engine.distances(points, solid, within=1.0)
     yield "clip_segments", lambda: engine.clip_segments(segments, solid)
     yield "clip_lines", lambda: engine.clip_lines(segments, solid)
     yield "clip_polygons", lambda: engine.clip_polygons([SQUARE[d]], solid)
@@ -106,8 +110,8 @@ def engine_questions(solid: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
             yield f"locate_scene {at}", lambda b=bodies: engine.locate_scene(points, *b)
             yield f"locate_scene many {at}", lambda b=bodies: engine.locate_scene(np.zeros((300, d)), *b, report=True)
             yield f"collide_scene {at}", lambda b=bodies: engine.collide_scene(*b, gap=1.0)
-            for what in ("locate", "collide", "clip_segments"):
-                given = () if what == "collide" else (points,) if what == "locate" else (segments,)
+            for what in ("locate", "collide", "clip_segments", "distances"):
+                given = () if what == "collide" else (segments,) if what == "clip_segments" else (points,)
                 yield f"Scene.{what} {at}", lambda b=bodies, w=what, g=given: getattr(engine.Scene(*b), w)(*g)
                 moved = {"moved": {1: pose}}
                 yield (
@@ -133,6 +137,7 @@ def service_questions(model: dict[str, Any], d: int) -> Iterator[tuple[str, dict
     yield "contains", {"solid": model, "points": points}
     yield "contains", {"solid": {"type": "csg", "operation": "union", "operands": [model, sphere]}, "points": points}
     yield "bounds", {"solid": model}
+    yield "distances", {"solid": model, "points": points}
     yield "clip/segments", {"region": model, "segments": segments}
     yield "clip/lines", {"region": model, "lines": segments}
     yield "clip/polygons", {"region": model, "polygons": [SQUARE[d]]}

@@ -123,6 +123,7 @@ WORK: dict[str, Callable[[], Any]] = {
     "bounds": lambda: {"solid": ball(9_000)},
     "collide": lambda: {"first": TIN, "second": TIN, "poses": [POSE] * 10_000},
     "clearance": lambda: {"first": TIN, "second": TIN, "poses": [{**POSE, "translation": [0, 0.5, 3]}] * 10_000},
+    "distances": lambda: {"solid": MANY_SIDES, "points": [[5, 5]] * 100},
     "compare": lambda: {
         "operation": "clip_segments", "region": MANY_SIDES, "segments": [[[-2, 0.1], [2, 0.2]]] * 60_000
     },

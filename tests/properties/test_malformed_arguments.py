@@ -180,6 +180,8 @@ OPTIONS: dict[str, Callable[..., object]] = {
     "collide_poses": lambda **given: engine.collide_poses(BOX, BOX, [np.eye(3)], [[0, 0, 0]], **given),
     "clearance": lambda **given: engine.clearance(BOX, BOX, **given),
     "clearance_poses": lambda **given: engine.clearance_poses(BOX, BOX, [np.eye(3)], [[0, 0, 0]], **given),
+    "distances": lambda **given: engine.distances(POINT, BOX, **given),
+    "Scene.distances": lambda **given: engine.Scene([BOX]).distances(POINT, **given),
     "clip_lines": lambda **given: engine.clip_lines([], BOX, **given),
     "overlay_batch": lambda **given: engine.overlay_batch([POLYGON], [POLYGON], **given),
     "union_all": lambda **given: engine.union_all([POLYGON], **given),
@@ -196,7 +198,7 @@ OPTIONS: dict[str, Callable[..., object]] = {
 }
 
 
-FLAGS = ("report", "boolean", "witness", "witnesses", "detail", "outside")
+FLAGS = ("report", "signed", "nearest", "boolean", "witness", "witnesses", "detail", "outside")
 POSE = engine.Pose.identity(3)
 POSES: dict[str, Any] = {"rotations": [np.eye(3)], "translations": [[0, 0, 0]]}
 PAIR: dict[str, Any] = {"first": BOX, "second": POLYHEDRON}
@@ -226,6 +228,8 @@ ASKED: dict[str, dict[str, Any]] = {
     "Pose.from_matrix": {"matrix": np.eye(4), "tolerance": 1e-12, "rounded": False},
     "Scene": {"solids": [BOX], "poses": [None]},
     "Scene.moved": {"self": SCENE, "poses": {0: POSE}},
+    "Scene.distances": {"self": SCENE, "points": POINT},
+    "distances": {"points": POINT, "solid": BOX, "to": "boundary", "within": 1.0, "pose": POSE},
     "Scene.locate": {"self": SCENE, "points": POINT},
     "Scene.collide": {"self": SCENE, "moved": [1], "skip": None, "only": None, "gap": 0.5},
     "Scene.clip_segments": {"self": SCENE, "segments": SEGMENT, "keep": "all"},
