@@ -157,6 +157,9 @@ COMBS = {"bodies": [{"solid": {"type": "polygon", "rings": [comb(3_000)]}}]}
 ALONG = [[[-1, 0], [9_000, 0]]] * 20_000
 WORK |= {
     "put_scene": lambda: {"bodies": [{"solid": prism(comb(1_200))}]},
+    "distances_stored": lambda: (MANY_SIDES, np.tile([5.0, 5.0], 100).tobytes()),
+    "distances_stored_scene": lambda: ({"bodies": [{"solid": MANY_SIDES}]}, {"points": [[5, 5]] * 100}),
+    "distances_stored_scene_binary": lambda: ({"bodies": [{"solid": MANY_SIDES}]}, np.tile([5.0, 5.0], 100).tobytes()),
     "contains_stored_scene": lambda: ({"bodies": [{"solid": POLYNOMIAL}]}, {"points": [[3, 5]] * 100_000}),
     "contains_stored_scene_binary": lambda: (
         {"bodies": [{"solid": POLYNOMIAL}]}, np.tile([3.0, 5.0], 100_000).tobytes()

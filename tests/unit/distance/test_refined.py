@@ -47,7 +47,7 @@ def test_a_sure_distance_is_that_of_integers(size: float, gap: float) -> None:
             asked = Query(np.inf, -1.0, *pair._radii, pair._reach, True)
             for how, item, rows in pair._unanswered(0, n, sure, asked):
                 points = pair._room.points[:, :d].tolist()
-                least = pair._least(item, rows)[0]
+                least = pair.least(item, rows)[0]
                 exact = least.distance()
                 if how == ANSWERED:
                     n_told += 1
