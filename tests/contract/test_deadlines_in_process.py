@@ -207,7 +207,8 @@ def operations() -> set[str]:
         public = getattr(engine, name)
         own = {name: public}
         if inspect.isclass(public):
-            own |= {f"{name}.{key}": getattr(public, key) for key in dir(public) if key[0] != "_"}
+            methods = inspect.getmembers(public, inspect.isfunction)
+            own |= {f"{name}.{key}": value for key, value in methods if key[0] != "_"}
         for full, each in own.items():
             if callable(each) and "deadline" in inspect.signature(each).parameters:
                 found.add(full)
