@@ -237,7 +237,7 @@ def distances(
     exactly. A pose is the exact image, as for `clearance`.
 
     Cost: the tree of a mesh is built once and cached with it. A point then takes 0.8 to 3 us of a mesh of 10^3 to 10^5
-    faces, those on the surface twice that; under a pose, or more than some 10^3 sizes of the mesh away, 50 us and more.
+    faces, under a pose or some 100 sizes of the mesh away up to 30 us; points of a posed solid's own surface 0.1 ms.
     A convex: outside of it rational arithmetic over sets of planes, 10^-4 s and more.
 
     References

@@ -19,7 +19,7 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.compiling.jit import entry_of
 from engine.distance.exact import ScaledGap
 from engine.distance.point_formulas import fill_from_ball, fill_from_planes
-from engine.distance.point_search import FAR, Goal, PointRoom, find_nearest_on_mesh, new_point_room
+from engine.distance.point_search import Goal, PointRoom, find_nearest_on_mesh, new_point_room
 from engine.distance.spreads import SpreadPair, feature_of, in_space, spread_of
 from engine.distance.traversal import BEYOND, DONE
 from engine.errors import EmptyGeometryError, NotRepresentableError
@@ -113,16 +113,14 @@ class TriangleMeasure:
     """Distances from the triangles of a mesh, from a triangle of space, from the edges of a planar body."""
 
     def __init__(self, solid: Solid, pose: Pose | None) -> None:
-        self.solid, self.pose, self.body = solid, pose, _spread(solid)
+        self.solid, self.body = solid, _spread(solid)
+        self.own = STILL if pose is None else in_space(pose.rotation[None], pose.translation[None])
         self._spot = Sphere(np.zeros(solid.dimension), 0.0)
 
     def fill(
         self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
     ) -> int:
-        """As `Measure.fill`. In the frame of the solid where it has no pose, else point by point."""
-        if self.pose is not None:
-            left = start + np.flatnonzero(np.isnan(answers.distance[start:stop]))
-            return sum(self._by_pair(points, item, answers, limit, budget) for item in left.tolist())
+        """As `Measure.fill`."""
         if points.shape[1] == 3:
             return self._search(points, points, 0, (start, stop), answers, limit, budget)
         placed = np.zeros((stop - start, 3))
@@ -142,26 +140,36 @@ class TriangleMeasure:
         room, n_exact, (item, stop) = _room(), 0, span
         while True:  # bound: each turn answers a point, or doubles the room
             item, how, n = entry_of(find_nearest_on_mesh)(
-                self.body.arrays, placed, (item, stop), goal, answers.distance[shift:], *rows, room, budget.flag
+                self.body.arrays,
+                self.own,
+                placed,
+                (item, stop),
+                goal,
+                answers.distance[shift:],
+                *rows,
+                room,
+                budget.flag,
             )
             budget.check()
             if item == stop:
                 return n_exact
             if how == DONE:
-                self._by_integers(points, shift + item, room.candidates.pairs[:n], answers, limit, budget)
-                n_exact += 1
-            elif how in (FAR, BEYOND):
+                pairs = room.candidates.pairs[:n]
+            elif how == BEYOND:
                 check_finite(points, ("points",))
-                n_exact += self._by_pair(points, shift + item, answers, limit, budget)
+                pairs = np.zeros((len(self.body.faces), 4), np.int64)
+                pairs[:, 0] = np.arange(len(pairs))
             else:
                 room = new_point_room(2 * len(room.candidates.bounds))
+                continue
+            self._by_integers(points, shift + item, pairs, answers, limit, budget)
+            n_exact += 1
 
     def _pair(self, points: FloatArray, item: int, budget: Budget) -> SpreadPair:
         """Return the solid and point number `item`, a ball without a radius, as a pair of bodies."""
         d = self.solid.dimension
-        own = STILL if self.pose is None else in_space(self.pose.rotation[None], self.pose.translation[None])
         spot = in_space(np.eye(d)[None], points[item][None])
-        return SpreadPair(self.solid, self._spot, own, spot, budget, (self.body, spread_of(self._spot)))
+        return SpreadPair(self.solid, self._spot, self.own, spot, budget, (self.body, spread_of(self._spot)))
 
     def _by_integers(
         self, points: FloatArray, item: int, pairs: IntArray, answers: Answers, limit: float | None, budget: Budget
@@ -172,21 +180,6 @@ class TriangleMeasure:
         rows[:, 0], rows[:, 2] = pairs[:, 0], pairs[:, 2]
         gap, (triangle, _) = self._pair(points, item, budget).least(0, rows.tolist())
         self._write(gap, triangle, item, answers, limit)
-
-    def _by_pair(self, points: FloatArray, item: int, answers: Answers, limit: float | None, budget: Budget) -> int:
-        """Answer point number `item` by the search for pairs of triangles, which knows poses and distant points; return
-        1 if integers decided."""
-        pair = self._pair(points, item, budget)
-        value, (triangle, _), (code, _), gap = pair.nearest(0)
-        if gap is None and value == limit:
-            gap, _ = pair.least(0, [(triangle, 0, code, 0)])
-        if gap is not None:
-            self._write(gap, triangle, item, answers, limit)
-            return 1
-        answers.distance[item] = value if limit is None else (0.0 if value < limit else np.inf)
-        if answers.is_named:
-            answers.codes[item], answers.feet[item] = (triangle, code), pair.points[0, : self.solid.dimension]
-        return 0
 
     def _write(self, gap: ScaledGap, triangle: int, item: int, answers: Answers, limit: float | None) -> None:
         if limit is not None:

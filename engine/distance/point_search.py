@@ -13,6 +13,11 @@
 
 The face is the least of the candidates'.
 
+**A pose.** The point is moved back by R', which differs from the inverse of R by less than 1e-12 in each entry
+(`solids/pose.py`): distances change by less than 2^-36 of the coordinates, far below what the bounds of
+`lanes/points.py` leave room for. Then placed corners are rounded, within `error` of `placement.py`; step 3 is left out,
+and coordinates in double-doubles are those of `refined.py`.
+
 Source: N. Roussopoulos, S. Kelley, F. Vincent, Nearest neighbor queries, 1995 (the order of the search).
 """
 
@@ -24,10 +29,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.bounding.bvh import STACK
-from engine.collision.meshes.mesh_arrays import STILL, MeshArrays, triangle_of
+from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import relative_to
-from engine.collision.meshes.placement import as_placement
-from engine.collision.meshes.triangle_triangle import Facet, corner
+from engine.collision.meshes.placement import PoseArrays, as_placement, placed, rotate_back
+from engine.collision.meshes.triangle_triangle import Facet
 from engine.compiling.jit import called, inline, kernel
 from engine.distance.closed_forms import Wide, Wide3, less, less3
 from engine.distance.point_triangle import UNSURE, distance_to, feature_under, measure, seen_from
@@ -46,22 +51,28 @@ from engine.distance.refined import (
 from engine.distance.traversal import BEYOND, CLOSER, DONE, FULL, INTERRUPTED
 from engine.lanes.boxes import EMPTY
 from engine.lanes.lanes import lowest_bit
-from engine.lanes.points import BOUND_ROWS, MARGIN, SLACK, boxes_within, triangle_bounds
+from engine.lanes.points import (
+    BOUND_ROWS,
+    MARGIN,
+    SLACK,
+    boxes_toward,
+    boxes_within,
+    triangle_bounds,
+    triangles_toward,
+)  # fmt: skip
 from engine.lanes.tracing import LANES
 from engine.predicates.error_free import is_correctly_rounded
-from engine.predicates.vectors import as_point3, largest_of
+from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import FlagArray, Float32Array, FloatArray, Int32Array, IntArray, Point3
 
-FAR: Final = 6
-"""Outcome of a search: the point is so far away that float32 cannot tell the triangles apart."""
 _LARGEST: Final = 1e300
-_FARTHEST: Final = 4096.0
+_DISTANT: Final = 1024.0
 _ABOVE_ONE: Final = 1.0 + 2.0**-20
 
 
 class PointRoom(NamedTuple):
     """Work space of one search at a time: candidates, of which the first and third columns are used; stack (STACK,) of
-    nodes with the least squared distance of each, bounds (STACK,); work of `lanes/points.py`; origin (3,) zeros."""
+    nodes with a lower bound on the distance of each, bounds (STACK,); work of `lanes/points.py`; origin (3,) zeros."""
 
     candidates: Candidates
     stack: Int32Array
@@ -87,12 +98,35 @@ class Goal(NamedTuple):
     is_named: bool
 
 
+class Spot(NamedTuple):
+    """Where a search starts: the point in tree coordinates, and reach, S of `lanes/points.py`; for a distant point
+    (spread > 0) its direction, and the spread of its bounds."""
+
+    at: Point3
+    reach: float
+    spread: float
+
+
 @inline
-def _push_children(mesh: MeshArrays, node: int, at: Point3, reach: float, most: float, room: PointRoom, n: int) -> int:
+def _spot_of(at: Point3) -> Spot:
+    """Return a point, given in tree coordinates, as a search takes it."""
+    largest = largest_of(at)
+    if largest < _DISTANT:
+        return Spot(at, largest + 2.0, 0.0)
+    e = Point3(at.x / largest, at.y / largest, at.z / largest)
+    size = np.sqrt(dot(e, e))
+    return Spot(Point3(e.x / size, e.y / size, e.z / size), 2.0, 6.1 / (largest * size - 4.0) * _ABOVE_ONE)
+
+
+@inline
+def _push_children(mesh: MeshArrays, node: int, spot: Spot, most: float, room: PointRoom, n: int) -> int:
     """Push a node's children that may be within `most` of a point on the stack of n nodes, the farthest first; return
-    its new size. at: the point, in tree coordinates; reach: S of `lanes/points.py`."""
-    square = most * most * _ABOVE_ONE + 1e-37
-    bits = boxes_within(mesh.boxes, node, at.x, at.y, at.z, MARGIN * reach, square, room.work)
+    its new size."""
+    at, margin, limit = spot.at, MARGIN * spot.reach, most + 2.0**-20 * abs(most) + 1e-37  # rounded to float32
+    if spot.spread > 0.0:
+        bits = boxes_toward(mesh.boxes, node, at.x, at.y, at.z, SLACK * spot.reach, limit, room.work)
+    else:
+        bits = boxes_within(mesh.boxes, node, at.x, at.y, at.z, margin, limit, room.work)
     first = n
     while bits != 0:  # bound: each turn takes a bit
         lane = lowest_bit(bits)
@@ -111,23 +145,26 @@ def _push_children(mesh: MeshArrays, node: int, at: Point3, reach: float, most: 
 
 @called
 def _search(
-    mesh: MeshArrays, at: Point3, reach: float, most: float, enough: float, room: PointRoom, flag: FlagArray
+    mesh: MeshArrays, spot: Spot, most: float, enough: float, room: PointRoom, flag: FlagArray
 ) -> tuple[int, int]:
-    """Fill the candidates; return (outcome, number). CLOSER: a triangle is nearer than `enough`; INTERRUPTED;
-    FULL. at: the point; lengths in tree coordinates."""
-    candidates, n_candidates, n = room.candidates, 0, 1
-    room.stack[0], room.bounds[0] = 0, 0.0
+    """Fill the candidates; return (outcome, number). CLOSER: a triangle is nearer than `enough`; INTERRUPTED; FULL.
+    Lengths are in tree coordinates."""
+    candidates, n_candidates, n, at = room.candidates, 0, 1, spot.at
+    room.stack[0], room.bounds[0] = 0, -np.inf
     while n > 0:  # bound: each node enters once
         n -= 1
         node = int(room.stack[n])
-        if room.bounds[n] > most * most * _ABOVE_ONE + 1e-37:
+        if room.bounds[n] > most:
             continue
         if mesh.child[node, 0] >= 0:
-            n = _push_children(mesh, node, at, reach, most, room, n)
+            n = _push_children(mesh, node, spot, most, room, n)
             continue
         if flag[0] != 0:
             return INTERRUPTED, 0
-        triangle_bounds(mesh.blocks, node, at.x, at.y, at.z, SLACK * reach, room.work)
+        if spot.spread > 0.0:
+            triangles_toward(mesh.blocks, node, at.x, at.y, at.z, SLACK * spot.reach, spot.spread, room.work)
+        else:
+            triangle_bounds(mesh.blocks, node, at.x, at.y, at.z, SLACK * spot.reach, room.work)
         for lane in range(LANES):
             child, low = mesh.child[node, lane], float(room.work[0, lane])
             if child == EMPTY:
@@ -174,11 +211,12 @@ def _refine(view: View, q: Point3, n: int, candidates: Candidates) -> tuple[floa
 
 @called
 def _certify(
-    view: View, q: Point3, n: int, is_certain: bool, room: PointRoom, start: FloatArray, foot: FloatArray
-) -> bool:
+    view: View, q: Point3, n: int, is_certain: bool, room: PointRoom, start: FloatArray, move: FloatArray,
+    foot: FloatArray,
+) -> bool:  # fmt: skip
     """Write the nearest point to foot (d,) if the first n candidates prove it (see the module), and return whether they
-    do; the candidate of the least face moves to row 0. start: the point (3,). is_certain: all name one feature, and it
-    is the nearest of each."""
+    do; the candidate of the least face moves to row 0. start: the point (3,); move: the mesh's translation. is_certain:
+    all name one feature, and it is the nearest of each."""
     pairs, best, faces = room.candidates.pairs, 0, view.mesh.faces
     here = named(view, pairs[0, 0], pairs[0, 2])
     none = Wide(0.0, 0.0)
@@ -199,35 +237,41 @@ def _certify(
                 return False
         best = k if faces[pairs[k, 0]] < faces[pairs[best, 0]] else best
     pairs[0, 0], pairs[0, 2] = pairs[best, 0], pairs[best, 2]
-    return write_offset_point(view, here, p, way, 0.0, start, room.origin, error, foot)
+    return write_offset_point(view, here, p, way, 0.0, start, move, error, foot)
 
 
 @called
 def _decide(
-    mesh: MeshArrays, start: FloatArray, unit: float, n: int, goal: Goal, room: PointRoom, foot: FloatArray
-) -> tuple[float, int, bool]:
+    mesh: MeshArrays, pose: PoseArrays, start: FloatArray, unit: float, n: int, goal: Goal, room: PointRoom,
+    foot: FloatArray,
+) -> tuple[float, int, bool]:  # fmt: skip
     """Return (distance, n, is_named): the nearest double, -1.0 if unproven (with a limit: 0.0 within it, infinity
     beyond), the number of candidates left, and whether row 0 and `foot` name the nearest point. start: the point (3,);
     unit: power of two that brings all coordinates below 1."""
-    candidates, q = room.candidates, as_point3(start, 0)
+    candidates, q, move = room.candidates, as_point3(start, 0), as_point3(pose.translations, 0)
     pairs = candidates.pairs
-    scaled_q = Point3(q.x * unit, q.y * unit, q.z * unit)
+    error = 2.0**-50 * (3.0 * mesh.extent.reach + largest_of(move)) + 2.0**-1060 if pose.is_posed else 0.0
+    place = as_placement(pose, 0, move, error)
+    scaled_q, slack = Point3(q.x * unit, q.y * unit, q.z * unit), 2.0 * unit * error
     most, largest, on, is_unsure = goal.most * unit, 0.0, -1, False
     for k in range(n):
         t = triangle_of(mesh, pairs[k, 0])
+        t = Facet(placed(t.p, place), placed(t.q, place), placed(t.r, place))
         t = relative_to(scaled_q, Facet(
             Point3(t.p.x * unit, t.p.y * unit, t.p.z * unit), Point3(t.q.x * unit, t.q.y * unit, t.q.z * unit),
             Point3(t.r.x * unit, t.r.y * unit, t.r.z * unit),
         ))  # fmt: skip
         low, high, code, is_certain = measure(t)
-        if low <= 0.0:
-            under = feature_under(mesh, pairs[k, 0], q)
+        if low <= slack:
+            under = UNSURE if pose.is_posed else feature_under(mesh, pairs[k, 0], q)
             is_unsure = is_unsure or under == UNSURE
             if under >= 0:
                 if on < 0 or mesh.faces[pairs[k, 0]] < mesh.faces[pairs[on, 0]]:
                     on = k
                 code = under
-        candidates.bounds[k], pairs[k, 1], pairs[k, 2], most = low, int(is_certain), code, min(most, high)
+        candidates.bounds[k], pairs[k, 1], pairs[k, 2] = low - slack, int(is_certain and not pose.is_posed), code
+        most = min(most, high + slack)
+        largest = max(largest, largest_of(t.p), largest_of(t.q), largest_of(t.r))
     if on >= 0 and not is_unsure:
         pairs[0, 0], pairs[0, 2] = pairs[on, 0], pairs[on, 2]
         for k in range(foot.shape[0]):
@@ -241,25 +285,24 @@ def _decide(
             return 0.0, n, False
         if goal.limit == 0.0:
             return np.inf, n, False
-    view, is_certain = View(mesh, as_placement(STILL, 0, Point3(0.0, 0.0, 0.0), 0.0), 1.0), True
+    view, is_certain = View(mesh, place, unit), True
     here = named(view, pairs[0, 0], pairs[0, 2])
     for k in range(n):
-        t = triangle_of(mesh, pairs[k, 0])
-        for turn in range(3):
-            p = corner(t, turn)
-            largest = max(largest, abs(p.x - q.x), abs(p.y - q.y), abs(p.z - q.z))
         is_certain = is_certain and pairs[k, 1] == 1 and named(view, pairs[k, 0], pairs[k, 2]) == here
-    view = View(mesh, view.place, math.ldexp(1.0, _power(largest)))
+    if not pose.is_posed:  # differences are exact: in units of the longest
+        view = View(mesh, place, math.ldexp(1.0, _power(largest / unit)))
     if is_certain:
-        distance, error = distance_to(seen_from(view, pairs[0, 0], q), pairs[0, 2])
-        value = _rounded(distance, error, view.unit)
+        distance, bound = distance_to(seen_from(view, pairs[0, 0], q), pairs[0, 2])
+        value = _rounded(distance, bound, view.unit)
     else:
         value, n = _refine(view, q, n, candidates)
     if goal.limit < np.inf:
         if value < 0.0 or value == goal.limit:
             return -1.0, n, False
         return (0.0 if value < goal.limit else np.inf), n, False
-    is_named = goal.is_named and value >= 0.0 and _certify(view, q, n, is_certain, room, start[0], foot)
+    is_named = goal.is_named and value >= 0.0
+    if is_named:
+        is_named = _certify(view, q, n, is_certain, room, start[0], pose.translations[0], foot)
     return value, n, is_named
 
 
@@ -271,37 +314,39 @@ def _power(size: float) -> int:
 
 @kernel
 def find_nearest_on_mesh(
-    mesh: MeshArrays, points: FloatArray, span: tuple[int, int], goal: Goal, answers: FloatArray, codes: IntArray,
-    feet: FloatArray, room: PointRoom, flag: FlagArray,
+    mesh: MeshArrays, pose: PoseArrays, points: FloatArray, span: tuple[int, int], goal: Goal, answers: FloatArray,
+    codes: IntArray, feet: FloatArray, room: PointRoom, flag: FlagArray,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Fill the NaN entries of answers (n,) for points (n, 3) span[0] .. span[1] - 1: the double nearest to the distance
-    from the triangles of a mesh, or with a limit 0.0 within it, infinity beyond. If the goal says so, also codes
-    (n, 2), triangle and feature code (`near_triangles.py`), and feet (n, d), the nearest doubles to the nearest point.
+    from the triangles of a mesh under a pose, or with a limit 0.0 within it, infinity beyond. If the goal says so, also
+    codes (n, 2), triangle and feature code (`near_triangles.py`), and feet (n, d), the nearest doubles to the nearest
+    point.
 
     Returns (item, outcome, n): the first point left open, the outcome of its search, and the number of candidates; item
     span[1] if none is left."""
-    o = mesh.origin
+    o, scale = mesh.origin, mesh.scale
+    move = as_point3(pose.translations, 0)
+    place = as_placement(pose, 0, move, 0.0)
     for item in range(span[0], span[1]):
         if answers[item] == answers[item]:
             continue
         q = as_point3(points, item)
-        size = 4.0 * (mesh.extent.reach + largest_of(q))
+        size = 4.0 * (mesh.extent.reach + largest_of(q) + largest_of(move))
         if not (size < _LARGEST and 0.0 * (q.x + q.y + q.z) == 0.0):  # NaN is lost in `largest_of`
             return item, BEYOND, 0
-        unit = math.ldexp(1.0, _power(size))
-        at = Point3((q.x - o[0]) / mesh.scale, (q.y - o[1]) / mesh.scale, (q.z - o[2]) / mesh.scale)
-        reach = largest_of(at) + 2.0
-        if not reach < _FARTHEST:
-            return item, FAR, 0
-        most, enough = goal.most / mesh.scale * _ABOVE_ONE, goal.enough / mesh.scale / _ABOVE_ONE
-        how, n = _search(mesh, at, reach, most, enough if goal.enough > 0.0 else -1.0, room, flag)
+        unit, p = math.ldexp(1.0, _power(size)), rotate_back(place, minus(q, move)) if pose.is_posed else q
+        spot = _spot_of(Point3((p.x - o[0]) / scale, (p.y - o[1]) / scale, (p.z - o[2]) / scale))
+        most, enough = goal.most / scale * _ABOVE_ONE, goal.enough / scale / _ABOVE_ONE
+        if spot.spread > 0.0 or not goal.enough > 0.0:
+            enough = -np.inf
+        how, n = _search(mesh, spot, np.inf if spot.spread > 0.0 else most, enough, room, flag)
         if how == CLOSER:
             answers[item] = 0.0
             continue
         if how != DONE:
             return item, how, n
         foot = feet[item] if goal.is_named else room.origin[:0]
-        value, n, is_named = _decide(mesh, points[item : item + 1], unit, n, goal, room, foot)
+        value, n, is_named = _decide(mesh, pose, points[item : item + 1], unit, n, goal, room, foot)
         if value < 0.0 or (goal.is_named and not is_named):
             return item, DONE, n
         answers[item] = value

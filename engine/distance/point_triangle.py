@@ -17,7 +17,7 @@ from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.triangle_triangle import Facet, corner, projected
 from engine.compiling.jit import called, inline
 from engine.distance.closed_forms import Wide, Wide3, dot3, less, less3, over, root, times
-from engine.distance.refined import View
+from engine.distance.refined import View, corners_of
 from engine.predicates.error_free import is_correctly_rounded, two_diff, workspace
 from engine.predicates.expansion import add_scaled, compress
 from engine.predicates.orientation import orient2d, orient3d
@@ -173,6 +173,13 @@ def feature_under(mesh: MeshArrays, item: int, q: Point3) -> int:
 def seen_from(view: View, item: int, q: Point3) -> Facet:
     """Return the corners of a triangle relative to a point, in double-doubles, times the unit of the view."""
     t, unit = triangle_of(view.mesh, item), view.unit
+    if view.place.is_posed:
+        move = view.place.shift
+        shift = Wide3(
+            Wide(*two_diff(move.x * unit, q.x * unit)), Wide(*two_diff(move.y * unit, q.y * unit)),
+            Wide(*two_diff(move.z * unit, q.z * unit)),
+        )  # fmt: skip
+        return corners_of(view, item, shift)
     x, y, z = q.x * unit, q.y * unit, q.z * unit
     return Facet(
         Wide3(Wide(*two_diff(t.p.x * unit, x)), Wide(*two_diff(t.p.y * unit, y)), Wide(*two_diff(t.p.z * unit, z))),

@@ -74,30 +74,16 @@ class SpreadPair:
 
     def clearance(self, item: int) -> Clearance:
         """Return distance, nearest points and features of two disjoint bodies under pose `item`."""
-        distance, triangles, codes, gap = self.nearest(item)
-        d, features = self.solids[0].dimension, self._features(triangles, codes)
-        if gap is not None:
-            return gap.clearance(features, d)
-        points = self._room.points[:, :d].copy()
-        points.setflags(write=False)
-        return Clearance(distance, points, features)
-
-    def nearest(self, item: int) -> tuple[float, Sequence[int], Sequence[int], ScaledGap | None]:
-        """Return (distance, triangles, codes, gap) of pose `item`: the nearest triangles of each and the codes of their
-        features. gap: if integers decided, with the distance and the points; None if the search did: then `points` has
-        these."""
         query, answers = Query(np.inf, -1.0, *self._radii, self._reach, True), np.full(item + 1, np.nan)
         how, _, pairs = next(self._unanswered(item, item + 1, answers, query))
+        d = self.solids[0].dimension
         if how != ANSWERED:
             gap, triangles = self.least(item, pairs)
-            return gap.distance(), triangles, (gap.gap.first, gap.gap.second), gap
+            return gap.clearance(self._features(triangles, (gap.gap.first, gap.gap.second)), d)
         i, j, *codes = next(iter(pairs))
-        return float(answers[item]), (i, j), codes, None
-
-    @property
-    def points(self) -> FloatArray:
-        """The nearest points (2, 3) that `nearest` found without integers; valid until the next search."""
-        return self._room.points
+        points = self._room.points[:, :d].copy()
+        points.setflags(write=False)
+        return Clearance(float(answers[item]), points, self._features((i, j), codes))
 
     def _features(self, triangles: Sequence[int], codes: Sequence[int]) -> tuple[Feature, Feature]:
         """Return the caller's features for a triangle of each body and a feature code of each."""

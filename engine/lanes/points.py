@@ -8,10 +8,14 @@ The point is given in tree coordinates (`bvh.py`); S >= 2 bounds its coordinates
 **Triangles.** A corner is rounded (u S), so is the point (u S), so is their difference (2 u S): 4 u S a coordinate, 7 u
 S in length. A point of an edge or of the triangle is a combination of the rounded corners with weights in [0, 1] that
 sum up to at most 1, whose three products and sums round by less than 9 u S a coordinate, 16 u S in length; its length
-takes 6 u S more. So the triangle has a point within `slack` = 64 u S of that length. For every direction p, however it
+takes 6 u S more. So the triangle has a point within `slack` = 32 u S of that length. For every direction p, however it
 was found, all corners c have c . p / |p| >= their least, computed within 7 u S + 8 u S: the slab bounds the distance of
 the triangle from below, and from a point that is nearly the nearest the two bounds nearly meet. What is no number,
 where p is too short to have a direction, bounds by 0. What underflows is far below u.
+
+**A distant point** at D > 1000 from the origin in the direction e: with a = e . x, a point x of the tree, |x|^2 <= 12,
+is D - a + (|x|^2 - a^2) / 2 (D - a) + ... away, between D - a and D - a + `spread`, 6.1 / (D - 4). The linear a is
+greatest at a corner, computed with the rounded direction within 40 u.
 
 Source: C. Ericson, Real-Time Collision Detection, 2005, 5.1.5 (the closest point of a triangle).
 """
@@ -27,7 +31,7 @@ from engine.lanes.lanes import bits_of, dot, greater, lesser, load, root, select
 from engine.lanes.tracing import Lanes, Number, Rows, traced
 
 MARGIN: Final = 2.0**-21
-SLACK: Final = 2.0**-18
+SLACK: Final = 2.0**-19
 """Over S: `margin` of boxes and `slack` of triangles."""
 BOUND_ROWS: Final = 2
 """Rows of the work space: a lower and an upper bound."""
@@ -38,13 +42,38 @@ _BELOW_ONE: Final = 1.0 - 2.0**-20
 def boxes_within(
     boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, most: Number, work: Rows
 ) -> int:
-    """Return the mask of a node's children whose boxes may be within a distance of a point; write lower bounds on their
-    squared distances to row 0 of work. most: the square of that distance."""
+    """Return the mask of a node's children whose boxes may be within `most` of a point; write lower bounds on their
+    distances to row 0 of work."""
     box = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
     gaps = [greater(abs(box[k] - at) - (box[3 + k] + margin), 0.0) for k, at in enumerate((x, y, z))]
-    square = dot(gaps, gaps) * _BELOW_ONE
-    store(work, 0, square)
-    return bits_of(~(square > most))
+    bound = root(dot(gaps, gaps)) * _BELOW_ONE
+    store(work, 0, bound)
+    return bits_of(~(bound > most))
+
+
+@traced
+def boxes_toward(
+    boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, most: Number, work: Rows
+) -> int:
+    """Do so for a distant point in the direction x, y, z: the bounds are less its distance from the origin."""
+    box = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
+    along, reach = dot((x, y, z), box[:3]), dot((abs(x), abs(y), abs(z)), box[3:])
+    bound = -(along + reach) - margin
+    store(work, 0, bound)
+    return bits_of(~(bound > most))
+
+
+@traced
+def triangles_toward(
+    blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, spread: Number, work: Rows
+) -> None:
+    """Write bounds on the distances of a distant point in the direction x, y, z from the triangles of a block, less its
+    distance from the origin, as `triangle_bounds` does."""
+    corners = [[load(blocks, CORNER_ROWS * node + 3 * corner + k) for k in range(3)] for corner in range(3)]
+    a, b, c = (dot((x, y, z), corner) for corner in corners)
+    level = -greater(a, greater(b, c))
+    store(work, 0, level - slack)
+    store(work, 1, level + slack + spread)
 
 
 def _nearest_of_edge(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
