@@ -123,8 +123,10 @@ class PointQuery:
         to_boundary: bool = False, is_signed: bool = False, where: tuple[str | int, ...] = ("solid",),
     ) -> None:  # fmt: skip
         n = len(points)
-        self.points, self.limit, self.is_signed = points, limit, is_signed
         self.measure, self.n_exact = measure_of(solid, pose, where), 0
+        self._order = self.measure.order(points)
+        self.points = points if self._order is None else read_only(points[self._order])
+        self.limit, self.is_signed = limit, is_signed
         rows = n if is_named else 0
         feet, codes = np.empty((rows, points.shape[1])), np.full((rows, 2), -1, np.int64)
         self.answers = Answers(np.full(n, np.nan), feet, codes)
@@ -156,14 +158,22 @@ class PointQuery:
     def result(self) -> Any:
         """Return the answers, once all are filled."""
         if self.limit is not None:
-            return self.answers.distance == 0.0
+            return self._as_given(self.answers.distance == 0.0)
         if not self.answers.is_named:
-            return self.answers.distance
+            return self._as_given(self.answers.distance)
         rows = np.flatnonzero(~self.is_within)
         n = len(self.points)
         face, kind, index = np.full(n, -1), np.full(n, NOWHERE, np.int8), np.full((n, 2), -1)
         face[rows], kind[rows], index[rows] = self.measure.features(self.answers.codes[rows])
-        return Distances(self.answers.distance, self.answers.feet, face, kind, index)
+        return Distances(*map(self._as_given, (self.answers.distance, self.answers.feet, face, kind, index)))
+
+    def _as_given(self, rows: Any) -> Any:
+        """Return rows in the order in which the points were given."""
+        if self._order is None:
+            return rows
+        result = np.empty_like(rows)
+        result[self._order] = rows
+        return result
 
 
 Result: TypeAlias = FloatArray | BoolArray | Distances

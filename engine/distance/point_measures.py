@@ -36,6 +36,8 @@ VERTEX, EDGE, WITHIN_FACE, OTHER, NOWHERE = range(5)
 KINDS: Final = ("vertex", "edge", "face", "", "inside")
 """Names of features by code; OTHER: the surface of a ball, a plane; NOWHERE: the point itself lies in the solid."""
 _ROOM: Final = 256
+_MANY: Final = 4096
+"""Points, and triangles, from which the order of the points pays."""
 
 
 class Answers(NamedTuple):
@@ -60,6 +62,9 @@ class Measure(Protocol):
         self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
     ) -> int:
         """Return how many of them integers decided."""
+
+    def order(self, points: FloatArray) -> IntArray | None:
+        """Return an order of points (n, d) in which they are answered sooner, None for as they are."""
 
     def features(self, codes: IntArray) -> tuple[IntArray, Int8Array, IntArray]:
         """Return faces (n,), kinds (n,) and the indices (n, 2) of features, -1 where there are none."""
@@ -126,6 +131,21 @@ class TriangleMeasure:
         placed = np.zeros((stop - start, 3))
         placed[:, :2] = points[start:stop]
         return self._search(points, placed, start, (0, stop - start), answers, limit, budget)
+
+    def order(self, points: FloatArray) -> IntArray | None:
+        """As `Measure.order`: by their cells, 64 an axis (G. M. Morton, 1966), where that pays: points near each other
+        need the same nodes, which is twice as fast."""
+        if len(points) < _MANY or len(self.body.faces) < _MANY:
+            return None
+        low, high = points.min(axis=0), points.max(axis=0)
+        with np.errstate(all="ignore"):
+            cells = (points / 4.0 - low / 4.0) / (high / 4.0 - low / 4.0) * 63.0
+        cells = np.nan_to_num(cells, nan=0.0, posinf=0.0, neginf=0.0).astype(np.int64)
+        keys = np.zeros(len(points), np.int64)
+        for bit in range(6):
+            for axis in range(points.shape[1]):
+                keys |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+        return np.argsort(keys, kind="stable")
 
     def _search(
         self, points: FloatArray, placed: FloatArray, shift: int, span: tuple[int, int], answers: Answers,
@@ -259,6 +279,9 @@ class _ByFormula:
 
     kernels: tuple[Any, ...] = ()
     """A kernel that decides most distances, with its arguments between span and limit."""
+
+    def order(self, _: FloatArray) -> None:
+        """As `Measure.order`."""
 
     def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
         """Return the distance of a point from the boundary or, outside, from the solid, its nearest point there, and
