@@ -9,7 +9,15 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.answers import clipping, collision, containment, overlays, refusals, wire  # noqa: F401 (families)
+from benchmarks.answers import (  # noqa: F401 (families)
+    clipping,
+    collision,
+    containment,
+    distances,
+    overlays,
+    refusals,
+    wire,
+)
 from benchmarks.answers.asking import CHUNKS, Chunk, joined
 
 STORED = Path(__file__).resolve().parent / "answers.json"
