@@ -2,7 +2,7 @@
 // every number as given. The picture is scaled to its size; what is asked is not.
 
 const QUESTION = {
-  "/v1/contains": "contains", "/v1/clip/segments": "segments", "/v1/clip/polygons": "polygons", "/v1/overlay": "overlay",
+  "/v1/contains": "contains", "/v1/distances": "distances", "/v1/clip/segments": "segments", "/v1/clip/polygons": "polygons", "/v1/overlay": "overlay",
   "/v1/collide": "collide", "/v1/clearance": "collide",
 };
 export const KEYS = ["given first", "given second"];

@@ -1,4 +1,4 @@
-// The five questions: which solids they take, the request they send, the figures and the picture of its answer.
+// The six questions: which solids they take, the request they send, the figures and the picture of its answer.
 
 import { outlines, posed, ring3d, solid2d, solid3d } from "./drawing.js";
 
@@ -147,6 +147,27 @@ export const QUESTIONS = {
       return [...firstItems(state), ...Object.entries(groups).map(([color, group]) => ({
         kind: "points", points: group, color, width: { outside: 3, inside: 5, boundary: 7 }[color] * size, alpha: color === "outside" ? 0.85 : 1,
       }))];
+    },
+  },
+
+  distances: {
+    hint: "A line leads from each point to the nearest point of the boundary: green to a face or an edge of the plane, orange to an edge or a corner. Each distance is the nearest double, negative inside; snapped points have exact ties.",
+    firsts: () => true,
+    counts: [0, 3, 1.5],
+    ask(state) {
+      const list = points(state);
+      return { path: "/v1/distances", body: { solid: state.first.asked, points: list, to: "boundary", nearest: true }, items: list.length };
+    },
+    figures: (state, { distances }) => ({ least: Math.min(...distances), largest: Math.max(...distances), "on the boundary": distances.filter((d) => d === 0).length }),
+    verdict: (state, answer, { least, largest }) => `${least.toPrecision(6)} to ${largest.toPrecision(6)} away`,
+    draw(state, { nearest, features }, { points: list }) {
+      const flat = state.dimension === 3 ? "face" : "edge", lines = { kept: [], boundary: [] };
+      list.forEach((point, i) => lines[[flat, "ball", "plane"].includes(features[i].kind) ? "kept" : "boundary"].push([point, nearest[i]]));
+      return [
+        ...firstItems(state),
+        ...Object.entries(lines).map(([color, group]) => ({ kind: "lines", lines: group, color, width: state.n > 200 ? 1 : 2 })),
+        { kind: "points", points: list, color: "outside", width: 4 },
+      ];
     },
   },
 
