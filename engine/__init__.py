@@ -55,6 +55,10 @@ from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.lines import LinePieces, clip_lines
+from engine.solid_cutting.cut import CutSolid, cut
+from engine.solid_cutting.measures import area, centroid, volume
+from engine.solid_cutting.overlap import iou, overlap_volume
+from engine.solid_cutting.section import Sections, section
 from engine.solids.accepted import PointsLike, PoseLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.bounds import Bounds, bounds
@@ -73,20 +77,20 @@ from engine.warmup import warm
 
 __all__ = [
     "Aabb", "Accuracy", "Bounds", "Cancel", "CancelledError", "Clearance", "ClippedPolygons", "Collapse", "Collision",
-    "Comparison", "Convex", "Csg", "DeadlineExceededError", "Distances", "EmptyGeometryError", "EngineError",
-    "FaceNotSimpleError",
-    "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError", "IndexOutOfRangeError", "Inspection",
-    "InvalidArrayError", "InvalidInputError", "InvalidOperationError", "InvalidPolynomialError", "LinePieces",
-    "Location", "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
-    "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece", "PointsLike", "Polygon", "PolygonStatus", "Polyhedron",
-    "Pose", "PoseLike", "Poses", "Rcc8", "Relation", "RepeatedIndexError", "RingTooShortError", "Scene",
-    "SceneDistances", "SceneLocations", "ScenePairs", "ScenePieces", "SegmentPieces", "Solid", "SolidLike", "Sphere",
-    "Surface", "TooComplexError", "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError",
-    "Witness",
-    "WrongDimensionError", "ZeroNormalError", "__version__", "bounds", "clearance", "clearance_poses", "clip_lines",
+    "Comparison", "Convex", "Csg", "CutSolid", "DeadlineExceededError", "Distances", "EmptyGeometryError",
+    "EngineError", "FaceNotSimpleError", "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError",
+    "IndexOutOfRangeError", "Inspection", "InvalidArrayError", "InvalidInputError", "InvalidOperationError",
+    "InvalidPolynomialError", "LinePieces", "Location", "MinAboveMaxError", "NegativeRadiusError", "NotClosedError",
+    "NotFiniteError", "NotRepresentableError", "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece",
+    "PointsLike", "Polygon", "PolygonStatus", "Polyhedron", "Pose", "PoseLike", "Poses", "Rcc8", "Relation",
+    "RepeatedIndexError", "RingTooShortError", "Scene", "SceneDistances", "SceneLocations", "ScenePairs",
+    "ScenePieces", "Sections", "SegmentPieces", "Solid", "SolidLike", "Sphere", "Surface", "TooComplexError",
+    "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness", "WrongDimensionError",
+    "ZeroNormalError", "__version__", "area", "bounds", "centroid", "clearance", "clearance_poses", "clip_lines",
     "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
-    "contains", "default_workers", "distances", "filled", "inspect", "layers", "locate", "locate_scene", "overlay",
-    "overlay_batch", "polygons", "read_layer", "read_mesh", "release", "solid_types", "union_all", "warm",
+    "contains", "cut", "default_workers", "distances", "filled", "inspect", "iou", "layers", "locate", "locate_scene",
+    "overlap_volume", "overlay", "overlay_batch", "polygons", "read_layer", "read_mesh", "release", "section",
+    "solid_types", "union_all", "volume", "warm",
 ]  # fmt: skip
 
 

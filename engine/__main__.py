@@ -1,5 +1,5 @@
-"""The command line ``python -m engine contains | collide | clearance | distances | clip | bounds | overlay | union |
-join`` for files; the last three are for layers.
+"""The command line ``python -m engine contains | collide | clearance | distances | clip | bounds | volume | section |
+cut | overlay | union | join``: for files; the last three are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
 ``python -m engine audit`` compares other packages with the exact answers on your data.
@@ -36,12 +36,23 @@ from engine.distance.clearance import clearance_poses
 from engine.distance.distances import Distances, distances
 from engine.errors import EngineError, InvalidInputError
 from engine.files.octets import in_words
-from engine.files.solids import read_features, read_rows, read_solid, read_solids, write_geojson, write_table
+from engine.files.solids import (
+    read_features,
+    read_rows,
+    read_solid,
+    read_solids,
+    write_geojson,
+    write_mesh,
+    write_table,
+)
 from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
 from engine.running.parallel import Progress
 from engine.segment_clipping.clip_segments import clip_segments
+from engine.solid_cutting.cut import cut
+from engine.solid_cutting.measures import area, centroid, volume
+from engine.solid_cutting.section import section
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation
 from engine.version import __version__
@@ -191,6 +202,32 @@ def _bounds(options: Options) -> None:
     write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
 
 
+def _volume(options: Options) -> None:
+    solid = read_solid(options.solid, _note(options))
+    asked: Any = {"volume": volume, "area": area, "centroid": centroid} if solid.dimension == 3 else {
+        "area": area, "centroid": centroid}  # fmt: skip
+    row = {name: np.atleast_1d(ask(solid, deadline=options.deadline)) for name, ask in asked.items()}
+    write_table(options.output, {name: value[np.newaxis] for name, value in row.items()})
+
+
+def _section(options: Options) -> None:
+    solid = read_solid(options.solid, _note(options))
+    with _bar(len(options.heights), "planes", options) as progress:
+        made: Any = section(solid, options.heights, normal=options.normal, progress=progress, deadline=options.deadline)
+    rings = np.repeat(np.arange(len(made.ring_offsets) - 1), np.diff(made.ring_offsets))
+    pieces = np.repeat(np.arange(len(made.piece_offsets) - 1), np.diff(made.piece_offsets))[rings]
+    planes = np.repeat(np.arange(len(made)), np.diff(made.plane_offsets))[pieces]
+    write_table(options.output, {"plane": planes, "piece": pieces, "ring": rings, "position": made.vertices})
+
+
+def _cut(options: Options) -> None:
+    solid, region = (read_solid(each, _note(options)) for each in (options.solid, options.region))
+    made = cut(solid, region, keep=options.keep, deadline=options.deadline)
+    write_mesh(options.output, made.vertices, made.faces)
+    if made.n_collapsed + made.n_folded and not options.quiet:
+        print(f"rounding made {made.n_collapsed} faces flat and turned {made.n_folded} over", file=sys.stderr)
+
+
 def _audit(words: Sequence[str]) -> int:
     """Run `benchmarks.audit`, which a wheel has too, and return its exit code."""
     audit = import_module(f"{warm.__module__.removesuffix('engine.warmup')}benchmarks.audit")
@@ -297,6 +334,10 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
     "join": (_join, "join points to the features that contain them, boundary included",
              {"points": ".geojson file of points" + ATTRIBUTES, "polygons": LAYER}),
     "bounds": (_bounds, "smallest box and smallest sphere of a solid", SOLID),
+    "volume": (_volume, "volume, area and centroid of a solid", SOLID),
+    "section": (_section, "sections of a mesh at heights, as rows of plane, piece, ring and position", SOLID),
+    "cut": (_cut, "what a half-space or a box leaves of a mesh, closed: .off, or .npz of vertices and faces",
+            SOLID | {"region": FORMATS}),
 }  # fmt: skip
 """By command: function, help text and arguments."""
 
@@ -327,6 +368,9 @@ def _parser() -> argparse.ArgumentParser:
     made["distances"].add_argument("--within", type=float, metavar="DISTANCE", help="decide only: at most so far away?")
     made["distances"].add_argument("--nearest", action="store_true", help="the nearest points too, and their faces")
     made["clip"].add_argument("--polygons", action="store_true", help="clip polygons of .geojson (Sutherland-Hodgman)")
+    made["section"].add_argument("heights", nargs="+", type=float, help="the planes dot(normal, p) = height")
+    made["section"].add_argument("--normal", nargs=3, type=float, metavar="NUMBER", help="z by default")
+    made["cut"].add_argument("--keep", choices=("inside", "outside"), default="inside")
     made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
     made["union"].add_argument("--by", nargs="+", metavar="NAME", help="unite features that agree in these properties")
     made["join"].add_argument("--outside", action="store_true", help="also write points that no feature contains")

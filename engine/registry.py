@@ -17,6 +17,8 @@ from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import profiles
 from engine.segment_clipping.on_boundary import boundary
+from engine.solid_cutting import measures
+from engine.solid_cutting import simple_measures as simple
 from engine.solids import bounds
 from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit
@@ -55,6 +57,7 @@ ROWS: Final = (
         posed=posed.posed_ball,
         box=lambda solid, _: (solid.center, solid.center, 0.0),
         bounds=bounds.bounds_of_sphere,
+        volumes=simple.BALL,
         profile=profiles.on_sphere,
         clip=segments.on_ball,
         meets={2: "sphere", 3: "sphere"},
@@ -74,6 +77,7 @@ ROWS: Final = (
         posed=posed.by_filter(posed.box_sides),
         box=lambda solid, _: (solid.min, solid.max, float("inf")),
         bounds=bounds.bounds_of_box,
+        volumes=simple.BOX,
         profile=profiles.on_planes,
         n_faces=lambda solid: 2 * int(solid.dimension),
         clip=segments.on_box,
@@ -93,6 +97,7 @@ ROWS: Final = (
         locator=locators.rows_locator,
         posed=posed.by_filter(posed.rows),
         bounds=bounds.bounds_of_convex,
+        volumes=simple.CONVEX,
         profile=profiles.on_planes,
         n_faces=lambda solid: len(solid.planes),
         clip=segments.on_planes,
@@ -114,6 +119,7 @@ ROWS: Final = (
         posed=posed.by_filter(posed.faces),
         box=bounds.vertices_box,
         bounds=bounds.bounds_of_vertices,
+        volumes=measures.MESH,
         profile=profiles.on_boundary,
         n_faces=lambda solid: int(solid.n_faces),
         clip=boundary.on_boundary,
@@ -133,6 +139,7 @@ ROWS: Final = (
         stored=("vertices", "face_offsets", "face_indices"),
         box=bounds.vertices_box,
         bounds=bounds.bounds_of_vertices,
+        volumes=measures.SURFACE,
         profile=profiles.on_boundary,
         meets={3: "mesh"},
         measure=TriangleMeasure,
@@ -148,6 +155,7 @@ ROWS: Final = (
         posed=posed.by_filter(posed.triangle),
         box=bounds.triangle_box,
         bounds=bounds.bounds_of_vertices,
+        volumes=simple.TRIANGLE,
         profile=profiles.on_triangle,
         n_faces=lambda solid: len(solid.vertices),
         meets={2: "outline"},
@@ -165,6 +173,7 @@ ROWS: Final = (
         posed=posed.by_filter(posed.rings),
         box=bounds.vertices_box,
         bounds=bounds.bounds_of_vertices,
+        volumes=simple.RINGS,
         profile=profiles.on_boundary,
         n_faces=lambda solid: len(solid.vertices),
         clip=boundary.on_boundary,

@@ -36,6 +36,10 @@ from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.lines import clip_lines
+from engine.solid_cutting.cut import cut
+from engine.solid_cutting.measures import area, centroid, volume
+from engine.solid_cutting.overlap import iou, overlap_volume
+from engine.solid_cutting.section import section
 from engine.solids.base import Solid
 from engine.solids.bounds import bounds
 from engine.solids.checks import as_points, shown
@@ -282,6 +286,30 @@ def _warm_bounds() -> None:
     orientations(*np.zeros((4, 1, 3)))  # of meshes that are inspected
 
 
+def _warm_cutting() -> None:
+    cube = _cube()
+    notched = Polyhedron(*_notched())
+    for solid in (cube, notched):
+        volume(solid), area(solid), centroid(solid)
+        section(solid, [0.25, 0.5, 0.6, 0.75])
+        for keep in (HalfSpace([1, 0.25, 0.5], -0.6), Aabb([0.2] * 3, [0.8] * 3)):
+            made = cut(solid, keep, measures=True)
+            made.solid  # noqa: B018
+    overlap_volume(cube, Aabb([0.2] * 3, [0.8] * 3))
+    squares = np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]])
+    iou(squares, squares + 1.0)
+
+
+def _notched() -> tuple[Any, Any]:
+    """Return a cube with a cube cut out of a corner of it, and a cavity: not convex, with holes in its sections."""
+    inner = _cube(0.5)
+    outer = _cube()
+    return (
+        np.concatenate([outer.vertices * 4.0 - 1.0, inner.vertices]),
+        np.concatenate([outer.triangles, inner.triangles + len(outer.vertices)]),
+    )
+
+
 STEPS = (
     _warm_overlay,
     _warm_poses,
@@ -292,14 +320,15 @@ STEPS = (
     _warm_scenes,
     _warm_bounds,
     _warm_distances,
+    _warm_cutting,
     _warm_containment,
     _warm_overlay_rest,
     _warm_cells,
 )
 """Parts of the work, long ones first; a kernel that several need is compiled by the first, or in several processes."""
-SHARES = (19, 15, 14, 13, 8, 10, 9, 3, 3, 2, 3, 1)
+SHARES = (18, 15, 14, 13, 8, 10, 8, 3, 3, 2, 2, 3, 1)
 """Duration of each of `STEPS`, in per cent."""
-GROUPS = ((1, 4, 6, 2, 7, 8, 9, 11), (0, 3, 5, 10))
+GROUPS = ((1, 4, 6, 2, 7, 8, 9, 10, 12), (0, 3, 5, 11))
 """Indices of the steps that one process each calls where the same bytes are wanted whatever the machine: their order
 decides symbols and inlining. What both compile is that of the first."""
 _LOCATING, _CLIPPING = (_warm_containment, _warm_cells), (_warm_clipping_2d, _warm_clipping_3d)
@@ -320,6 +349,7 @@ OPERATIONS = {
     "overlay_batch": (_warm_overlay, _warm_overlay_rest),
     "union_all": (_warm_overlay, _warm_overlay_rest),
     "bounds": (_warm_bounds,),
+    **dict.fromkeys(("volume", "area", "centroid", "section", "cut", "overlap_volume", "iou"), (_warm_cutting,)),
 }
 """The steps of each operation."""
 

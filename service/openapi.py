@@ -30,6 +30,7 @@ _TAGS: Final = {
     "clipping": "What remains of segments and polygons?",
     "layers": "Polygons with attributes, as maps have them: GeoJSON.",
     "bounds": "The smallest box and ball.",
+    "solids cut": "Volumes, sections, closed halves, overlaps of two.",
     "compare": "The exact answer beside the textbook's plain float64 one.",
     "solids": "Solids kept between requests.",
     "binary": "Raw float64 there and back, and files of meshes.",

@@ -113,6 +113,20 @@ def _csv(columns: dict[str, npt.NDArray[Any]]) -> str:
     return "\n".join([",".join(names), *map(",".join, zip(*lists, strict=True))]) + "\n"
 
 
+def write_mesh(target: str | None, vertices: FloatArray, faces: npt.NDArray[Any]) -> None:
+    """Write a mesh of triangles: .npz, else as OFF. target: a path; None: OFF to the standard output."""
+    suffix = "" if target is None else Path(target).suffix.lower()
+    if suffix == ".npz":
+        np.savez(str(target), vertices=vertices, faces=faces)
+        return
+    if suffix not in ("", ".off"):
+        raise InvalidInputError(f"{target}: a mesh is written to .off or .npz", ("output",))
+    rows = [" ".join(map(repr, row)) for row in vertices.tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
+    with _open_output(target) as file:
+        file.write("\n".join(["OFF", f"{len(vertices)} {len(faces)} 0", *rows]) + "\n")
+
+
 def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
     """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if any."""
     with _open_output(target) as file:

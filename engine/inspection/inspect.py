@@ -11,9 +11,9 @@ import numpy as np
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.files.meshes import read_mesh
-from engine.inspection.faults import are_flat, crossings, edges_of, junctions, nesting, shells_of
 from engine.inspection.mends import filled, oriented, welded
 from engine.running.budget import Budget, Cancel
+from engine.solid_cutting.faults import are_flat, crossings, edges_of, junctions, nesting, shells_of
 from engine.solids.accepted import SolidLike
 from engine.solids.checks import as_points, shown
 from engine.solids.columns import ByValue

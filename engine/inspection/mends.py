@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
-from engine.inspection.faults import edges_of, junctions, nesting, shells_of
 from engine.running.budget import Budget, polled
+from engine.solid_cutting.faults import edges_of, junctions, nesting, shells_of
 from engine.types import FloatArray, IntArray
 
 

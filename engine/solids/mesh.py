@@ -316,6 +316,20 @@ class Polyhedron(Mesh):
     type: ClassVar[str] = "polyhedron"
     _must_close: ClassVar[bool] = True
 
+    @classmethod
+    def of_arrays(cls, vertices: FloatArray, triangles: IntArray) -> Polyhedron:
+        """Return a polyhedron of these arrays without a copy or checks. triangles: (m, 3). Caller guarantees that they
+        are read-only, have no -0.0, and close by index with three different vertices each."""
+        first = first_equal(vertices)
+        indices = triangles.reshape(-1)
+        merged = None if first is None else read_only(first[indices])
+        polyhedron = object.__new__(cls)
+        polyhedron._set(
+            dimension=3, vertices=vertices, face_indices=indices, _face_offsets=None, _triangles=merged,
+            _triangle_faces=None,
+        )  # fmt: skip
+        return polyhedron
+
 
 class Surface(Mesh):
     """The faces themselves, open or closed, in any orientation; nothing is inside. For collision and bounds; 3D.

@@ -84,6 +84,8 @@ class Row:
     """(solid, check) -> integer plane rows, to which polygons are clipped."""
     measure: Callable[[Any, Any], Any] | None = None
     """(solid, pose) -> `distance.point_measures.Measure`: distances of points."""
+    volumes: Any = None
+    """`Measures`: the functions for its volume, area and centroid."""
     kind: BodyKind = BodyKind.OTHER
     """The table of a scene in which kernels find a body of this type."""
     meets: Mapping[int, str] = field(default_factory=dict)

@@ -7,7 +7,7 @@ from typing import Any, Final
 from starlette.responses import JSONResponse
 
 import engine
-from service.convert import answers, areas, questions
+from service.convert import answers, areas, cutting, questions
 from service.openapi import router_of
 from service.schemas.bodies import (
     ClearanceRequest,
@@ -32,6 +32,16 @@ from service.schemas.clipping import (
     OverlayBatchResponse,
     OverlayRequest,
     OverlayResponse,
+)
+from service.schemas.cutting import (
+    CutRequest,
+    CutResponse,
+    OverlapRequest,
+    OverlapResponse,
+    SectionRequest,
+    SectionResponse,
+    VolumeRequest,
+    VolumeResponse,
 )
 from service.schemas.points import (
     NEEDED,
@@ -223,6 +233,30 @@ def bounds(question: BoundsRequest, call: CallOf) -> BoundsResponse:
     """Return the smallest axis-aligned box and the smallest sphere that hold the solid."""
     solid = questions.to_solid(question.solid, call, ("solid",))
     return answers.from_bounds(*call.compute(engine.bounds, solid))
+
+
+@router.post("/v1/volume", operation_id="volume", tags=["solids cut"])
+def volume(question: VolumeRequest, call: CallOf) -> VolumeResponse:
+    """Return the volume, area and centroid of a solid, each the double nearest to the exact value."""
+    return cutting.measured(questions.to_solid(question.solid, call, ("solid",)), call)
+
+
+@router.post("/v1/section", operation_id="section", tags=["solids cut"])
+def section(question: SectionRequest, call: CallOf) -> SectionResponse:
+    """Return the sections of a polyhedron by planes, as polygons with holes."""
+    return cutting.sections(question, call)
+
+
+@router.post("/v1/cut", operation_id="cut", tags=["solids cut"])
+def cut(question: CutRequest, call: CallOf) -> CutResponse:
+    """Cut a polyhedron by a half-space, box or convex region; what is left is closed by caps."""
+    return cutting.cut(question, call)
+
+
+@router.post("/v1/overlap", operation_id="overlap", tags=["solids cut"])
+def overlap(question: OverlapRequest, call: CallOf) -> OverlapResponse:
+    """Return the volume that two solids have in common, in the plane the area, and its part of their union."""
+    return cutting.overlaps(question, call)
 
 
 @router.post("/v1/compare", operation_id="compare", tags=["compare"])

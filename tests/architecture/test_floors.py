@@ -26,6 +26,7 @@ FLOORS = {
     "engine.collision": 7,
     "engine.textbook": 7,
     "engine.distance": 8,
+    "engine.solid_cutting": 9,
     "engine.scenes": 9,
     "engine.layers": 10,
     "engine.registry": 10,

@@ -90,6 +90,12 @@ def engine_questions(solid: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
         yield f"distances {its_pose}", lambda p=its_pose: engine.distances(points, solid, pose=p)
     yield "distances nearest", lambda: engine.distances(points, solid, nearest=True)
     yield "distances within", lambda: engine.distances(points, solid, within=1.0)
+    yield "volume", lambda: engine.volume(solid)
+    yield "area", lambda: engine.area(solid)
+    yield "centroid", lambda: engine.centroid(solid)
+    yield "section", lambda: engine.section(solid, [0.5])
+    yield "cut", lambda: engine.cut(solid, engine.HalfSpace([1] * d, 0))
+    yield "overlap_volume", lambda: engine.overlap_volume(solid, engine.Aabb([0] * d, [1] * d))
     yield "clip_segments", lambda: engine.clip_segments(segments, solid)
     yield "clip_lines", lambda: engine.clip_lines(segments, solid)
     yield "clip_polygons", lambda: engine.clip_polygons([SQUARE[d]], solid)
@@ -138,6 +144,10 @@ def service_questions(model: dict[str, Any], d: int) -> Iterator[tuple[str, dict
     yield "contains", {"solid": {"type": "csg", "operation": "union", "operands": [model, sphere]}, "points": points}
     yield "bounds", {"solid": model}
     yield "distances", {"solid": model, "points": points}
+    yield "volume", {"solid": model}
+    yield "section", {"solid": model, "heights": [0.5]}
+    yield "cut", {"solid": model, "region": {"type": "half_space", "normal": [1] * d, "offset": 0}}
+    yield "overlap", {"first": model, "second": sphere}
     yield "clip/segments", {"region": model, "segments": segments}
     yield "clip/lines", {"region": model, "lines": segments}
     yield "clip/polygons", {"region": model, "polygons": [SQUARE[d]]}

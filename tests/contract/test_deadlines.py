@@ -115,12 +115,17 @@ def far_apart_batch() -> dict[str, Any]:
 
 POSE = {"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 1]}
 TIN, POLYNOMIAL = prism(circle(200)), vanishing(400)
+BOX = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}
 MANY_SIDES = {"type": "convex", "planes": np.c_[circle(9_000), np.ones(9_000)].tolist()}
 ZIGZAG = np.c_[np.arange(20_000), 10 * (np.arange(20_000) % 2)].tolist()
 WORK: dict[str, Callable[[], Any]] = {
     "contains": lambda: {"solid": POLYNOMIAL, "points": [[3, 5]] * 100_000},
     "contains_scene": lambda: {"bodies": [{"solid": POLYNOMIAL}], "points": [[3, 5]] * 100_000},
     "bounds": lambda: {"solid": ball(9_000)},
+    "volume": lambda: {"solid": prism(circle(9_000))},
+    "section": lambda: {"solid": prism(circle(3_000)), "heights": np.linspace(0.01, 0.99, 900).tolist()},
+    "cut": lambda: {"solid": prism(circle(9_000)), "region": ball(200)},
+    "overlap": lambda: {"first": TIN, "second": BOX, "poses": [POSE] * 999},
     "collide": lambda: {"first": TIN, "second": TIN, "poses": [POSE] * 10_000},
     "clearance": lambda: {"first": TIN, "second": TIN, "poses": [{**POSE, "translation": [0, 0.5, 3]}] * 10_000},
     "distances": lambda: {"solid": MANY_SIDES, "points": [[5, 5]] * 100},

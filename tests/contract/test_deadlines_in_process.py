@@ -124,6 +124,28 @@ def nested() -> tuple[Any, Any]:
     return engine.Surface(outer.vertices, outer.triangles), engine.Polyhedron(0.5 * inner.vertices, inner.triangles)
 
 
+@cache
+def wrinkled() -> tuple[Any, Any]:
+    ball = fine_ball(300)
+    sizes = np.random.default_rng(0).uniform(0.99, 1.0, (len(ball.vertices), 1))
+    return ball.vertices * sizes, ball.triangles
+
+
+def vast() -> Any:
+    """Return a ball that is not convex, with nothing prepared."""
+    return engine.Polyhedron(*wrinkled())
+
+
+@cache
+def spread_out() -> Any:
+    """Return surfaces whose exponents only integers hold."""
+    vertices, faces = wrinkled()
+    return engine.Surface(
+        np.concatenate([vertices * 1e150, vertices[:3] * 1e-200]),
+        np.concatenate([faces, len(vertices) + np.arange(3)[None]]),
+    )
+
+
 def fan(n: int) -> list[Any]:
     """Return thin triangles that all cross each other."""
     turns = np.pi * np.arange(n) / n
@@ -160,6 +182,13 @@ WORK: dict[str, Callable[..., Any]] = {
     "Scene.locate": lambda **end: engine.Scene([solid("vanishing")]).locate(POINTS, **end),
     "Surface": lambda **end: engine.Surface(*arrows(), **end),
     "bounds": lambda **end: engine.bounds(new(solid("ball")), **end),
+    "area": lambda **end: engine.area(spread_out(), **end),
+    "centroid": lambda **end: engine.centroid(vast(), **end),
+    "volume": lambda **end: engine.volume(vast(), **end),
+    "cut": lambda **end: engine.cut(vast(), engine.HalfSpace([0, 0, 1], -0.5), **end),
+    "section": lambda **end: engine.section(vast(), np.linspace(0.1, 0.9, 99), **end),
+    "overlap_volume": lambda **end: engine.overlap_volume(vast(), engine.Aabb([-1] * 3, [1] * 3), **end),
+    "iou": lambda **end: engine.iou(vast(), engine.Aabb([-1] * 3, [1] * 3), **end),
     "clearance": lambda **end: engine.clearance(*nested(), **end),
     "clearance_poses": lambda **end: engine.clearance_poses(solid("tin"), solid("tin"), *poses(10_000, 3.0), **end),
     "distances": lambda **end: engine.distances(POINTS, solid("many sides"), **end),

@@ -173,6 +173,23 @@ def test_bounds(cube: str, capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
+def test_volume_section_and_cut(cube: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["volume", cube]) == 0
+    assert capsys.readouterr().out.split() == ["volume,area,centroid_0,centroid_1,centroid_2", "1.0,6.0,0.5,0.5,0.5"]
+    assert main(["section", cube, "0.25", "7", "--normal", "1", "0", "0"]) == 0
+    header, *rows = capsys.readouterr().out.split()
+    assert header == "plane,piece,ring,position_0,position_1,position_2"
+    assert {row.split(",")[0] for row in rows} == {"0"}
+    assert {row.split(",")[3] for row in rows} == {"0.25"}
+    half, target = '{"type": "half_space", "normal": [0, 0, 1], "offset": -0.5}', str(tmp_path / "half.off")
+    for keep, middle in (("inside", 0.75), ("outside", 0.25)):
+        assert main(["cut", cube, half, "--keep", keep, "-o", target]) == 0
+        solid = engine.read_mesh(target).solid()
+        assert (engine.volume(solid), engine.centroid(solid).tolist()) == (0.5, [0.5, 0.5, middle])  # type: ignore[union-attr]
+    assert main(["cut", cube, half, "-o", str(tmp_path / "half.stl")]) == 2
+    assert "written to .off or .npz" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "off", "glb"])
 def test_every_mesh_format(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trimesh = pytest.importorskip("trimesh", reason="the extra `formats` is not installed")

@@ -32,6 +32,8 @@ VALUES: dict[str, Any] = {
     "batch": engine.overlay_batch([SQUARE, OTHER], [OTHER, SQUARE], "difference"),
     "clipped": engine.clip_polygons([[[[0, 0], [4, 0], [4, 4]]]], engine.Aabb([0, 0], [2, 2])),
     "lines": engine.clip_lines([[[0, 0], [3, 1], [5, 5]]], engine.Aabb([0, 0], [2, 2])),
+    "cut": engine.cut(CUBE, engine.HalfSpace([1, 2, 3], -1)),
+    "sections": engine.section(CUBE, [0.25, 0.5], normal=[1, 2, 3]),
     "locations": engine.locate_scene([[0.5, 0.5], [3, 0]], [SQUARE, OTHER]),
 }
 

@@ -28,6 +28,9 @@ def results() -> dict[str, Any]:
         "polygons": engine.clip_polygons([SQUARE], Aabb((0, 0), (1, 1))),
         "points": engine.locate_scene([(0.5, 0.5, 0.5), (1, 0.5, 0.5), (9, 9, 9)], [CUBE, BESIDE]),
         "scene pieces": engine.Scene([CUBE, BESIDE]).clip_segments(SEGMENTS),
+        "sections": engine.section(
+            ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), [0.5]
+        ),
         "batch": engine.overlay_batch([SQUARE], [SQUARE]),
     }
 

@@ -145,7 +145,7 @@ def test_steps_are_all_in_some_group_and_some_operation() -> None:
     assert all(hasattr(engine, name) for name in warmup.OPERATIONS)
 
 
-@pytest.mark.parametrize("operations", [["volume"], "overlay", [1], ["overlay", "?"], 5, [[]]])
+@pytest.mark.parametrize("operations", [["volumes"], "overlay", [1], ["overlay", "?"], 5, [[]]])
 def test_an_unknown_operation_is_refused(operations: Any) -> None:
     with pytest.raises(engine.InvalidInputError, match="overlay_batch"):
         engine.warm(operations=operations)

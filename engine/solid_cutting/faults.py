@@ -17,13 +17,15 @@ from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
 from engine.collision.codes import DISJOINT, TOUCHING
 from engine.collision.collide import collide
 from engine.collision.triangles import collide_triangles
+from engine.compiling.jit import entry_of
 from engine.containment.locate import locate
 from engine.errors import EngineError
 from engine.polygon_clipping.planes import orientations
 from engine.predicates.rational import cross, scaled_integers
 from engine.running.budget import Budget, polled
+from engine.solid_cutting.face_pairs import find_candidates
 from engine.solids.mesh import Polyhedron
-from engine.types import FloatArray, IntArray, Rcc8
+from engine.types import FloatArray, IntArray, Rcc8, read_only
 
 _POLLED: Final = 1 << 10
 """Turns of a loop in Python between two checks of the deadline."""
@@ -134,11 +136,11 @@ def nesting(
             else:  # all its corners are on the other's faces
                 lies = collide(closed[number][1], closed[other][1], detail=True, **limits).detail
                 depth += lies in (Rcc8.TPP, Rcc8.NTPP)
-        volume = _sign_of_volume(points, faces[shell], budget)
+        volume = sign_of_volume(points, faces[shell], budget)
         yield shell, volume != 0 and (volume > 0) is (depth % 2 == 1)
 
 
-def _sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
+def sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
     """Return the sign of the volume that triangles run around, exactly."""
     corners = points[faces] - points[faces[0, 0]]
     with np.errstate(all="ignore"):
@@ -170,6 +172,9 @@ def crossings(
     for block in pairs_of_boxes(low, high, budget.flag, 1 << 16) if len(solid_faces) else ():
         budget.check()
         pairs = solid_faces[block]
+        may_meet = np.empty(len(pairs), np.bool_)
+        entry_of(find_candidates)(read_only(points), read_only(faces), read_only(pairs), may_meet)
+        pairs = pairs[may_meet]
         first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
         same = first[:, :, None] == second[:, None, :]
         n_common = same.sum(axis=(1, 2))

@@ -1,0 +1,1 @@
+"""Solids measured and cut: volumes, sections, capped halves, overlaps of two."""

@@ -1,0 +1,367 @@
+"""The chain of sides along a plane as polygons with holes, and these as triangles.
+
+Sides that run both ways between the same points cancel. Where more than two meet in a point each incoming one is
+matched with the outgoing one next to it clockwise, as parentheses are, so that rings do not pass through each other;
+a ring that comes to a point again is cut there. Rings run counter-clockwise about what is inside, seen against the
+normal of the plane: shells counter-clockwise, holes clockwise. Rings may touch each other.
+
+Which shell has a hole, and the triangles, are proposed by floats and checked exactly (`ears.py`); else by fractions.
+
+Source: K. Weiler, P. Atherton, Hidden surface removal using polygon area sorting, 1977 (the walk along the chain).
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from fractions import Fraction
+from functools import cmp_to_key
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.compiling.jit import entry_of
+from engine.errors import TooComplexError
+from engine.predicates.rational import largest_axis, sign_of
+from engine.running.budget import Budget
+from engine.solid_cutting.ears import bridge_of, clip_ears
+from engine.solid_cutting.face_cuts import find_turned
+from engine.solid_cutting.plane_cut import Plane, Points, without_repeats
+from engine.types import FloatArray, IntArray, read_only
+
+Ring = list[int]
+
+
+class Seen(NamedTuple):
+    """Points seen against the normal of a plane: two axes, in which counter-clockwise is so about the normal."""
+
+    points: Points
+    axes: tuple[int, int]
+
+    def doubles(self, ring: Sequence[int]) -> FloatArray:
+        """Return the rounded positions (n, 2) of points."""
+        return self.points.at(np.array(ring, np.int64))[0][:, list(self.axes)]
+
+    def exact(self, number: int) -> tuple[Fraction, Fraction]:
+        """Return the exact position of a point."""
+        place = self.points.exact(number)
+        return Fraction(place[self.axes[0]], place[3]), Fraction(place[self.axes[1]], place[3])
+
+    def turn(self, i: int, j: int, k: int) -> int:
+        """Return the exact sign of the turn at j from i to k."""
+        a, b = self.axes
+        p, q, r = (self.points.exact(number) for number in (i, j, k))
+        ux, uy = q[a] * p[3] - p[a] * q[3], q[b] * p[3] - p[b] * q[3]
+        vx, vy = r[a] * p[3] - p[a] * r[3], r[b] * p[3] - p[b] * r[3]
+        return sign_of(ux * vy - uy * vx)
+
+
+class Area(NamedTuple):
+    """A polygon of a plane, by points: a shell and its holes."""
+
+    shell: Ring
+    holes: list[Ring]
+
+
+def seen(points: Points, plane: Plane) -> Seen:
+    """Return how points are seen against the normal of a plane."""
+    axis = largest_axis(plane.integers[:3])
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    return Seen(points, (i, j) if plane.integers[axis] > 0 else (j, i))
+
+
+def rings_of(view: Seen, chain: IntArray, budget: Budget) -> list[Ring]:
+    """Return the rings of a chain of directed sides (k, 2), each simple in its points, from its leftmost point on."""
+    if not len(chain):
+        return []
+    order = np.argsort(chain[:, 0])
+    known = chain[order, 0]
+    ends, is_simple = chain, bool((known[1:] != known[:-1]).all())
+    if is_simple:
+        after = order[np.searchsorted(known, chain[:, 1])].tolist()
+    else:
+        ends, after = _balanced(view, chain, budget)
+    starts, is_done, rings = ends[:, 0].tolist(), [False] * len(ends), []
+    for first in range(len(ends)):
+        walk: Ring = []
+        side = first
+        while not is_done[side]:  # bound: each side once
+            is_done[side] = True
+            walk.append(starts[side])
+            side = after[side]
+        if walk:
+            rings += [walk] if is_simple else _parted(walk)
+    return [_from_leftmost(view, ring) for ring in rings if len(ring) > 2]  # others run there and back
+
+
+def _parted(walk: Ring) -> list[Ring]:
+    """Return a closed walk as rings that come to no point twice."""
+    rings: list[Ring] = []
+    way: Ring = []
+    place: dict[int, int] = {}
+    for point in walk:
+        if point in place:  # the walk is here again: what it made is a ring of its own
+            rings.append(way[place[point] :])
+            for other in rings[-1]:
+                del place[other]
+            del way[len(way) - len(rings[-1]) :]
+        place[point] = len(way)
+        way.append(point)
+    return [*rings, way]
+
+
+def _balanced(view: Seen, chain: IntArray, budget: Budget) -> tuple[IntArray, list[int]]:
+    """Return the sides (k, 2) of a chain that do not cancel, and by side the next one of its ring."""
+    n = int(chain.max()) + 1
+    keys, net = np.unique(chain.min(axis=1) * n + chain.max(axis=1), return_inverse=True)
+    net = np.bincount(net.reshape(-1), np.sign(chain[:, 1] - chain[:, 0])).astype(np.int64)
+    ends = np.stack(np.divmod(keys, n), axis=1)
+    ends = np.where(net[:, None] > 0, ends, ends[:, ::-1]).repeat(np.abs(net), axis=0)
+    following: dict[int, list[int]] = defaultdict(list)
+    for side, (start, _) in enumerate(ends.tolist()):
+        following[start].append(side)
+    targets = ends[:, 1].tolist()
+    after = [following[end][0] for end in targets]
+    for point in [point for point, sides in following.items() if len(sides) > 1]:
+        budget.check()
+        incoming = np.flatnonzero(ends[:, 1] == point).tolist()
+        for side, other in _matched(view, point, ends, incoming, following[point]):
+            after[side] = other
+    return ends, after
+
+
+def _from_leftmost(view: Seen, ring: Ring) -> Ring:
+    places = view.doubles(ring)
+    first = int(np.lexsort((places[:, 1], places[:, 0]))[0])
+    return ring[first:] + ring[:first]
+
+
+def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoing: list[int]) -> list[tuple[int, int]]:
+    """Return pairs (incoming, outgoing) of sides at a point."""
+    x, y = view.exact(point)
+    rays: list[tuple[int, Fraction, Fraction, int, bool]] = []
+    for side, other in [(k, int(ends[k, 0])) for k in incoming] + [(k, int(ends[k, 1])) for k in outgoing]:
+        u, v = (a - b for a, b in zip(view.exact(other), (x, y)))
+        rays.append((0 if v > 0 or (v == 0 and u > 0) else 1, u, v, side, len(rays) < len(incoming)))
+
+    def clockwise(one: Any, other: Any) -> int:
+        return int(other[0] - one[0]) or sign_of(one[2] * other[1] - one[1] * other[2]) * -1
+
+    order = sorted(rays, key=cmp_to_key(clockwise))
+    waiting: list[int] = []
+    pairs: dict[int, int] = {}
+    for *_, side, is_incoming in order + order:
+        if is_incoming and side not in pairs and side not in waiting:
+            waiting.append(side)
+        elif not is_incoming and waiting and side not in pairs.values():
+            pairs[waiting.pop()] = side
+    return list(pairs.items())
+
+
+def areas_of(view: Seen, rings: list[Ring], budget: Budget, is_exact: bool = False) -> tuple[list[Area], list[Ring]]:
+    """Return rings as polygons with holes, and those without area. is_exact: decide with fractions which shell has a
+    hole."""
+    signs = [_sign_of(view, ring) for ring in rings]
+    shells = [ring for ring, sign in zip(rings, signs) if sign > 0]
+    areas = [Area(shell, []) for shell in shells]
+    holes = [ring for ring, sign in zip(rings, signs) if sign < 0]
+    boxes = [np.stack([places.min(axis=0), places.max(axis=0)]) for places in map(view.doubles, shells)]
+    for hole in holes:
+        budget.check()
+        low, high = (pick(view.doubles(hole), axis=0) for pick in (np.min, np.max))  # rounding is monotonic
+        may = [k for k, box in enumerate(boxes) if (box[0] <= low).all() and (high <= box[1]).all()]
+        best = may[0] if len(may) == 1 else may[_holder(view, hole, [shells[k] for k in may], is_exact)]
+        areas[best].holes.append(hole)
+    return areas, [ring for ring, sign in zip(rings, signs) if sign == 0]
+
+
+def _sign_of(view: Seen, ring: Ring) -> int:
+    """Return the exact sign of the area of a ring."""
+    places = view.doubles(ring)
+    off = places - places[0]
+    terms = off[:, 0] * np.roll(off[:, 1], -1) - off[:, 1] * np.roll(off[:, 0], -1)
+    span, size = float(np.abs(off).max()), float(np.abs(places).max())
+    bound = len(ring) * 2.0**-49 * (span * size + span * span) + 2.0**-1000
+    total = float(terms.sum())
+    if abs(total) > bound and np.isfinite(bound):
+        return 1 if total > 0 else -1
+    corners = [view.exact(number) for number in ring]
+    return sign_of(sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1])))
+
+
+def _holder(view: Seen, hole: Ring, shells: list[Ring], is_exact: bool) -> int:
+    """Return the number of the smallest shell that has a corner of a hole within, or an even chance of it on itself."""
+    places = [[view.exact(k) for k in ring] if is_exact else view.doubles(ring).tolist() for ring in (hole, *shells)]
+    best, least = 0, None
+    for number, ring in enumerate(places[1:]):
+        size = abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(ring, ring[1:] + ring[:1])))
+        if least is not None and size >= least:
+            continue
+        sides = (_side_of(ring, corner) for corner in places[0])
+        if next((side for side in sides if side != 0), 1) > 0:
+            best, least = number, size
+    return best
+
+
+def _side_of(ring: list[Any], corner: Any) -> int:
+    """Return 1 for a point within a ring, -1 for one outside, 0 for one on it."""
+    x, y = corner
+    is_in = False
+    for (ax, ay), (bx, by) in zip(ring, ring[1:] + ring[:1]):
+        if (ay > y) != (by > y):
+            turn = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+            if turn == 0:
+                return 0
+            is_in ^= (turn > 0) == (by > ay)
+        elif (ay == y == by and min(ax, bx) <= x <= max(ax, bx)) or (ax == x and ay == y):
+            return 0
+    return 1 if is_in else -1
+
+
+def cap_of(view: Seen, chain: IntArray, budget: Budget) -> IntArray:
+    """Return triangles (k, 3) that close a chain, clockwise seen against the normal of the plane. Raises:
+    TooComplexError."""
+    rings = rings_of(view, chain, budget)
+    areas, flat = areas_of(view, rings, budget)
+    made = [_fan_of(ring) for ring in flat]
+    try:
+        made += [triangles_of(view, area, False, budget) for area in areas]
+    except _TurnedError:
+        chain, joints = _split_at_contacts(view, chain, budget)
+        areas, flat = areas_of(view, rings_of(view, chain, budget), budget, True)
+        made = [joints, *(_fan_of(ring) for ring in flat)]
+        for area in areas:
+            try:
+                made.append(triangles_of(view, area, False, budget))
+            except _TurnedError:
+                made.append(triangles_of(view, area, True, budget))
+    return without_repeats(np.concatenate([np.zeros((0, 3), np.int64), *made])[:, ::-1])
+
+
+def _split_at_contacts(view: Seen, chain: IntArray, budget: Budget) -> tuple[IntArray, IntArray]:
+    """Return a chain of which each side is split at the points of others that lie on it, and flat triangles between
+    the sides before and after: so that sides that lie on each other cancel."""
+    numbers = np.unique(chain)
+    places = view.doubles(numbers.tolist())
+    sides: list[tuple[int, int]] = []
+    joints: list[tuple[int, int, int]] = []
+    slack = 2.0**-40 * np.abs(places).max()
+    for start, end in chain.tolist():
+        budget.check()
+        a, b = view.doubles([start, end])
+        near = ((places >= np.minimum(a, b) - slack) & (places <= np.maximum(a, b) + slack)).all(axis=1)
+        off = np.abs((b[0] - a[0]) * (places[:, 1] - a[1]) - (b[1] - a[1]) * (places[:, 0] - a[0]))
+        near &= off <= 4.0 * slack * np.abs(b - a).sum() + slack * slack
+        others = [k for k in numbers[near].tolist() if k not in (start, end) and view.turn(start, end, k) == 0]
+        if others:
+            p, q = view.exact(start), view.exact(end)
+            ahead = {k: sum((x - y) * (z - y) for x, y, z in zip(view.exact(k), p, q)) for k in others}
+            length = sum((z - y) ** 2 for y, z in zip(p, q))
+            others = sorted((k for k in others if 0 < ahead[k] < length), key=ahead.__getitem__)
+        stops = [start, *others, end]
+        sides += pairwise(stops)
+        joints += [(start, j, i) for i, j in pairwise(stops[1:])]
+    return np.array(sides, np.int64), np.array(joints, np.int64).reshape(-1, 3)
+
+
+def _fan_of(ring: Ring) -> IntArray:
+    """Return triangles that close a ring without area."""
+    return np.array([(ring[0], i, j) for i, j in pairwise(ring[1:])], np.int64).reshape(-1, 3)
+
+
+class _TurnedError(Exception):
+    """A triangle is turned: what floats proposed is not right."""
+
+
+def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntArray:
+    """Return the triangles (n, 3) of a polygon, checked exactly; is_exact: made with fractions. Raises _TurnedError, or
+    TooComplexError where there is nothing left to try."""
+    rings = [area.shell, *area.holes]
+    numbers = [number for ring in rings for number in ring]
+    n = len(numbers) + 2 * len(area.holes)
+    x: Any
+    y: Any
+    x, y = np.ascontiguousarray(view.doubles(numbers).T)
+    before, after, starts = np.empty(n, np.int64), np.empty(n, np.int64), np.cumsum([0, *map(len, rings)])
+    for start, stop in zip(starts[:-1].tolist(), starts[1:].tolist()):
+        after[start:stop], before[start:stop] = np.arange(start + 1, stop + 1), np.arange(start - 1, stop - 1)
+        after[stop - 1], before[start] = start, stop - 1
+    bridge: Any = entry_of(bridge_of)
+    clip: Any = entry_of(clip_ears)
+    if is_exact:
+        x, y = (list(axis) for axis in zip(*map(view.exact, numbers)))
+        bridge, clip = (getattr(each, "py_func", each) for each in (bridge_of, clip_ears))
+    order = sorted(range(1, len(rings)), key=lambda k: (x[starts[k]], y[starts[k]]))
+    if order:
+        x, y = ([*axis, *[axis[0]] * (n - len(axis))] for axis in (x, y))
+        x, y = (x, y) if is_exact else (np.array(x), np.array(y))
+    end = len(numbers)
+    for hole in (int(starts[k]) for k in order):
+        budget.check()
+        at = bridge(x, y, before, after, 0, hole)
+        if at < 0:
+            raise _failed(view, area, is_exact)
+        x[end], y[end], x[end + 1], y[end + 1] = x[at], y[at], x[hole], y[hole]
+        numbers += [numbers[at], numbers[hole]]
+        following, last = after[at], before[hole]
+        after[at], before[hole], after[end], before[following] = hole, at, following, end
+        after[end + 1], before[end], after[last], before[end + 1] = end, end + 1, end + 1, last
+        end += 2
+    ears = np.empty((n - 2, 3), np.int64)
+    scratch = np.empty(n, np.int64), np.zeros(n, np.bool_)
+    n_ears = clip(x, y, before, after, 0, n, *scratch, ears, budget.flag)
+    budget.check()
+    triangles = np.array(numbers, np.int64)[ears[:n_ears]]
+    made = triangles if n_ears == n - 2 else None
+    if made is not None and (turned := _turned_in(view, made, budget)):
+        made = _flipped(view, made, turned, budget)
+    if made is None:
+        raise _failed(view, area, is_exact)
+    return made
+
+
+def _failed(view: Seen, area: Area, is_exact: bool) -> Exception:
+    if not is_exact:
+        return _TurnedError()
+    at = view.points.at(np.array(area.shell[:1]))[0][0].tolist()
+    return TooComplexError(f"the section around {at} is not a polygon whose rings only touch; move the plane a little")
+
+
+def _turned_in(view: Seen, triangles: IntArray, budget: Budget) -> list[int]:
+    """Return which triangles are clockwise, exactly."""
+    used, local = np.unique(triangles, return_inverse=True)
+    high, low = view.points.at(used)
+    is_open = np.empty(len(triangles), np.bool_)
+    axes = read_only(np.array(view.axes))
+    with np.errstate(all="ignore"):
+        size = float(2.0 * np.abs(high).max(initial=0.0))
+        entry_of(find_turned)(high, low, size, local.reshape(-1, 3), axes, is_open)
+    turned = []
+    for row in np.flatnonzero(is_open).tolist():
+        budget.check()
+        if view.turn(*triangles[row].tolist()) < 0:
+            turned.append(row)
+    return turned
+
+
+def _flipped(view: Seen, triangles: IntArray, turned: list[int], budget: Budget) -> IntArray | None:
+    """Return triangles with edges of those that are clockwise flipped, so that none is; None where that fails: floats
+    made them of points that are nearly on a line."""
+    rows = triangles.tolist()
+    across = {(row[k], row[k - 2]): number for number, row in enumerate(rows) for k in range(3)}
+    for number in turned:
+        budget.check()
+        for k in range(3):
+            a, b, c = rows[number][k], rows[number][k - 2], rows[number][k - 1]
+            other = across.get((b, a), -1)
+            if other < 0 or len({*rows[other], c}) < 4:
+                continue
+            d = sum(rows[other]) - a - b
+            if view.turn(a, d, c) >= 0 and view.turn(d, b, c) >= 0:
+                rows[number], rows[other] = [a, d, c], [d, b, c]
+                across |= {(a, d): number, (d, c): number, (c, a): number, (d, b): other, (b, c): other, (c, d): other}
+                break
+        else:
+            return None
+    return np.array(rows, np.int64)

@@ -1,0 +1,159 @@
+"""Volumes and areas of what planes leave, each the double nearest to the exact value for the input.
+
+Faces of given vertices are summed by the kernels. Corners that are cut points are rational, with denominators of their
+own, so a sum of them as one fraction would grow with their number: they are cut off to a number of bits, in integers,
+each off by less than one unit. With M the largest coordinate and L the largest difference of two, in units:
+
+    m (a.z + b.z + c.z)     m off by 16 (M + 1), the sum by 6:            120 (M + 1)^2 a face
+    |(b - a) x (c - a)|     differences off by 2, products by 4 L + 4:    16 L + 16    a face
+    p x q, seen along z     2 products of 2 numbers:                      4 (M + 1)    a side
+
+Both ends of what the total may be must round alike; else there are more bits, and at last exact fractions.
+
+Source: the divergence theorem; interval arithmetic: Moore, Interval Analysis, 1966.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from math import isqrt
+from typing import Final
+
+import numpy as np
+
+from engine.compiling.jit import entry_of
+from engine.predicates.rational import cross, minus, nearest_float, nearest_with_root, squared_length
+from engine.running.budget import Budget
+from engine.solid_cutting.caps import Area, Seen
+from engine.solid_cutting.exact_sums import ExactMesh, exact_mesh, exact_volume, nearest_area
+from engine.solid_cutting.plane_cut import Plane, Points
+from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_volume
+from engine.types import IntArray, read_only
+
+_NO_SIDES: Final = read_only(np.zeros(0, np.int8))
+_MOST_BITS: Final = 1 << 12
+Whole = tuple[int, int, int]
+
+
+def _cut_off(points: Points, numbers: Iterable[int], bits: int) -> tuple[dict[int, Whole], int, int]:
+    """Return the coordinates of points in units of 2^-k, cut off, k, and the largest of them."""
+    k = bits - int(np.frexp(points.size)[1])
+    places = {}
+    for number in numbers:
+        x, y, z, w = points.exact(number)
+        w, up = (w, k) if k >= 0 else (w << -k, 0)
+        places[number] = ((x << up) // w, (y << up) // w, (z << up) // w)
+    return places, k, max((abs(x) for place in places.values() for x in place), default=0) + 1
+
+
+def _narrowed(ends_of: Callable[[int], tuple[float, float]]) -> float | None:
+    """Return what both ends of a value round to, with as many bits as it takes; None beyond `_MOST_BITS`."""
+    bits = 128
+    while bits <= _MOST_BITS:
+        low, high = ends_of(bits)
+        if low == high:
+            return low
+        bits *= 4
+    return None
+
+
+def _parted(points: Points, triangles: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the triangles for kernels, and those for integers."""
+    is_new = (triangles >= points.n_given).any(axis=1) if points.is_in_range else np.ones(len(triangles), np.bool_)
+    return read_only(triangles[~is_new]), triangles[is_new]
+
+
+def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: Fraction = Fraction(1)) -> float:
+    """Return factor times the volume of a closed mesh of points, its faces outwards."""
+    given, others = _parted(points, triangles)
+    z0 = float(points.vertices[given[0, 0], 2]) if len(given) else 0.0
+    sums = np.zeros((1, 3))
+    with np.errstate(all="ignore"):
+        entry_of(sum_volume)(points.vertices, given, _NO_SIDES, z0, sums, budget.flag)
+    budget.check()
+    known, off = Fraction(sums[0, 0]) + Fraction(sums[0, 1]), Fraction(bound_of(float(sums[0, 2]), len(given)))
+    rows = others.tolist()
+
+    def ends_of(bits: int) -> tuple[float, float]:
+        places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
+        base = Fraction(z0) * Fraction(2) ** k
+        z_unit, z_rest = base.numerator // base.denominator, base.denominator
+        total = 0
+        for i, j, m in rows:
+            a, b, c = places[i], places[j], places[m]
+            minor = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            total += minor * ((a[2] + b[2] + c[2]) - 3 * z_unit)
+        budget.check()
+        slack = len(rows) * (120 * (most + abs(z_unit) + 1) ** 2 + (12 * (most + 1) ** 2 if z_rest > 1 else 0))
+        unit = Fraction(1, 6) / Fraction(2) ** (3 * k)
+        middle, width = known / 6 + total * unit, off / 6 + slack * unit
+        return nearest_float(factor * (middle - width)), nearest_float(factor * (middle + width))
+
+    value = _narrowed(ends_of)
+    return nearest_float(factor * exact_volume(_as_fractions(points, triangles))) if value is None else value
+
+
+def _as_fractions(points: Points, triangles: IntArray) -> ExactMesh:
+    used, local = np.unique(triangles, return_inverse=True)
+    places = [points.exact(number) for number in used.tolist()]
+    return exact_mesh([[Fraction(x, p[3]) for x in p[:3]] for p in places], map(tuple, local.reshape(-1, 3).tolist()))
+
+
+def area_of_cut(points: Points, triangles: IntArray, budget: Budget) -> float:
+    """Return the area of triangles of points."""
+    given, others = _parted(points, triangles)
+    sums = np.zeros((1, 3))
+    with np.errstate(all="ignore"):
+        entry_of(sum_area)(points.vertices, given, sums, budget.flag)
+    budget.check()
+    n = len(given)
+    known = Fraction(sums[0, 0]) + Fraction(sums[0, 1])
+    off = Fraction(bound_of(float(sums[0, 2]), n) + n * LOST_TO_ROOTS)
+    rows = others.tolist()
+
+    def ends_of(bits: int) -> tuple[float, float]:
+        places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
+        total = 0
+        for i, j, m in rows:
+            a = places[i]
+            total += isqrt(squared_length(cross(minus(places[j], a), minus(places[m], a))))
+        budget.check()
+        slack = len(rows) * (32 * most + 33)
+        unit = Fraction(1, 2) / Fraction(2) ** (2 * k)
+        middle, width = known / 2 + total * unit, off / 2 + slack * unit
+        return nearest_float(middle - width), nearest_float(middle + width)
+
+    value = _narrowed(ends_of)
+    return nearest_area(_as_fractions(points, triangles)) if value is None else value
+
+
+def area_of_section(view: Seen, plane: Plane, area: Area, budget: Budget) -> float:
+    """Return the area of a polygon of a plane, in the plane."""
+    rings = [area.shell, *area.holes]
+    a, b = view.axes
+    normal = plane.integers[:3]
+    tilt = Fraction(squared_length(normal), normal[3 - a - b] ** 2)
+
+    def rounded(seen_area: Fraction) -> float:
+        square = max(seen_area, Fraction(0)) ** 2 * tilt
+        return nearest_with_root(0, 1, square.numerator * square.denominator, square.denominator)
+
+    def ends_of(bits: int) -> tuple[float, float]:
+        places, k, most = _cut_off(view.points, (number for ring in rings for number in ring), bits)
+        total, n = 0, 0
+        for ring in rings:
+            corners = [places[number] for number in ring]
+            total += sum(p[a] * q[b] - p[b] * q[a] for p, q in zip(corners, corners[1:] + corners[:1]))
+            n += len(ring)
+        budget.check()
+        unit = Fraction(1, 2) / Fraction(2) ** (2 * k)
+        return rounded((total - 4 * n * (most + 1)) * unit), rounded((total + 4 * n * (most + 1)) * unit)
+
+    value = _narrowed(ends_of)
+    if value is None:
+        corners = [[view.exact(number) for number in ring] for ring in rings]
+        value = rounded(
+            sum((p[0] * q[1] - p[1] * q[0] for c in corners for p, q in zip(c, c[1:] + c[:1])), Fraction(0)) / 2
+        )
+    return value

@@ -1,0 +1,170 @@
+"""Volume, area and centroid in integers: the definition, and the exact fallback of the kernels.
+
+A sum of square roots of integers is irrational unless every one of them is whole (square roots of different square-free
+integers are independent over the rationals, and here none is subtracted), so it is never in the middle of two doubles
+then: enough digits decide. The same holds for multiples of pi.
+
+Source: A. S. Besicovitch, On the linear independence of fractional powers of integers, 1940; J. Machin's formula, 1706.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from functools import cmp_to_key
+from itertools import pairwise
+from math import isqrt, lcm
+from typing import NamedTuple
+
+from engine.bounding.double_description import corners_of_half_spaces
+from engine.errors import EmptyGeometryError, UnsupportedSolidError
+from engine.predicates.rational import (
+    Number,
+    cross,
+    dot,
+    largest_axis,
+    minus,
+    nearest_float,
+    scaled_integers,
+    sign_of,
+    squared_length,
+)
+from engine.running.budget import Budget, polled
+
+Point = tuple[int, ...]
+Triple = tuple[int, int, int]
+
+
+class ExactMesh(NamedTuple):
+    """A closed mesh in integers: points over a common denominator `w`, triangles counter-clockwise seen from outside;
+    in the plane, edges."""
+
+    points: list[Point]
+    w: int
+    faces: list[tuple[int, ...]]
+
+
+def exact_mesh(points: Sequence[Sequence[Number]], faces: Iterable[tuple[int, ...]]) -> ExactMesh:
+    """Return a mesh with its coordinates as integers."""
+    size = len(points[0])
+    ratios = [x.as_integer_ratio() for point in polled(list(points)) for x in point]
+    w = lcm(*{bottom for _, bottom in ratios})
+    numbers = [top * (w // bottom) for top, bottom in polled(ratios)]
+    return ExactMesh([tuple(numbers[k : k + size]) for k in range(0, len(numbers), size)], w, list(faces))
+
+
+def exact_volume(mesh: ExactMesh) -> Fraction:
+    """Return the volume of a mesh, or the area of a ring, whose faces look outwards."""
+    points, total = mesh.points, 0
+    if len(points[0]) == 2:
+        total = sum(points[i][0] * points[j][1] - points[j][0] * points[i][1] for i, j in polled(mesh.faces))
+        return Fraction(total, 2 * mesh.w**2)
+    total = sum(dot(points[i], cross(points[j], points[k])) for i, j, k in polled(mesh.faces))
+    return Fraction(total, 6 * mesh.w**3)
+
+
+def exact_centroid(mesh: ExactMesh) -> list[Fraction]:
+    """Return the centroid of what a mesh, or a ring, encloses. Raises: EmptyGeometryError if it has no volume."""
+    points, volume = mesh.points, 0
+    size = len(points[0])
+    sums = [0] * size
+    for face in polled(mesh.faces):
+        corners = [points[k] for k in face]
+        part = dot(corners[0], cross(*corners[1:])) if size == 3 else _cross(*corners)
+        volume += part
+        for k in range(size):
+            sums[k] += part * sum(corner[k] for corner in corners)
+    if volume == 0:
+        raise EmptyGeometryError("a solid without volume has no centroid; average its vertices", ("solid",))
+    return [Fraction(total, (size + 1) * volume * mesh.w) for total in sums]
+
+
+def _cross(u: Sequence[int], v: Sequence[int]) -> int:
+    return u[0] * v[1] - u[1] * v[0]
+
+
+def nearest_area(mesh: ExactMesh) -> float:
+    """Return the double nearest to the area of the triangles of a mesh of space."""
+    squares = []
+    for i, j, k in polled(mesh.faces):
+        a, b, c = mesh.points[i], mesh.points[j], mesh.points[k]
+        squares.append(squared_length(cross(minus(b, a), minus(c, a))))
+    return nearest_sum_of_roots(squares, Fraction(1, 2 * mesh.w**2))
+
+
+def nearest_sum_of_roots(squares: Sequence[int], factor: Fraction) -> float:
+    """Return the double nearest to factor times the sum of the square roots of integers."""
+    if all(isqrt(square) ** 2 == square for square in polled(list(squares))):
+        return nearest_float(factor * sum(map(isqrt, squares)))
+    bits = 64
+    while True:  # bound: the sum is irrational, see the head of this file
+        bits *= 2
+        low = sum(isqrt(square << 2 * bits) for square in polled(list(squares)))
+        ends = [nearest_float(factor * Fraction(total, 1 << bits)) for total in (low, low + len(squares))]
+        if ends[0] == ends[1]:
+            return ends[0]
+
+
+def nearest_multiple_of_pi(factor: Fraction) -> float:
+    """Return the double nearest to factor pi, for factor >= 0."""
+    bits = 64
+    while factor:  # bound: pi is irrational
+        bits *= 2
+        one = 1 << bits
+        pi = 16 * _arctangent(5, one) - 4 * _arctangent(239, one)
+        slack = 40 * bits
+        ends = [nearest_float(factor * Fraction(pi + off, one)) for off in (-slack, slack)]
+        if ends[0] == ends[1]:
+            return ends[0]
+    return 0.0
+
+
+def _arctangent(inverse: int, one: int) -> int:
+    """Return arctan(1 / inverse) in units of 1 / one, each term rounded down."""
+    power, total, n = one // inverse, 0, 1
+    while power:  # bound: it falls to 0
+        total += power // n if n % 4 == 1 else -(power // n)
+        power //= inverse * inverse
+        n += 2
+    return total
+
+
+def mesh_of_half_spaces(rows: Sequence[Sequence[Number]], budget: Budget) -> ExactMesh | None:
+    """Return the boundary of an intersection of half-spaces, None if it has no interior. rows: normal and offset, exact
+    numbers. Raises: UnsupportedSolidError if it is unbounded."""
+    integers = [scaled_integers(row) for row in rows]
+    corners = corners_of_half_spaces(integers, budget)
+    if not corners.is_bounded:
+        more = "this region reaches to infinity, so it has no volume; add the planes that close it"
+        raise UnsupportedSolidError(more, ("solid", "planes"))
+    size = len(integers[0]) - 1
+    if len(corners.points) <= size:
+        return None
+    points, w, _ = exact_mesh(corners.points, [])
+    faces: dict[frozenset[int], list[tuple[int, ...]]] = {}
+    for *normal, offset in integers:
+        budget.check()
+        values = [dot(tuple(normal), point) + offset * w for point in points]
+        on = [k for k, value in enumerate(values) if value == 0]
+        if len(on) == len(points):
+            return None
+        if len(on) >= size and frozenset(on) not in faces:
+            faces[frozenset(on)] = _around(points, on, normal)
+    return ExactMesh(points, w, [face for some in faces.values() for face in some])
+
+
+def _around(points: list[Point], on: list[int], normal: list[int]) -> list[tuple[int, ...]]:
+    """Return the triangles of a face of a convex body, whose corners are `on` and whose inner normal is given; in the
+    plane its edge."""
+    first, *others = on
+    if len(normal) == 2:
+        run = _cross(minus(points[others[0]], points[first]), normal)
+        return [(first, others[0])] if run > 0 else [(others[0], first)]
+    axis = largest_axis(tuple(normal))
+
+    def compare(i: int, j: int) -> int:
+        turn = cross(minus(points[i], points[first]), minus(points[j], points[first]))[axis] * normal[axis]
+        return sign_of(turn)
+
+    ring = sorted(others, key=cmp_to_key(compare))
+    return [(first, i, j) for i, j in pairwise(ring)]

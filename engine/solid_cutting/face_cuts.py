@@ -1,0 +1,107 @@
+"""Compiled: the sides of vertices, the faces that a plane leaves whole, and where edges cross it.
+
+Cut points are double-doubles. With weights w = |value of the plane| at both ends p and q, each known to b,
+
+    t = w_p / (w_p + w_q)     error: below 1.01 (b_p + b_q) / (w_p + w_q)
+    x = p + t (q - p)         error: |q - p| that of t, and `POINT_BOUND` (cut_point.py)
+
+and the double nearest to x is certain where the bound says so; the caller computes the others in integers.
+"""
+
+from __future__ import annotations
+
+from engine.compiling.jit import kernel
+from engine.predicates.cut_point import POINT_BOUND, TINY, point_along
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_sub, fast_two_sum, is_correctly_rounded
+from engine.predicates.side import dd_value, side_of_plane, side_of_plane_filter
+from engine.predicates.vectors import as_point3
+from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, Int8Array, IntArray
+
+_POLL = 0x3FFF
+
+
+@kernel
+def find_sides(vertices: FloatArray, row: FloatArray, is_exact: bool, sides: Int8Array, flag: FlagArray) -> int:
+    """Fill sides (n,) with the sign of the plane `row` (4,) at each vertex; return how many are UNDECIDED.
+    is_exact: the row is not rounded."""
+    plane, n_open = HalfSpace3(row[0], row[1], row[2], row[3]), 0
+    for vertex in range(vertices.shape[0]):
+        if vertex & _POLL == 0 and flag[0] != 0:
+            return 0
+        point = as_point3(vertices, vertex)
+        side = side_of_plane_filter(plane, point)
+        if side == UNDECIDED:
+            if is_exact:
+                side = side_of_plane(plane, point)
+            n_open += side == UNDECIDED
+        sides[vertex] = side
+    return n_open
+
+
+@kernel
+def split_faces(triangles: IntArray, sides: Int8Array, whole: IntArray, mixed: IntArray, flag: FlagArray) -> int:
+    """Write the numbers of the triangles with three corners on side 1 to `whole`, of those with one or two to `mixed`;
+    return n_whole << 32 | n_mixed."""
+    n_whole, n_mixed = 0, 0
+    for item in range(triangles.shape[0]):
+        if item & _POLL == 0 and flag[0] != 0:
+            break
+        count = (
+            int(sides[triangles[item, 0]] > 0) + int(sides[triangles[item, 1]] > 0) + int(sides[triangles[item, 2]] > 0)
+        )
+        whole[n_whole] = item
+        mixed[n_mixed] = item
+        n_whole += count == 3
+        n_mixed += count == 1 or count == 2
+    return n_whole << 32 | n_mixed
+
+
+@kernel
+def cut_edges(
+    vertices: FloatArray, edges: IntArray, row: FloatArray, high: FloatArray, low: FloatArray, is_nearest: BoolArray
+) -> None:
+    """Fill high and low (n, 3) with the points where edges (n, 2) of vertices cross the plane `row` (4,), and
+    is_nearest (n,) with whether all of high is certain to be the nearest double, and low the rest, to 2^-84."""
+    for item in range(edges.shape[0]):
+        p, q = edges[item, 0], edges[item, 1]
+        ph, pl, p_bound = dd_value(row[0], row[1], row[2], row[3], as_point3(vertices, p))
+        qh, ql, q_bound = dd_value(row[0], row[1], row[2], row[3], as_point3(vertices, q))
+        if ph < 0.0:
+            ph, pl, qh, ql = -ph, -pl, -qh, -ql
+        sum_h, sum_l = dd_add(ph, pl, -qh, -ql)
+        th, tl = dd_div(ph, pl, sum_h, sum_l)
+        t_error = 1.01 * (p_bound + q_bound) / sum_h + 24.0 * U2 * th
+        is_sure = True
+        for k in range(3):
+            x, y = vertices[p, k], vertices[q, k]
+            sh, sl, mh, dh = point_along(x, y, th, tl)
+            h, rest = fast_two_sum(sh, sl)
+            bound = 1.01 * t_error * abs(dh) + POINT_BOUND * (abs(x) + abs(mh)) + TINY
+            if x == y:
+                h, rest, bound = x, 0.0, 0.0
+            is_sure = is_sure and is_correctly_rounded(h, rest, bound) and bound <= 2.0**-84 * (abs(x) + abs(y))
+            high[item, k], low[item, k] = h + 0.0, rest
+        is_nearest[item] = is_sure
+
+
+@kernel
+def find_turned(
+    high: FloatArray, low: FloatArray, size: float, triangles: IntArray, axes: IntArray, is_open: BoolArray
+) -> None:
+    """Fill is_open (n,) with whether the turn of each triangle of points high + low, on two axes, is not proven to be
+    left. size: a bound of coordinates; they are known to 2^-84 of it.
+
+    Differences are off by 2^-83 of that and 4 u^2; products and their difference add 20 u^2.
+    """
+    i, j, off = axes[0], axes[1], 2.0**-82 * size
+    for item in range(triangles.shape[0]):
+        a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
+        uh, ul = dd_add(high[b, i], low[b, i], -high[a, i], -low[a, i])
+        vh, vl = dd_add(high[c, j], low[c, j], -high[a, j], -low[a, j])
+        sh, sl = dd_add(high[b, j], low[b, j], -high[a, j], -low[a, j])
+        th, tl = dd_add(high[c, i], low[c, i], -high[a, i], -low[a, i])
+        ph, pl = dd_mul(uh, ul, vh, vl)
+        qh, ql = dd_mul(sh, sl, th, tl)
+        gap, _ = dd_sub(ph, pl, qh, ql)
+        bound = 1.01 * off * (abs(uh) + abs(vh) + abs(sh) + abs(th) + off) + 2.0**-98 * (abs(ph) + abs(qh)) + TINY
+        is_open[item] = not gap > bound

@@ -1,0 +1,217 @@
+"""One mesh cut by planes one after another: its faces, where new points are, the chain along each plane.
+
+A vertex on the plane counts as outside, as if the plane were moved inwards by less than anything: then it passes
+through no vertex, each face has none or two sides that it crosses, and what it leaves of closed shells has closed
+chains as its boundary. An edge that ends on the plane is cut at that end.
+
+A new point is where an edge of two earlier points crosses a plane. Its exact place, x w, y w, z w, w in integers, is
+computed where a decision or a rounding needs it; nothing is decided on rounded coordinates.
+
+Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974, for each face.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from engine.compiling.jit import entry_of
+from engine.predicates.rational import Number, nearest_pair, reduced, scaled_integers, sign_of
+from engine.running.budget import Budget
+from engine.solid_cutting.face_cuts import cut_edges, find_sides, split_faces
+from engine.solids.mesh import first_equal
+from engine.types import UNDECIDED, BoolArray, FloatArray, Int8Array, IntArray, read_only
+
+Place = tuple[int, int, int, int]
+_MOST_EXPONENT: Final = 200
+"""Rows and coordinates of kernels lie within 2^-200 .. 2^200; others go through integers."""
+
+
+class Plane(NamedTuple):
+    """A plane, inside where integers . (x, y, z, 1) > 0. row (4,): the same in doubles, times a positive factor,
+    rounded unless `is_exact`."""
+
+    integers: tuple[int, ...]
+    row: FloatArray
+    is_exact: bool
+
+    @property
+    def reversed(self) -> Plane:
+        """The plane with its sides exchanged."""
+        return Plane(tuple(-x for x in self.integers), read_only(-self.row), self.is_exact)
+
+
+def plane_of(row: Sequence[Number]) -> Plane:
+    """Return the plane of a row of exact numbers, normal and offset."""
+    integers = reduced(scaled_integers(row))
+    shift = max(x.bit_length() for x in integers)
+    scaled = [x / (1 << shift) for x in integers]  # rounded once; no less than 2^-1000 where it counts
+    is_exact = all(
+        Fraction(x) * (1 << shift) == n and (x == 0.0 or x > 2.0**-_MOST_EXPONENT or -x > 2.0**-_MOST_EXPONENT)
+        for x, n in zip(scaled, integers)
+    )
+    return Plane(integers, read_only(np.array(scaled)), is_exact)
+
+
+class Points:
+    """The vertices of a solid, and those that cuts add; a point is its number.
+
+    n: number of points; high (n, 3): nearest doubles; low (n, 3): the rest, to 2^-84.
+    """
+
+    def __init__(self, vertices: FloatArray) -> None:
+        self.vertices, self.n_given = read_only(vertices), len(vertices)
+        self.high, self.low = np.zeros((0, 3)), np.zeros((0, 3))
+        sizes = np.abs(vertices)
+        self.size = float(sizes.max())
+        self.is_in_range = (
+            bool(((sizes == 0.0) | (sizes > 2.0**-_MOST_EXPONENT)).all()) and self.size < 2.0**_MOST_EXPONENT
+        )
+        self._edges = np.zeros((0, 2), np.int64)
+        self._planes: list[Plane] = []
+        self._plane_of: list[int] = []
+        self._places: dict[int, Place] = {}
+
+    def __len__(self) -> int:
+        return self.n_given + len(self.high)
+
+    def at(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the nearest doubles (n, 3) of points, and the rest."""
+        is_new = numbers >= self.n_given
+        if not is_new.any():
+            return self.vertices[numbers], np.zeros((len(numbers), 3))
+        if is_new.all():
+            return self.high[numbers - self.n_given], self.low[numbers - self.n_given]
+        high, low = self.vertices[np.where(is_new, 0, numbers)], np.zeros((len(numbers), 3))
+        some = numbers[is_new] - self.n_given
+        high[is_new], low[is_new] = self.high[some], self.low[some]
+        return high, low
+
+    def exact(self, number: int) -> Place:
+        """Return the exact place of a point, homogeneous with w > 0."""
+        place = self._places.get(number)
+        if place is None:
+            k = number - self.n_given
+            if k < 0:
+                x, y, z, w = scaled_integers([*self.vertices[number].tolist(), 1])
+                place = x, y, z, w
+            else:
+                plane = self._planes[self._plane_of[k]]
+                p, q = (self.exact(end) for end in self._edges[k].tolist())
+                a, b = value_at(plane, p), value_at(plane, q)
+                if a < 0:
+                    p, q, a, b = q, p, b, a
+                x, y, z, w = reduced([a * s - b * r for r, s in zip(p, q)])
+                place = (x, y, z, w) if w > 0 else (-x, -y, -z, -w)
+            self._places[number] = place
+        return place
+
+    def sides(self, plane: Plane, budget: Budget, used: IntArray | None = None) -> Int8Array:
+        """Return on which side of a plane all points are, or the points `used`: 1, 0 or -1 each."""
+        vertices = self.vertices if used is None else read_only(self.vertices[used])
+        sides = np.empty(len(self) if used is None else len(used), np.int8)
+        n_open = len(vertices)
+        with np.errstate(all="ignore"):
+            n_open = entry_of(find_sides)(vertices, plane.row, plane.is_exact, sides[: len(vertices)], budget.flag)
+        budget.check()
+        for place in np.flatnonzero(sides[: len(vertices)] == UNDECIDED).tolist() if n_open else ():
+            budget.check()
+            sides[place] = self.side(plane, place if used is None else int(used[place]))
+        for number in range(len(vertices), len(sides)):
+            budget.check()
+            sides[number] = self.side(plane, number)
+        return sides
+
+    def side(self, plane: Plane, number: int) -> int:
+        """Return the exact side of one point."""
+        return sign_of(value_at(plane, self.exact(number)))
+
+    def add_crossings(self, edges: IntArray, on_plane: IntArray, plane: Plane, budget: Budget) -> IntArray:
+        """Add the points where edges (k, 2) cross a plane, the first end inside; return their numbers: of points at one
+        place the first, one of those on the plane if it is there."""
+        first, n = len(self), len(edges)
+        high, low, is_nearest = np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, np.bool_)
+        self._planes.append(plane)
+        self._plane_of += [len(self._planes) - 1] * n
+        self._edges = np.concatenate([self._edges, edges])
+        if plane.is_exact and self.is_in_range and (not n or edges.max() < self.n_given):
+            with np.errstate(all="ignore"):
+                entry_of(cut_edges)(self.vertices, read_only(edges), plane.row, high, low, is_nearest)
+        for k in np.flatnonzero(~is_nearest).tolist():
+            budget.check()
+            x, y, z, w = self.exact(first + k)
+            for axis, value in enumerate((x, y, z)):
+                high[k, axis], low[k, axis] = nearest_pair(value, w)
+        self.high, self.low = np.concatenate([self.high, high]), np.concatenate([self.low, low])
+        numbers = np.arange(first, first + n)
+        known = np.concatenate([on_plane, numbers])
+        same = first_equal(np.concatenate([self.at(on_plane)[0], high])) if n else None
+        if same is not None:
+            for k in (np.flatnonzero(same[-n:] != np.arange(len(known) - n, len(known)))).tolist():
+                budget.check()
+                other = int(known[same[k - n]])
+                if self.exact(first + k) == self.exact(other):
+                    numbers[k] = other
+        return numbers
+
+
+def value_at(plane: Plane, place: Place) -> int:
+    """Return the value of a plane at an exact place, times its w."""
+    (a, b, c, d), (x, y, z, w) = plane.integers, place
+    return a * x + b * y + c * z + d * w
+
+
+class Cut(NamedTuple):
+    """What a plane leaves of triangles. whole: numbers of those that it leaves whole. pieces (k, 3): triangles of the
+    others, cut; of (k,): the number of each one's triangle. chain (n, 2): sides of pieces along the plane, with what is
+    left on their left seen against the normal."""
+
+    whole: IntArray
+    pieces: IntArray
+    of: IntArray
+    chain: IntArray
+
+
+def cut_triangles(
+    points: Points, triangles: IntArray, plane: Plane, budget: Budget, sides: Int8Array | None = None
+) -> Cut:
+    """Return what is inside a plane of triangles (m, 3); the points on it are added. sides: by point, if known."""
+    sides = points.sides(plane, budget) if sides is None else sides
+    whole, mixed = np.empty(len(triangles), np.int64), np.empty(len(triangles), np.int64)
+    counts = entry_of(split_faces)(read_only(triangles), sides, whole, mixed, budget.flag)
+    budget.check()
+    whole, mixed = whole[: counts >> 32], mixed[: counts & 0xFFFFFFFF]
+    some = triangles[mixed]
+    is_in = sides[some] > 0
+    is_one = is_in.sum(axis=1) == 1
+    lone = np.argmax(is_in == is_one[:, None], axis=1)  # the corner on the other side than the two others
+    rows = np.arange(len(some))
+    p, q, r = (some[rows, (lone + k) % 3] for k in range(3))
+    ends = np.concatenate([np.stack([np.where(is_one, p, x), np.where(is_one, x, p)], axis=1) for x in (q, r)])
+    cuts = ends[:, 1].copy()  # an end on the plane is the point itself
+    crosses = np.flatnonzero(sides[cuts] < 0)
+    keys, numbers = np.unique(ends[crosses, 0] * len(points) + ends[crosses, 1], return_inverse=True)
+    edges = np.stack(np.divmod(keys, len(points)), axis=1)
+    cuts[crosses] = points.add_crossings(edges, np.flatnonzero(sides == 0), plane, budget)[numbers.reshape(-1)]
+    a, b = cuts[: len(some)], cuts[len(some) :]
+    two = np.flatnonzero(~is_one)
+    quads = two[a[two] != b[two]]
+    pieces = np.stack([np.where(is_one, p, a), np.where(is_one, a, q), np.where(is_one, b, r)], axis=1)
+    others = np.stack([a[quads], r[quads], b[quads]], axis=1)
+    chain = np.stack([np.where(is_one, a, b), np.where(is_one, b, a)], axis=1)
+    cut, of = np.concatenate([pieces, others]), np.concatenate([mixed, mixed[quads]])
+    has_sides = _are_different(cut)
+    return Cut(whole, cut[has_sides], of[has_sides], chain[a != b])
+
+
+def _are_different(triangles: IntArray) -> BoolArray:
+    """Return whether triangles name three points; others, where points at one place are one, have no boundary."""
+    return (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+
+
+def without_repeats(triangles: IntArray) -> IntArray:
+    """Return the triangles that name three different points."""
+    return triangles[_are_different(triangles)]

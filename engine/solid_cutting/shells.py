@@ -1,0 +1,252 @@
+"""The shells of a polyhedron, and which way their faces look: outwards of the even-odd solid, or inwards.
+
+A shell is a closed surface: faces joined by their edges. Where more than two faces share an edge they are sorted by
+angle about it and matched as parentheses are, a side that runs down with the next one that runs up, so that matched
+faces do not pass through each other: a wedge of solid is between them if the shells look outwards. Faces at one
+angle are ordered as if every shell were a little smaller, or larger, else by their numbers.
+
+No shell crosses itself or another (that is refused), so each is the boundary of one region, on which the winding
+number of the shell is 1 or -1 throughout, and the solid is the sum of regions by the parity of their depth:
+
+    volume of the solid = sum over shells of (-1)^depth |volume of the shell|
+
+depth: the number of other shells around it. A shell is turned if the sign of its volume is not (-1)^depth.
+
+Source: E. A. F. Muecke, Shapes and implementations in three-dimensional geometry, 1993: faces sorted about an edge.
+"""
+
+from __future__ import annotations
+
+from functools import cmp_to_key
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.bounding.box_grid import all_pairs_of_boxes
+from engine.collision.collide import collide
+from engine.containment.locate import locate
+from engine.errors import InvalidInputError
+from engine.predicates.rational import cross, dot, minus, scaled_integers, sign_of
+from engine.running.budget import Budget
+from engine.solid_cutting.faults import Edges, are_flat, crossings, edges_of, shells_of, sign_of_volume
+from engine.solids.convexity import convexity
+from engine.solids.mesh import Polyhedron
+from engine.types import FloatArray, Int8Array, IntArray, Rcc8, read_only
+
+_NO_JUNCTIONS: Final = np.zeros((0, 3), np.int64)
+
+
+class Shells(NamedTuple):
+    """Which way the triangles of a polyhedron look.
+
+    sides (m,): 1 for a triangle that is counter-clockwise seen from outside the solid, -1 for one that is clockwise;
+    empty where all are as `common` says. common: 1, -1; 0 where they differ. n: number of shells.
+    """
+
+    sides: Int8Array
+    common: int
+    n: int
+
+
+def shells(solid: Polyhedron, budget: Budget) -> Shells:
+    """Return which way the triangles of a polyhedron look, cached with it. Raises: InvalidInputError for faces that
+    cross, naming two."""
+    return solid.prepared("shells", lambda: _shells_of(solid, budget), budget.check)
+
+
+def _shells_of(solid: Polyhedron, budget: Budget) -> Shells:
+    none = read_only(np.zeros(0, np.int8))
+    certificate = convexity(solid)
+    if certificate is not None:
+        return Shells(none, 1 if certificate.is_outward else -1, 1)
+    points, faces = solid.vertices, solid.triangles
+    budget.check()
+    edges = edges_of(faces)
+    is_solid = ~are_flat(points, faces, budget)
+    contacts = crossings(points, faces, np.flatnonzero(is_solid), _NO_JUNCTIONS, budget)
+    for way in (1, -1):
+        parts = shells_of(_matched(points, faces, edges, way, budget), budget)
+        part_of = _numbers_of(parts, len(faces))
+        if not len(within := _within(part_of, contacts)):
+            break
+    else:  # at a common edge, matched faces lie on each other
+        parts = shells_of(_separated(edges), budget)
+        part_of = _numbers_of(parts, len(faces))
+        if len(still := _within(part_of, contacts)) or not _are_closed(edges, part_of, faces):
+            raise _crossing(solid, still[0] if len(still) else within[0])
+        contacts = np.concatenate([contacts, _neighbours(edges, part_of)])
+    number_of = np.cumsum(used := np.array([is_solid[part].any() for part in parts])) - 1  # others bound nothing
+    bodies = [_Shell(solid, part) for part, is_used in zip(parts, used) if is_used]
+    depths = _depths(solid, bodies, number_of[part_of[contacts]], budget, contacts)
+    sides = np.ones(len(faces), np.int8)
+    for body, depth in zip(bodies, depths):
+        volume = sign_of_volume(points, faces[body.part], budget)
+        sides[body.part] = 1 if volume == 0 or (volume > 0) == (depth % 2 == 0) else -1
+    if (sides == sides[0]).all():
+        return Shells(none, int(sides[0]), len(bodies))
+    return Shells(read_only(sides), 0, len(bodies))
+
+
+def _numbers_of(parts: list[IntArray], n: int) -> IntArray:
+    """Return the number of the part of each of n faces."""
+    numbers = np.empty(n, np.int64)
+    for number, part in enumerate(parts):
+        numbers[part] = number
+    return numbers
+
+
+def _within(part_of: IntArray, contacts: IntArray) -> IntArray:
+    """Return the contacts of faces of one part."""
+    return contacts[part_of[contacts[:, 0]] == part_of[contacts[:, 1]]]
+
+
+def _separated(edges: Edges) -> Edges:
+    """Return edges of which those of more than two faces join nothing."""
+    of, n = edges.of.copy(), len(edges.ends)
+    for corner in np.flatnonzero(edges.uses[of.ravel()] != 2).tolist():
+        of[corner // 3, corner % 3], n = n, n + 1
+    return Edges(np.zeros((n, 2), np.int64), of, edges.uses, edges.net)
+
+
+def _are_closed(edges: Edges, part_of: IntArray, faces: IntArray) -> bool:
+    """Return whether the faces of each part use each edge as often in one direction as in the other."""
+    keys = edges.of * (int(part_of.max()) + 1) + part_of[:, None]
+    _, numbers = np.unique(keys, return_inverse=True)
+    ways = np.sign(np.roll(faces, -1, axis=1) - faces)
+    return not np.bincount(numbers.reshape(-1), ways.ravel()).any()
+
+
+def _neighbours(edges: Edges, part_of: IntArray) -> IntArray:
+    """Return pairs of faces of different parts at each edge of more than two faces."""
+    corners = np.flatnonzero(edges.uses[edges.of.ravel()] > 2)
+    corners = corners[np.argsort(edges.of.ravel()[corners], kind="stable")]
+    of = edges.of.ravel()[corners]
+    pairs = [np.zeros((0, 2), np.int64)]
+    for step in range(1, int(edges.uses.max())):
+        same = of[step:] == of[:-step]
+        pairs.append(np.stack([corners[:-step][same], corners[step:][same]], axis=1) // 3)
+    rows = np.concatenate(pairs)
+    return rows[part_of[rows[:, 0]] != part_of[rows[:, 1]]]
+
+
+def _crossing(solid: Polyhedron, pair: IntArray) -> InvalidInputError:
+    first, second = (int(solid.triangle_faces[triangle]) for triangle in pair)
+    return InvalidInputError(
+        f"faces[{first}] and faces[{second}] meet besides their common corners and edges, so which side of them is "
+        "inside is not one for each shell; inspect names all such pairs; unite the parts in the program that made them",
+        ("solid", "faces", first),
+    )
+
+
+class _Shell:
+    """One shell of a solid; `body` is it as a polyhedron, made at first use."""
+
+    def __init__(self, solid: Polyhedron, part: IntArray) -> None:
+        self.solid, self.part = solid, part
+        self.vertices = np.unique(solid.triangles[part])
+        self.low = solid.vertices[self.vertices].min(axis=0)
+        self.high = solid.vertices[self.vertices].max(axis=0)
+        self._body: Polyhedron | None = None
+
+    def body(self, budget: Budget) -> Polyhedron:
+        if self._body is None:
+            faces = self.solid.triangles[self.part]
+            faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]  # others use each edge both ways
+            self._body = Polyhedron(self.solid.vertices, faces, deadline=budget.left(), cancel=budget.cancel)
+        return self._body
+
+    def is_within_box_of(self, other: _Shell) -> bool:
+        return bool((other.low <= self.low).all() and (self.high <= other.high).all())
+
+
+def _depths(
+    solid: Polyhedron, bodies: list[_Shell], shells_in_contact: IntArray, budget: Budget, contacts: IntArray
+) -> list[int]:
+    """Return how many other shells are around each. contacts (k, 2): pairs of faces of different shells that meet, and
+    shells_in_contact (k, 2) these shells. Of two that are the same set the second counts as within the first."""
+    depths = [0] * len(bodies)
+    if len(bodies) < 2:
+        return depths
+    touching = {(min(pair), max(pair)): row for row, pair in enumerate(shells_in_contact.tolist())}
+    low, high = (np.array([getattr(body, name) for body in bodies]) for name in ("low", "high"))
+    for i, j in sorted((min(pair), max(pair)) for pair in all_pairs_of_boxes(low, high, budget).tolist()):
+        budget.check()
+        if (i, j) not in touching:
+            lies = _lies_within(bodies[i], bodies[j], budget), _lies_within(bodies[j], bodies[i], budget)
+            if 0 not in lies:
+                depths[i] += lies[0] == 1
+                depths[j] += lies[1] == 1
+                continue
+        limits: Any = {"deadline": budget.left(), "cancel": budget.cancel}
+        relation = collide(bodies[i].body(budget), bodies[j].body(budget), detail=True, **limits).detail
+        if relation == Rcc8.PO:
+            pair = contacts[touching[i, j]] if (i, j) in touching else np.array([bodies[k].part[0] for k in (i, j)])
+            raise _crossing(solid, pair)
+        depths[i] += relation in (Rcc8.TPP, Rcc8.NTPP)
+        depths[j] += relation in (Rcc8.TPPI, Rcc8.NTPPI, Rcc8.EQ)
+    return depths
+
+
+def _lies_within(one: _Shell, other: _Shell, budget: Budget) -> int:
+    """Return 1 if a shell that crosses no other lies within another, -1 if not, 0 if all its vertices are on that."""
+    if not one.is_within_box_of(other):
+        return -1
+    points = one.solid.vertices[one.vertices]
+    for some in (points[:1], points):
+        places = locate(some, other.body(budget), deadline=budget.left(), cancel=budget.cancel)
+        if places.any():
+            return int(places[np.argmax(places != 0)])
+    return 0
+
+
+def _matched(points: FloatArray, faces: IntArray, edges: Edges, way: int, budget: Budget) -> Edges:
+    """Return edges that two faces use each: those of more are taken apart by `_matches`."""
+    if ((edges.uses == 2) | (edges.uses == 1)).all():
+        return edges
+    of, n = edges.of.copy(), len(edges.ends)
+    for corner in np.flatnonzero(edges.uses[of.ravel()] == 0).tolist():  # from a vertex to itself: joins nothing
+        of[corner // 3, corner % 3], n = n, n + 1
+    order = np.argsort(edges.of.ravel(), kind="stable")
+    starts = np.searchsorted(edges.of.ravel()[order], np.arange(len(edges.ends) + 1))
+    for edge in np.flatnonzero(edges.uses > 2).tolist():
+        budget.check()
+        corners = order[starts[edge] : starts[edge + 1]]
+        for one, other in _matches(points, faces, edges.ends[edge], corners, way):
+            of[one // 3, one % 3] = of[other // 3, other % 3] = n
+            n += 1
+    return Edges(np.zeros((n, 2), np.int64), of, edges.uses, edges.net)
+
+
+def _matches(points: FloatArray, faces: IntArray, ends: IntArray, corners: IntArray, way: int) -> list[tuple[int, int]]:
+    """Return pairs of sides at an edge, side k of face i as 3 i + k: neighbours by angle, in opposite directions. way:
+    1 where faces at the same angle that look away from each other lie as if shells were smaller, -1 if larger."""
+    apexes = faces[corners // 3, (corners + 2) % 3]
+    numbers = scaled_integers(points[np.concatenate([ends, apexes])].ravel().tolist())
+    a, b, *others = (tuple(numbers[k : k + 3]) for k in range(0, len(numbers), 3))
+    axis = minus(b, a)
+    arms = [minus(c, a) for c in others]
+    first = next((arm for arm in arms if any(cross(axis, arm))), arms[0])
+    normal = cross(axis, first)
+    keys = []
+    for corner, apex, arm in zip(corners.tolist(), apexes.tolist(), arms):
+        across = cross(axis, arm)
+        rise, run = sign_of(dot(normal, arm)), sign_of(dot(normal, across))
+        half = -1 if not any(across) else 0 if rise > 0 or (rise == 0 and run > 0) else 1
+        is_odd = sorted((*ends.tolist(), apex)).index(apex) == 1  # the middle one of the three: angles run down
+        is_up = faces[corner // 3, corner % 3] == ends[0]
+        keys.append((half, arm, (-way if is_up else way, -(corner // 3) if is_odd else corner // 3), corner))
+
+    def compare(one: Any, other: Any) -> int:
+        turn = sign_of(dot(axis, cross(one[1], other[1]))) if one[0] == other[0] else other[0] - one[0]
+        return -turn if turn else -1 if one[2] < other[2] else 1
+
+    waiting: list[int] = []
+    pairs: dict[int, int] = {}
+    ring = [key[3] for key in sorted(keys, key=cmp_to_key(compare))]
+    for corner in ring + ring:  # the solid of a shell that looks outwards begins above a side that runs down
+        if (faces[corner // 3, corner % 3] == ends[0]) == (way < 0):
+            if corner not in pairs and corner not in waiting:
+                waiting.append(corner)
+        elif waiting and corner not in pairs.values():
+            pairs[waiting.pop()] = corner
+    return list(pairs.items())

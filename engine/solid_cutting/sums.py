@@ -1,0 +1,150 @@
+"""Compiled: volume, moments and area of a mesh as double-doubles with a bound, from which the nearest double is proven.
+
+With m = (b - a) x (c - a) along z, twice the area of a triangle abc seen along z, and S x = a.x + b.x + c.x:
+
+    volume       sum of  m S z / 6                                  (divergence theorem for (0, 0, z))
+    its x moment sum of  m ((S x)(S z) + a.x a.z + b.x b.z + c.x c.z) / 24            (for (0, 0, x z)), y alike
+    its z moment sum of  m ((S z)^2 + a.z^2 + b.z^2 + c.z^2) / 48                     (for (0, 0, z^2 / 2))
+    area         sum of  |(b - a) x (c - a)| / 2
+
+Coordinates are taken relative to an origin, as exact pairs. Error bounds, with u = 2^-53 and P the sum of the two
+products of m in size: m 24 u^2 P; each sum or product of double-doubles adds at most 8 u^2 of its size; so a term is
+within 64 u^2 of `size`, the same expression of magnitudes, and a moment within 128 u^2. A square root of a
+double-double adds 8 u^2. The high parts are added without error; the low parts and what the high ones lose are below
+2 n u of all sizes at any time, and rounded 2 n times: 4 n^2 u^2 of all sizes. Underflow takes at most `_TINY` a term.
+
+Source: B. Mirtich, Fast and accurate computation of polyhedral mass properties, 1996.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Final
+
+from engine.compiling.jit import inline, kernel
+from engine.predicates.error_free import U2, dd_add, dd_mul, dd_sub, fast_two_sum, two_diff, two_prod, two_sum
+from engine.types import FlagArray, FloatArray, Int8Array, IntArray
+
+_TINY: Final = 2.0**-1000
+LOST_TO_ROOTS: Final = 2.0**-500
+"""More than a square that underflows takes from a root."""
+_POLL: Final = 0x3FFF
+
+
+@inline
+def _minor(vertices: FloatArray, a: int, b: int, c: int, x: int, y: int) -> tuple[float, float, float]:
+    """Return (h, l, size): (b - a) x (c - a) on the axes x and y as a double-double, and the size of its products."""
+    uh, ul = two_diff(vertices[b, x], vertices[a, x])
+    vh, vl = two_diff(vertices[c, y], vertices[a, y])
+    sh, sl = two_diff(vertices[b, y], vertices[a, y])
+    th, tl = two_diff(vertices[c, x], vertices[a, x])
+    p, p_low = two_prod(uh, vh)
+    q, q_low = two_prod(sh, th)
+    h, low = two_diff(p, q)
+    low += (p_low - q_low) + ((uh * vl + ul * vh) - (sh * tl + sl * th))
+    h, low = fast_two_sum(h, low)
+    return h, low, abs(p) + abs(q)
+
+
+@inline
+def _sum_of_three(vertices: FloatArray, a: int, b: int, c: int, x: int, origin: float) -> tuple[float, float, float]:
+    """Return (h, l, size): the sum of three coordinates relative to the origin, and of their sizes."""
+    ah, al = two_diff(vertices[a, x], origin)
+    bh, bl = two_diff(vertices[b, x], origin)
+    ch, cl = two_diff(vertices[c, x], origin)
+    h, first = two_sum(ah, bh)
+    h, second = two_sum(h, ch)
+    h, low = fast_two_sum(h, (first + second) + ((al + bl) + cl))
+    return h, low, abs(ah) + abs(bh) + abs(ch)
+
+
+@inline
+def _sum_of_squares(
+    vertices: FloatArray, a: int, b: int, c: int, x: int, z: int, origin: FloatArray
+) -> tuple[float, float, float]:
+    """Return (h, l, size): (S x)(S z) + a.x a.z + b.x b.z + c.x c.z relative to the origin, and its size."""
+    sh, sl, x_size = _sum_of_three(vertices, a, b, c, x, origin[x])
+    th, tl, z_size = _sum_of_three(vertices, a, b, c, z, origin[z])
+    h, low = dd_mul(sh, sl, th, tl)
+    for vertex in (a, b, c):
+        ph, pl = two_diff(vertices[vertex, x], origin[x])
+        qh, ql = two_diff(vertices[vertex, z], origin[z])
+        ph, pl = dd_mul(ph, pl, qh, ql)
+        h, low = dd_add(h, low, ph, pl)
+    return h, low, 2.0 * x_size * z_size
+
+
+@inline
+def _add(sums: FloatArray, k: int, h: float, low: float, size: float) -> None:
+    """Add a term to row k of sums (4, 3): high part, low part, size."""
+    sums[k, 0], lost = two_sum(sums[k, 0], h)
+    sums[k, 1] += lost + low
+    sums[k, 2] += size
+
+
+@kernel
+def sum_volume(
+    vertices: FloatArray, triangles: IntArray, sides: Int8Array, z0: float, sums: FloatArray, flag: FlagArray
+) -> None:
+    """Add to sums[0] six times the volume, as `_add` does. sides: 1 or -1 by triangle, or empty for 1 throughout. z0:
+    where z is measured from."""
+    total = rest = all_sizes = 0.0
+    for item in range(triangles.shape[0]):
+        if item & _POLL == 0 and flag[0] != 0:
+            return
+        a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
+        h, low, size = _minor(vertices, a, b, c, 0, 1)
+        sh, sl, z_size = _sum_of_three(vertices, a, b, c, 2, z0)
+        h, low = dd_mul(h, low, sh, sl)
+        if sides.shape[0] > 0 and sides[item] < 0:
+            h, low = -h, -low
+        total, lost = two_sum(total, h)
+        rest += lost + low
+        all_sizes += size * z_size
+    sums[0, 0], sums[0, 1], sums[0, 2] = total, rest, all_sizes
+
+
+@kernel
+def sum_moments(
+    vertices: FloatArray, triangles: IntArray, sides: Int8Array, origin: FloatArray, sums: FloatArray, flag: FlagArray
+) -> None:
+    """Add to sums[k], for k = 0, 1, 2, 24, 24 and 48 times the moments of the volume about the origin (3,), as `_add`
+    does. sides: as for `sum_volume`."""
+    for item in range(triangles.shape[0]):
+        if item & _POLL == 0 and flag[0] != 0:
+            return
+        a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
+        h, low, size = _minor(vertices, a, b, c, 0, 1)
+        side = -1.0 if sides.shape[0] > 0 and sides[item] < 0 else 1.0
+        for k in range(3):
+            sh, sl, moment = _sum_of_squares(vertices, a, b, c, k, 2, origin)
+            sh, sl = dd_mul(side * h, side * low, sh, sl)
+            _add(sums, k, sh, sl, size * moment)
+
+
+@kernel
+def sum_area(vertices: FloatArray, triangles: IntArray, sums: FloatArray, flag: FlagArray) -> None:
+    """Add to sums[0] twice the area of all triangles, as `_add` does; size: that of the products in each minor."""
+    for item in range(triangles.shape[0]):
+        if item & _POLL == 0 and flag[0] != 0:
+            return
+        a, b, c = triangles[item, 0], triangles[item, 1], triangles[item, 2]
+        h = low = size = 0.0
+        for k in range(3):
+            mh, ml, product = _minor(vertices, a, b, c, (k + 1) % 3, (k + 2) % 3)
+            mh, ml = dd_mul(mh, ml, mh, ml)
+            h, low = dd_add(h, low, mh, ml)
+            size += product
+        root = sqrt(h)
+        if root > 0.0:
+            ph, pl = two_prod(root, root)
+            ph, pl = dd_sub(h, low, ph, pl)
+            root, rest = fast_two_sum(root, ph / (2.0 * root))
+            _add(sums, 0, root, rest, size)
+        else:
+            _add(sums, 0, 0.0, 0.0, size)
+
+
+def bound_of(size: float, n: int) -> float:
+    """Return the error bound of a sum of n terms; size: the sum of their sizes."""
+    return 1.001 * ((192.0 + 4.0 * float(n) ** 2) * U2 * size + n * _TINY)

@@ -1,0 +1,65 @@
+"""Volumes, centroids and sections of meshes in rationals: faces cut one by one, sums from a point of the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+Point = Sequence[Fraction]
+
+
+def points_of(vertices: Any) -> list[list[Fraction]]:
+    return [[Fraction(x) for x in vertex] for vertex in vertices.tolist()]
+
+
+def det(a: Point, b: Point, c: Point) -> Fraction:
+    return (
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )  # fmt: skip
+
+
+def signed_volume(points: list[list[Fraction]], faces: Any) -> Fraction:
+    return sum((det(*(points[k] for k in face)) for face in faces.tolist()), Fraction(0)) / 6
+
+
+def moment(points: list[list[Fraction]], faces: Any, axis: int) -> Fraction:
+    corners = [[points[k] for k in face] for face in faces.tolist()]
+    return sum((det(*some) * sum(corner[axis] for corner in some) for some in corners), Fraction(0)) / 24
+
+
+def cut_volume(points: list[list[Fraction]], faces: Any, row: Sequence[float]) -> tuple[Fraction, Fraction]:
+    """Return the signed volume of a mesh, its faces outwards, within a x + b y + c z + d >= 0, and the square of the
+    area of its section: cones from a point of the plane, on which the cap adds nothing."""
+    *normal, offset = map(Fraction, row)
+    values = [sum(n * x for n, x in zip(normal, point)) + offset for point in points]
+    axis = max(range(3), key=lambda k: abs(normal[k]))
+    apex = [Fraction(0)] * 3
+    apex[axis] = -offset / normal[axis]
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    volume, seen = Fraction(0), Fraction(0)
+    for face in faces.tolist():
+        if max(values[k] for k in face) <= 0:
+            continue
+        piece: list[list[Fraction]] = []
+        for u, v in zip(face, [*face[1:], face[0]]):
+            if values[u] >= 0:
+                piece.append(points[u])
+            if (values[u] > 0 > values[v]) or (values[u] < 0 < values[v]):
+                t = values[u] / (values[u] - values[v])
+                piece.append([x + t * (y - x) for x, y in zip(points[u], points[v])])
+        off = [[x - o for x, o in zip(corner, apex)] for corner in piece]
+        volume += sum((det(off[0], b, c) for b, c in pairwise(off[1:])), Fraction(0)) / 6
+        on = [sum(n * x for n, x in zip(normal, corner)) + offset == 0 for corner in piece]
+        for k in range(len(piece)):
+            p, q = piece[k - 1], piece[k]
+            if on[k - 1] and on[k]:
+                seen += (p[i] * q[j] - p[j] * q[i]) / 2
+    return volume, seen**2 * sum(n * n for n in normal) / normal[axis] ** 2
+
+
+def nearest(value: Fraction) -> float:
+    return value.numerator / value.denominator + 0.0

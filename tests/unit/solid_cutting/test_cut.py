@@ -1,0 +1,163 @@
+"""cut and section: hard planes against rationals, closedness by index and position, nesting, scales, regions."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from tests.reference.cutting import cut_volume, nearest, points_of
+from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
+
+BODIES: dict[str, Any] = {
+    "block": lambda draw: joined([(block([0, 0, 0], draw.integers(1, 6, 3)), CUBE)]),
+    "cavities": lambda draw: joined([(block([0] * 3, [9] * 3), CUBE), (block([1, 2, 1], [7, 8, 8]), CUBE[:, ::-1]),
+                                     (block([2, 3, 3], [5, 6, 7]), CUBE)]),
+    "star": lambda draw: star(int(draw.integers(99))),
+    "flush": lambda draw: joined([(block([0] * 3, [4] * 3), CUBE), (block([4, 1, 1], [7, 3, 3]), CUBE),
+                                  (block([1, 1, 1], [3, 3, 4]), CUBE[:, ::-1])]),
+    "edges": lambda draw: joined([(block(low, np.array(low) + 2), CUBE)
+                                  for low in ([0, 0, 0], [2, 2, 0], [2, 0, 2], [0, 2, 2])]),
+    "columns": lambda draw: joined([(block([i, j, 0], [i + 1, j + 1, int(draw.integers(1, 4))]), CUBE)
+                                    for i in range(2) for j in range(2)]),
+}  # fmt: skip
+
+
+def plane(draw: np.random.Generator, vertices: np.ndarray, kind: int) -> tuple[np.ndarray, float]:
+    """Return a plane through a vertex, an ulp beside one, through three, or anywhere."""
+    at = vertices[draw.integers(len(vertices))]
+    normal = np.eye(3)[draw.integers(3)] * draw.choice([-1, 1])
+    if kind == 2:
+        normal = draw.integers(-2, 3, 3) + np.array([0, 0, 0.5])
+    elif kind == 3:
+        a, b, c = vertices[draw.choice(len(vertices), 3, replace=False)]
+        normal = np.cross(b - a, c - a) if np.cross(b - a, c - a).any() else np.array([1.0, 1, 0])
+    elif kind == 4:
+        normal, at = draw.normal(size=3), 0.5 * (at + vertices[0])
+    offset = -float(normal @ at)
+    return normal.astype(float), float(np.nextafter(offset, np.inf)) if kind == 1 else offset
+
+
+def assert_closed(faces: np.ndarray) -> None:
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    sides = sides[sides[:, 0] != sides[:, 1]]
+    _, numbers = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
+    assert not np.bincount(numbers.reshape(-1), np.sign(sides[:, 1] - sides[:, 0])).any()
+
+
+@pytest.mark.parametrize("seed", range(90))
+def test_hard_cuts(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    vertices, faces = list(BODIES.values())[seed % len(BODIES)](draw)
+    vertices = vertices * 2.0 ** int(draw.integers(-200, 200)) if seed % 7 == 1 else vertices
+    vertices = vertices + 1e14 if seed % 7 == 2 and (vertices == np.round(vertices)).all() else vertices
+    normal, offset = plane(draw, vertices, seed % 5)
+    body, half = engine.Polyhedron(vertices, faces), engine.HalfSpace(normal, offset)
+    points = points_of(vertices)
+    parts: Any = engine.cut(body, half, keep="both")
+    row = np.array([*normal, offset])
+    for part, side in zip(parts, (row, -row), strict=True):
+        volume, area_squared = cut_volume(points, faces, side.tolist())
+        assert part.volume == nearest(volume)
+        assert bool(part) is (volume > 0)
+        if part:
+            assert_closed(part.faces)
+            _, at = np.unique(part.vertices, axis=0, return_inverse=True)
+            assert_closed(at.reshape(-1)[part.faces])
+            assert engine.Polyhedron(part.vertices, part.faces) == part.solid
+            assert set(part.origins[part.origins < 0].tolist()) <= {-1}
+    sections: Any = engine.section(body, half)
+    _, area_squared = cut_volume(points, faces, row.tolist())
+    scale = 1 << 1200
+    exact = Fraction(math.isqrt(int(area_squared * scale * scale)), scale)
+    assert sum(map(Fraction, sections.areas)) == pytest.approx(exact, rel=1e-14)
+    if len(sections.areas) == 1:
+        assert sections.areas[0] == nearest(exact)
+    flat = sum(engine.area(polygon) for polygon in sections.polygons(0)) if seed % 7 != 2 else sections.areas.sum()
+    assert flat == pytest.approx(float(sections.areas.sum()), rel=1e-8)
+
+
+def test_a_vertex_on_the_plane_is_outside_and_nothing_flat_is_left() -> None:
+    cube = engine.Polyhedron(block([0] * 3, [1] * 3), CUBE)
+    top: Any = engine.cut(cube, engine.HalfSpace([0, 0, 1], -1))
+    assert not top
+    assert top.volume == top.area == 0.0
+    with pytest.raises(engine.EmptyGeometryError):
+        _ = top.solid
+    whole: Any = engine.cut(cube, engine.HalfSpace([0, 0, -1], 1))
+    assert (whole.volume, whole.n_collapsed, (whole.origins < 0).sum()) == (1.0, 0, 2)
+    upper: Any = engine.section(cube, engine.HalfSpace([0, 0, -1], 1))
+    assert upper.areas.tolist() == [1.0]
+    assert len(engine.section(cube, engine.HalfSpace([0, 0, 1], -1)).areas) == 0  # type: ignore[union-attr]
+    corner: Any = engine.section(cube, [[0, 0, 0], [1, 1, 1]])
+    assert len(corner.areas) == 0
+    diagonal: Any = engine.section(cube, [[0, 0, 0], [1, 1, 0], [0, 0, 1]])
+    assert diagonal.areas.tolist() == [math.sqrt(2)]
+
+
+def test_scaled_bodies_have_the_same_topology() -> None:
+    vertices, faces = star(3)
+    cuts = [engine.cut(engine.Polyhedron(vertices * s, faces), engine.HalfSpace([1, 2, 3], 0.5 * s)) for s in
+            (2.0**-40, 1.0, 2.0**30)]  # fmt: skip
+    assert all((each.faces == cuts[0].faces).all() for each in cuts)
+    assert all((each.origins == cuts[0].origins).all() for each in cuts)
+
+
+def test_heights_are_one_sweep_with_the_same_answers() -> None:
+    body = engine.Polyhedron(*star(5))
+    heights = np.linspace(-2, 2, 23)
+    together: Any = engine.section(body, heights, normal=[1, 0.5, 0.25])
+    assert len(together) == 23
+    for number, height in enumerate(heights):
+        alone: Any = engine.section(body, engine.HalfSpace([1, 0.5, 0.25], -height))
+        first, last = together.plane_offsets[number : number + 2]
+        assert together.areas[first:last].tolist() == alone.areas.tolist()
+        rings = together.ring_offsets[together.piece_offsets[[first, last]]]
+        assert (together.vertices[rings[0] : rings[1]] == alone.vertices).all()
+
+
+def test_boxes_and_convex_regions_leave_what_planes_one_by_one_do() -> None:
+    vertices, faces = star(11)
+    body = engine.Polyhedron(vertices, faces)
+    low, high = [-0.4, -0.5, -0.3], [0.6, 0.5, 0.4]
+    part: Any = engine.cut(body, engine.Aabb(low, high))
+    assert_closed(part.faces)
+    rows = engine.Aabb(low, high).rows
+    same: Any = engine.cut(body, engine.Convex(rows))
+    assert same.volume == part.volume == engine.overlap_volume(body, engine.Aabb(low, high))
+    outside: Any = [engine.cut(body, engine.HalfSpace(-row[:3], -row[3])) for row in rows]
+    assert part.volume < min(engine.volume(body) - each.volume for each in outside)
+    tetrahedron = engine.Polyhedron(
+        [[-1, -1, -1], [2, 0, 0], [0, 2, 0], [0, 0, 2]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    )
+    both: Any = engine.cut(body, tetrahedron)
+    assert_closed(both.faces)
+    with pytest.raises(engine.InvalidOperationError, match="half_space"):
+        engine.cut(body, engine.Aabb(low, high), keep="outside")
+    with pytest.raises(engine.UnsupportedSolidError, match="not convex"):
+        engine.cut(body, body)
+
+
+def test_overlaps() -> None:
+    unit = engine.Aabb([0, 0, 0], [1, 1, 1])
+    quarter = engine.Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [1, 0, 0])
+    assert engine.iou(unit, unit, second_pose=quarter) == 1.0
+    half = engine.Pose(np.eye(3), [0.5, 0.25, 0])
+    assert engine.overlap_volume(unit, unit, second_pose=half) == 0.375
+    assert engine.iou(unit, engine.Aabb([1, 0, 0], [2, 1, 1])) == 0.0
+    cube = engine.Polyhedron(block([0] * 3, [1] * 3), CUBE)
+    assert engine.overlap_volume(cube, unit, first_pose=half) == 0.375
+    hollow = engine.Polyhedron(*joined([(block([-1] * 3, [2] * 3), CUBE), (block([0] * 3, [1] * 3), CUBE)]))
+    assert engine.overlap_volume(hollow, engine.Aabb([0, 0, 0], [2, 1, 1])) == 1.0
+    assert engine.overlap_volume(engine.Aabb([0, 0, 0], [2, 1, 1]), hollow, second_pose=half) == 1.25
+    with pytest.raises(engine.UnsupportedPairError, match="convex parts"):
+        engine.overlap_volume(hollow, hollow)
+    squares = np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]] * 3)
+    moved = squares + np.array([[[0.0, 0.0]], [[1.0, 1.0]], [[2.0, 0.0]]])
+    assert engine.iou(squares, moved).tolist() == [1.0, 1 / 7, 0.0]  # type: ignore[union-attr]
+    pairs: Any = engine.overlap_volume([unit, unit], [unit, engine.Aabb([0.5, 0, 0], [2, 1, 1])])
+    assert pairs.tolist() == [1.0, 0.5]
