@@ -22,6 +22,7 @@ from engine.solid_cutting.cut_measures import volume_of_cut
 from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
 from engine.solid_cutting.measures import measure
 from engine.solid_cutting.plane_cut import plane_of
+from engine.solid_cutting.simple_measures import product, sides_of
 from engine.solids.accepted import PoseLike, SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats
@@ -240,10 +241,14 @@ def _common(first: Any, second: Any, poses: tuple[Any, Any], budget: Budget) -> 
     moves = posed(poses[0], first, "first_pose"), posed(poses[1], second, "second_pose")
     if first.dimension == 2 and any(isinstance(each, (Polygon, Triangle)) for each in (first, second)):
         return _of_polygons(first, second, moves, budget)
+    if isinstance(first, Aabb) and isinstance(second, Aabb) and moves == (None, None):
+        ends = zip(first.min.tolist(), second.min.tolist(), first.max.tolist(), second.max.tolist())
+        sides = [max(Fraction(0), Fraction(min(c, d)) - Fraction(max(a, b))) for a, b, c, d in ends]
+        return _Common(product(sides), product(sides_of(first)), product(sides_of(second)), True)
     rows = [_rows_of(each, move, budget) for each, move in zip((first, second), moves)]
     if rows[0] is not None and rows[1] is not None:
-        both, one, other = (_volume_within(some, budget) for some in (rows[0] + rows[1], rows[0], rows[1]))
-        return _Common(both, one, other, True)
+        one, other = (_own_volume(each, move, budget) for each, move in zip((first, second), moves))
+        return _Common(_volume_within(rows[0] + rows[1], budget), one, other, True)
     if rows[0] is None and isinstance(first, Polyhedron) and rows[1] is not None:
         return _of_mesh(first, moves[0], rows[1], budget)
     if rows[1] is None and isinstance(second, Polyhedron) and rows[0] is not None:
@@ -293,6 +298,15 @@ def _numbers(pose: Pose) -> tuple[list[tuple[Fraction, ...]], list[Fraction]]:
 def _volume_within(rows: Rows, budget: Budget) -> Fraction:
     mesh = mesh_of_half_spaces(rows, budget)
     return Fraction(0) if mesh is None else exact_volume(mesh)
+
+
+def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
+    """Return the exact volume of a convex solid under a pose."""
+    factor = Fraction(1) if pose is None else Fraction(determinant(_numbers(pose)[0]))
+    if isinstance(solid, Aabb):
+        return factor * product(sides_of(solid))
+    own: Rows = [[Fraction(x) for x in row] for row in plan_of(solid, budget.check).rows]
+    return factor * solid.prepared("exact_volume", lambda: _volume_within(own, budget), budget.check)
 
 
 def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, budget: Budget) -> _Common:

@@ -36,18 +36,20 @@ class Measures(NamedTuple):
     centroid: Callable[[Any, Budget], tuple[FloatArray, bool]] | None = None
 
 
-def _box(solid: Aabb) -> list[Fraction]:
+def sides_of(solid: Aabb) -> list[Fraction]:
+    """Return the exact lengths of the sides of a box."""
     return [Fraction(b) - Fraction(a) for a, b in zip(solid.min.tolist(), solid.max.tolist())]
 
 
-def _product(factors: list[Fraction]) -> Fraction:
+def product(factors: list[Fraction]) -> Fraction:
+    """Return the product of two or three numbers."""
     return factors[0] * factors[1] * (factors[2] if len(factors) == 3 else 1)
 
 
 def _area_of_box(solid: Aabb, _: Budget) -> tuple[float, bool]:
-    sides = _box(solid)
+    sides = sides_of(solid)
     if len(sides) == 2:
-        return nearest_float(_product(sides)), True
+        return nearest_float(product(sides)), True
     return nearest_float(2 * sum(sides[k] * sides[k - 1] for k in range(3))), True
 
 
@@ -101,7 +103,7 @@ def _as_polygon(solid: Triangle, what: str, budget: Budget) -> tuple[Any, bool]:
     raise WrongDimensionError("a triangle of space has no volume, so no centroid; average its vertices", ("solid",))
 
 
-BOX: Final = Measures(lambda solid, _: (nearest_float(_product(_box(solid))), True), _area_of_box, _middle_of_box)
+BOX: Final = Measures(lambda solid, _: (nearest_float(product(sides_of(solid))), True), _area_of_box, _middle_of_box)
 BALL: Final = Measures(
     lambda solid, _: _of_ball(solid, 3, Fraction(4, 3)),
     lambda solid, _: _of_ball(solid, 2, Fraction(4)) if solid.dimension == 3 else _of_ball(solid, 2, Fraction(1)),

@@ -161,3 +161,18 @@ def test_overlaps() -> None:
     assert engine.iou(squares, moved).tolist() == [1.0, 1 / 7, 0.0]  # type: ignore[union-attr]
     pairs: Any = engine.overlap_volume([unit, unit], [unit, engine.Aabb([0.5, 0, 0], [2, 1, 1])])
     assert pairs.tolist() == [1.0, 0.5]
+
+
+def test_overlaps_of_turned_bodies_do_not_depend_on_how_they_are_given() -> None:
+    box = engine.Aabb([-1, -0.5, 0], [1, 0.5, 2])
+    mesh = engine.Polyhedron(block(box.min, box.max), CUBE)
+    rows = engine.Convex(box.rows)
+    pose = engine.Pose.from_quaternion([1, 0.3, 0.2, 0.1], [0.5, 0.2, 0.1])
+    values = {engine.iou(one, other, second_pose=pose) for one in (box, mesh, rows) for other in (box, mesh, rows)}
+    assert len(values) == 1
+    assert 0.1 < values.pop() < 0.9
+    straight = [
+        engine.iou(box, other)
+        for other in (engine.Aabb([0, 0, 0], [3, 3, 3]), engine.Convex(engine.Aabb([0, 0, 0], [3, 3, 3]).rows))
+    ]
+    assert straight[0] == straight[1] == float(Fraction(1, 30))
