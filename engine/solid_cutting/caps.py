@@ -224,13 +224,14 @@ def cap_of(view: Seen, chain: IntArray, budget: Budget) -> IntArray:
     TooComplexError."""
     rings = rings_of(view, chain, budget)
     areas, flat = areas_of(view, rings, budget)
-    made = [_fan_of(ring) for ring in flat]
     try:
-        made += [triangles_of(view, area, False, budget) for area in areas]
+        if flat:  # it may run along itself
+            raise _TurnedError
+        made = [triangles_of(view, area, False, budget) for area in areas]
     except _TurnedError:
         chain, joints = _split_at_contacts(view, chain, budget)
         areas, flat = areas_of(view, rings_of(view, chain, budget), budget, True)
-        made = [joints, *(_fan_of(ring) for ring in flat)]
+        made = [joints, *(_fan_of(view, ring) for ring in flat)]
         for area in areas:
             try:
                 made.append(triangles_of(view, area, False, budget))
@@ -252,7 +253,7 @@ def _split_at_contacts(view: Seen, chain: IntArray, budget: Budget) -> tuple[Int
         a, b = view.doubles([start, end])
         near = ((places >= np.minimum(a, b) - slack) & (places <= np.maximum(a, b) + slack)).all(axis=1)
         off = np.abs((b[0] - a[0]) * (places[:, 1] - a[1]) - (b[1] - a[1]) * (places[:, 0] - a[0]))
-        near &= off <= 4.0 * slack * np.abs(b - a).sum() + slack * slack
+        near &= ~(off > 4.0 * slack * np.abs(b - a).sum() + slack * slack)
         others = [k for k in numbers[near].tolist() if k not in (start, end) and view.turn(start, end, k) == 0]
         if others:
             p, q = view.exact(start), view.exact(end)
@@ -265,9 +266,12 @@ def _split_at_contacts(view: Seen, chain: IntArray, budget: Budget) -> tuple[Int
     return np.array(sides, np.int64), np.array(joints, np.int64).reshape(-1, 3)
 
 
-def _fan_of(ring: Ring) -> IntArray:
-    """Return triangles that close a ring without area."""
-    return np.array([(ring[0], i, j) for i, j in pairwise(ring[1:])], np.int64).reshape(-1, 3)
+def _fan_of(view: Seen, ring: Ring) -> IntArray:
+    """Return triangles that close a ring all on one line."""
+    rows = [(ring[0], i, j) for i, j in pairwise(ring[1:])]
+    if any(view.turn(*row) for row in rows):
+        raise _failed(view, Area(ring, []), True)
+    return np.array(rows, np.int64).reshape(-1, 3)
 
 
 class _TurnedError(Exception):
@@ -278,6 +282,9 @@ def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntA
     """Return the triangles (n, 3) of a polygon, checked exactly; is_exact: made with fractions. Raises _TurnedError, or
     TooComplexError where there is nothing left to try."""
     rings = [area.shell, *area.holes]
+    if is_exact:
+        firsts = [min(range(len(ring)), key=lambda k: view.exact(ring[k])) for ring in rings]
+        rings = [ring[k:] + ring[:k] for ring, k in zip(rings, firsts)]
     numbers = [number for ring in rings for number in ring]
     n = len(numbers) + 2 * len(area.holes)
     x: Any
@@ -335,7 +342,7 @@ def _turned_in(view: Seen, triangles: IntArray, budget: Budget) -> list[int]:
     is_open = np.empty(len(triangles), np.bool_)
     axes = read_only(np.array(view.axes))
     with np.errstate(all="ignore"):
-        size = float(2.0 * np.abs(high).max(initial=0.0))
+        size = 2.0 * view.points.size  # of the ends of edges that were cut
         entry_of(find_turned)(high, low, size, local.reshape(-1, 3), axes, is_open)
     turned = []
     for row in np.flatnonzero(is_open).tolist():
@@ -355,7 +362,7 @@ def _flipped(view: Seen, triangles: IntArray, turned: list[int], budget: Budget)
         for k in range(3):
             a, b, c = rows[number][k], rows[number][k - 2], rows[number][k - 1]
             other = across.get((b, a), -1)
-            if other < 0 or len({*rows[other], c}) < 4:
+            if other < 0 or not {a, b} <= {*rows[other]} or c in rows[other]:
                 continue
             d = sum(rows[other]) - a - b
             if view.turn(a, d, c) >= 0 and view.turn(d, b, c) >= 0:

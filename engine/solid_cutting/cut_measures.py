@@ -23,10 +23,10 @@ from typing import Final
 import numpy as np
 
 from engine.compiling.jit import entry_of
-from engine.predicates.rational import cross, minus, nearest_float, nearest_with_root, squared_length
+from engine.predicates.rational import cross, minus, nearest_float, squared_length
 from engine.running.budget import Budget
 from engine.solid_cutting.caps import Area, Seen
-from engine.solid_cutting.exact_sums import ExactMesh, exact_mesh, exact_volume, nearest_area
+from engine.solid_cutting.exact_sums import ExactMesh, exact_mesh, exact_volume, nearest_area, nearest_root_over
 from engine.solid_cutting.plane_cut import Plane, Points
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_volume
 from engine.types import IntArray, read_only
@@ -137,7 +137,7 @@ def area_of_section(view: Seen, plane: Plane, area: Area, budget: Budget) -> flo
 
     def rounded(seen_area: Fraction) -> float:
         square = max(seen_area, Fraction(0)) ** 2 * tilt
-        return nearest_with_root(0, 1, square.numerator * square.denominator, square.denominator)
+        return nearest_root_over(1, square.numerator * square.denominator, square.denominator)
 
     def ends_of(bits: int) -> tuple[float, float]:
         places, k, most = _cut_off(view.points, (number for ring in rings for number in ring), bits)

@@ -17,7 +17,7 @@ from math import isqrt, lcm
 from typing import NamedTuple
 
 from engine.bounding.double_description import corners_of_half_spaces
-from engine.errors import EmptyGeometryError, UnsupportedSolidError
+from engine.errors import EmptyGeometryError, NotRepresentableError, UnsupportedSolidError
 from engine.predicates.rational import (
     Number,
     cross,
@@ -25,6 +25,7 @@ from engine.predicates.rational import (
     largest_axis,
     minus,
     nearest_float,
+    nearest_with_root,
     scaled_integers,
     sign_of,
     squared_length,
@@ -103,6 +104,14 @@ def nearest_sum_of_roots(squares: Sequence[int], factor: Fraction) -> float:
         ends = [nearest_float(factor * Fraction(total, 1 << bits)) for total in (low, low + len(squares))]
         if ends[0] == ends[1]:
             return ends[0]
+
+
+def nearest_root_over(v: int, w: int, z: int) -> float:
+    """Return the double nearest to v sqrt(w) / z, for w, z > 0. Raises: NotRepresentableError beyond the largest."""
+    try:
+        return nearest_with_root(0, v, w, z)
+    except OverflowError:
+        raise NotRepresentableError("a length or area is beyond the largest float64; scale the input down") from None
 
 
 def nearest_multiple_of_pi(factor: Fraction) -> float:

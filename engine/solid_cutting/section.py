@@ -9,11 +9,12 @@ from typing import Any, ClassVar, Final, cast
 import numpy as np
 
 from engine.errors import InvalidArrayError, InvalidInputError, UnsupportedSolidError, ZeroNormalError
-from engine.predicates.rational import cross, dot, minus, nearest_with_root, scaled_integers, squared_length
+from engine.predicates.rational import cross, dot, minus, scaled_integers, squared_length
 from engine.running.budget import Budget, Cancel, current, polled, reading
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import Area, Seen, areas_of, rings_of, seen
 from engine.solid_cutting.cut_measures import area_of_section
+from engine.solid_cutting.exact_sums import nearest_root_over
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles, plane_of
 from engine.solid_cutting.shells import shells
 from engine.solids.accepted import SolidLike
@@ -185,7 +186,7 @@ def section(
     """
     body, deadline = as_polyhedron(solid, "section", deadline, cancel)
     check_options(workers, progress, report=report, measures=measures)
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
         rows, axis = _rows_of(planes, normal, budget)
         faces = outward(body, budget)
@@ -356,6 +357,6 @@ def _flat(view: Seen, plane: Plane, number: int) -> tuple[float, float]:
     along = tuple(int(k == i) for k in range(3))
     second = dot(cross(normal, along), place[:3])
     return (
-        nearest_with_root(0, first, square * rest, square * rest * w),
-        nearest_with_root(0, second, rest, rest * w),
+        nearest_root_over(first, square * rest, square * rest * w),
+        nearest_root_over(second, rest, rest * w),
     )
