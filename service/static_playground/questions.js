@@ -151,7 +151,7 @@ export const QUESTIONS = {
   },
 
   distances: {
-    hint: "A line leads from each point to the nearest point of the boundary: green to a face or an edge of the plane, orange to an edge or a corner. Each distance is the nearest double, negative inside; snapped points have exact ties.",
+    hint: "A line leads from each point to the nearest point of the boundary: green to a face or an edge of the plane, orange to an edge or a corner. Each distance is the nearest double; snapped points have exact ties.",
     firsts: () => true,
     counts: [0, 3, 1.5],
     ask(state) {
