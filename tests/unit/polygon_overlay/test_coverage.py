@@ -96,7 +96,7 @@ def crossing_itself(random: Random) -> list[list[Any]]:
 def equal(random: Random) -> list[list[Any]]:
     """Parcels twice and more often, either way round."""
     found = parcels(random)
-    return [*found, *([[found[5][0][:: random.choice([-1, 1])]] for _ in range(1500)])]
+    return [*found, *([[found[5][0][:: random.choice([-1, 1])]] for _ in range(400)])]
 
 
 def pie(random: Random) -> list[list[Any]]:
