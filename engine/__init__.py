@@ -50,10 +50,12 @@ from engine.running.parallel import default_workers
 from engine.scenes.collide_scene import ScenePairs, collide_scene
 from engine.scenes.distances import SceneDistances
 from engine.scenes.ends import ScenePieces
+from engine.scenes.hits import SceneHits
 from engine.scenes.locate import SceneLocations
 from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
+from engine.segment_clipping.hits import HitKind, Hits, hits
 from engine.segment_clipping.lines import LinePieces, clip_lines
 from engine.solid_cutting.cut import CutSolid, cut
 from engine.solid_cutting.measures import area, centroid, volume
@@ -76,19 +78,20 @@ from engine.version import __version__
 from engine.warmup import warm
 
 __all__ = [
-    "Aabb", "Accuracy", "Bounds", "Cancel", "CancelledError", "Clearance", "ClippedPolygons", "Collapse", "Collision",
-    "Comparison", "Convex", "Csg", "CutSolid", "DeadlineExceededError", "Distances", "EmptyGeometryError",
-    "EngineError", "FaceNotSimpleError", "Feature", "HalfSpace", "Implicit", "InconsistentOrientationError",
-    "IndexOutOfRangeError", "Inspection", "InvalidArrayError", "InvalidInputError", "InvalidOperationError",
-    "InvalidPolynomialError", "LinePieces", "Location", "MinAboveMaxError", "NegativeRadiusError", "NotClosedError",
-    "NotFiniteError", "NotRepresentableError", "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece",
-    "PointsLike", "Polygon", "PolygonStatus", "Polyhedron", "Pose", "PoseLike", "Poses", "Rcc8", "Relation",
-    "RepeatedIndexError", "RingTooShortError", "Scene", "SceneDistances", "SceneLocations", "ScenePairs",
-    "ScenePieces", "Sections", "SegmentPieces", "Solid", "SolidLike", "Sphere", "Surface", "TooComplexError",
-    "TooDeepError", "Triangle", "UnsupportedPairError", "UnsupportedSolidError", "Witness", "WrongDimensionError",
-    "ZeroNormalError", "__version__", "area", "bounds", "centroid", "clearance", "clearance_poses", "clip_lines",
-    "clip_polygons", "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare",
-    "contains", "cut", "default_workers", "distances", "filled", "inspect", "iou", "layers", "locate", "locate_scene",
+    "Aabb", "Accuracy", "Bounds", "Cancel", "CancelledError", "Clearance", "ClippedPolygons", "Collapse",
+    "Collision", "Comparison", "Convex", "Csg", "CutSolid", "DeadlineExceededError", "Distances",
+    "EmptyGeometryError", "EngineError", "FaceNotSimpleError", "Feature", "HalfSpace", "HitKind", "Hits",
+    "Implicit", "InconsistentOrientationError", "IndexOutOfRangeError", "Inspection", "InvalidArrayError",
+    "InvalidInputError", "InvalidOperationError", "InvalidPolynomialError", "LinePieces", "Location",
+    "MinAboveMaxError", "NegativeRadiusError", "NotClosedError", "NotFiniteError", "NotRepresentableError",
+    "NotRigidError", "Overlay", "OverlayBatch", "OverlayPiece", "PointsLike", "Polygon", "PolygonStatus",
+    "Polyhedron", "Pose", "PoseLike", "Poses", "Rcc8", "Relation", "RepeatedIndexError", "RingTooShortError",
+    "Scene", "SceneDistances", "SceneHits", "SceneLocations", "ScenePairs", "ScenePieces", "Sections",
+    "SegmentPieces", "Solid", "SolidLike", "Sphere", "Surface", "TooComplexError", "TooDeepError", "Triangle",
+    "UnsupportedPairError", "UnsupportedSolidError", "Witness", "WrongDimensionError", "ZeroNormalError",
+    "__version__", "area", "bounds", "centroid", "clearance", "clearance_poses", "clip_lines", "clip_polygons",
+    "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare", "contains", "cut",
+    "default_workers", "distances", "filled", "hits", "inspect", "iou", "layers", "locate", "locate_scene",
     "overlap_volume", "overlay", "overlay_batch", "polygons", "read_layer", "read_mesh", "release", "section",
     "solid_types", "union_all", "volume", "warm",
 ]  # fmt: skip

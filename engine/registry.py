@@ -15,7 +15,7 @@ from engine.containment.methods import rational_locate
 from engine.distance.point_measures import BallMeasure, PlanesMeasure, TriangleMeasure
 from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
-from engine.segment_clipping import profiles
+from engine.segment_clipping import hits, profiles
 from engine.segment_clipping.on_boundary import boundary
 from engine.solid_cutting import measures
 from engine.solid_cutting import simple_measures as simple
@@ -123,6 +123,7 @@ ROWS: Final = (
         profile=profiles.on_boundary,
         n_faces=lambda solid: int(solid.n_faces),
         clip=boundary.on_boundary,
+        hits=hits.on_mesh,
         planes=planes.planes_of_faces,
         meets={3: "mesh"},
         measure=TriangleMeasure,
@@ -141,6 +142,7 @@ ROWS: Final = (
         bounds=bounds.bounds_of_vertices,
         volumes=measures.SURFACE,
         profile=profiles.on_boundary,
+        hits=hits.on_mesh,
         meets={3: "mesh"},
         measure=TriangleMeasure,
     ),

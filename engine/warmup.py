@@ -35,6 +35,7 @@ from engine.scenes.collide_scene import collide_scene
 from engine.scenes.locate_scene import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
+from engine.segment_clipping.hits import hits
 from engine.segment_clipping.lines import clip_lines
 from engine.solid_cutting.cut import cut
 from engine.solid_cutting.measures import area, centroid, volume
@@ -214,6 +215,7 @@ def _warm_scenes() -> None:
 
 def _warm_scene_clipping() -> None:
     segments = [[[-1.0, 0.3, 0.2], [2.0, 0.4, 0.1]]]
+    Scene([_cube()], [Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])]).hits(segments)
     turned = Pose.from_quaternion([3, 1, 0, 0], [0.25, 0, 0])
     for dimension in (2, 3):
         some = [*_regions(dimension), *_bodies()[1:2] * (dimension == 3)]
@@ -239,6 +241,7 @@ def _warm_clipping_2d() -> None:
 def _warm_clipping_3d() -> None:
     _clip(3)
     clip_segments([[[-3.0, -3.0, -1.0], [3.0, 3.0, 1.0]]], _cube())  # through a corner, its middle inside no double
+    hits([[[-1.0, 0.5, 0.25], [2.0, 0.5, 0.5]]], _cube())
 
 
 def _clip(dimension: int) -> None:
@@ -343,6 +346,7 @@ OPERATIONS = {
     "distances": (_warm_distances,),
     "clip_segments": _CLIPPING,
     "clip_lines": _CLIPPING,
+    "hits": (_warm_clipping_3d,),
     "clip_polygons": _CLIPPING,
     "Scene": (*_LOCATING, _warm_scenes, _warm_scene_clipping),
     "overlay": (_warm_overlay, _warm_overlay_rest),

@@ -24,6 +24,7 @@ from engine.scenes.bodies import Bodies
 from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, meets_any
 from engine.scenes.collide_scene import PairQuery, ScenePairs, collide_bodies, pair_keys
 from engine.scenes.ends import ScenePieces, merge_parts, sort_pieces
+from engine.scenes.hits import hits
 from engine.scenes.placements import Placements
 from engine.scenes.point_queries import PointQueries
 from engine.segment_clipping.exact_pieces import ONE, ZERO
@@ -74,6 +75,7 @@ class Scene(PointQueries):
     __slots__ = ()
 
     type: ClassVar[str] = "scene"
+    hits = hits
 
     def __init__(self, solids: SolidsLike, poses: PosesLike | None = None) -> None:
         bodies = Bodies(*checked_bodies(solids, poses))

@@ -165,7 +165,8 @@ def plan_for(region: Solid) -> Plan:
     """Return the cached clipping plan of a solid. Raises: UnsupportedSolidError."""
     make = row_of(region).clip
     if make is None:
-        raise refused(region, "clip_segments does not take", lambda row: row.clip, where=("region",))
+        more = "; hits tells where segments meet a surface" if row_of(region).hits else ""
+        raise refused(region, "clip_segments does not take", lambda row: row.clip, more, ("region",))
     plan: Plan = region.prepared("segment_plan", lambda: make(region))
     return plan
 

@@ -80,6 +80,8 @@ class Row:
     """(solid) -> number of faces, to which `SegmentPieces.faces` refers."""
     clip: Callable[[Any], Any] | None = None
     """(solid) -> the clipping `Plan`; without it `clip_segments` refuses the type."""
+    hits: Callable[[Any, Any], Any] | None = None
+    """(solid, budget) -> what `hits` needs of a mesh; without it `hits` refuses the type."""
     planes: Callable[[Any, Any], Any] | None = None
     """(solid, check) -> integer plane rows, to which polygons are clipped."""
     measure: Callable[[Any, Any], Any] | None = None

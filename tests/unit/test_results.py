@@ -15,6 +15,7 @@ from engine import Aabb, Polygon, Sphere
 
 CUBE = Aabb((0, 0, 0), (1, 1, 1))
 BESIDE = Aabb((1, 0, 0), (2, 1, 1))
+WALL = engine.Surface([(0, 0, 0), (0, 4, 0), (0, 0, 4)], [(0, 1, 2)])
 FAR = Aabb((5, 5, 5), (6, 6, 6))
 SQUARE = Polygon([[(0, 0), (4, 0), (4, 4), (0, 4)]])
 SEGMENTS = [((-1.0, 0.5, 0.5), (2.0, 0.5, 0.5)), ((0.5, 0.5, 0.5), (0.5, 0.5, 9.0))]
@@ -31,6 +32,8 @@ def results() -> dict[str, Any]:
         "sections": engine.section(
             ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), [0.5]
         ),
+        "hits": engine.hits(SEGMENTS, WALL),
+        "scene hits": engine.Scene([WALL]).hits(SEGMENTS),
         "batch": engine.overlay_batch([SQUARE], [SQUARE]),
     }
 

@@ -59,6 +59,9 @@ for dimension in (2, 3):
     for segments in [*segments_of, np.empty((0, 2, dimension))]:
         for solid in solids[dimension]:
             engine.clip_segments(segments, solid)
+        if dimension == 3:
+            engine.hits(segments, cube)
+            engine.Scene([cube, cube], [None, engine.Pose(np.eye(3)[[1, 2, 0]], [0.5, 0, 0])]).hits(segments, rays=True)
     for triangles in layouts(np.linspace(-1, 2, 6 * dimension).reshape(-1, 3, dimension)):
         engine.collide_triangles(triangles, triangles)
 for turns, moves in zip(layouts(np.broadcast_to(np.eye(3), (4, 3, 3))), layouts(np.eye(3)[[0, 1, 2, 0]])):

@@ -20,12 +20,15 @@ from engine.lanes.boxes import EMPTY
 from engine.lanes.faces import CORNER_ROWS
 from engine.lanes.tracing import LANES
 from engine.predicates.rational import are_all_safe
+from engine.running.budget import poll
 from engine.segment_clipping.on_boundary.contacts import LEAF_SIZE
 from engine.solids.mesh import Polyhedron, Surface
 from engine.solids.polygon import Polygon
 from engine.solids.primitives import Triangle
 from engine.types import Float32Array, FloatArray, Int32Array, IntArray, read_only
 
+_ITEMS: Final = 1 << 16
+"""Triangles placed between two checks of the deadline."""
 _BITS: Final = 20
 """Bits of each coordinate in the Morton code."""
 
@@ -139,7 +142,8 @@ def _curve(low: FloatArray, high: FloatArray) -> npt.NDArray[np.uint64]:
 
 def mesh_of(elements: FloatArray, faces: IntArray) -> Mesh:
     """Build the boundary of a mesh from its triangles (k, 3, 3). faces: the caller's number of the face of each."""
-    low, high = elements.min(axis=1), elements.max(axis=1)
+    low, high = (pick(pick(elements[:, 0], elements[:, 1]), elements[:, 2]) for pick in (np.minimum, np.maximum))
+    poll()
     stretched, origin, scale = build_stretched_bvh(np.concatenate([low, high], axis=1))
     tree, n_inner = _inner_first(stretched)
     with np.errstate(over="ignore"):  # of a mesh of denormal size: what is no number separates nothing
@@ -170,7 +174,11 @@ def corners_of(tree: Bvh, n_inner: int, local: tuple[FloatArray, FloatArray, Flo
     block, lane = np.nonzero(is_item)
     corners = np.full((len(child), CORNER_ROWS, LANES), -UNUSED, np.float32)
     elements, origin, inverse = local
-    with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
-        places = elements[-1 - child[is_item]] * inverse - origin * inverse
-    corners[block, :, lane] = places.reshape(-1, CORNER_ROWS)
+    items = -1 - child[is_item]
+    for first in range(0, len(items), _ITEMS):
+        poll()
+        some = slice(first, first + _ITEMS)
+        with np.errstate(all="ignore"):  # what underflows here is far below what the lanes round
+            places = elements[items[some]] * inverse - origin * inverse
+        corners[block[some], :, lane[some]] = places.reshape(-1, CORNER_ROWS)
     return cache_aligned(corners)

@@ -1,0 +1,232 @@
+"""Hits of segments and rays on the bodies of a scene; in a body's own frame where it has a pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+import numpy as np
+
+from engine.compiling.jit import entry_of, kernel
+from engine.containment.methods.rational_locate import to_body_frame, to_world_frame
+from engine.errors import UnsupportedSolidError
+from engine.predicates.error_free import two_diff
+from engine.running.budget import Budget, Cancel, reading
+from engine.running.parallel import Progress, check_options
+from engine.scenes.posed_cut import _turned
+from engine.scenes.table import _frame_of
+from engine.segment_clipping import hits as on_one
+from engine.segment_clipping.hit_contacts import fill_normals
+from engine.segment_clipping.hit_search import ANY, FIRST
+from engine.segment_clipping.hits import Hits, Keep, Lines, Target, code_of_keep, find, plain_lines
+from engine.solids.checks import as_point_groups
+from engine.solids.columns import Columns
+from engine.solids.pose import Pose
+from engine.solids.registry import refused, row_of
+from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, read_only
+
+if TYPE_CHECKING:
+    from engine.scenes.placements import Placements
+
+_ROWS: Final = 1 << 16
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SceneHits(Columns):
+    """The hits of lines on the bodies of a scene, by source, then by t, then by body; columns as in `Hits`.
+
+    Attributes
+    ----------
+    source, body : ndarray of int64, shape (m,)
+        The line and the body of each hit.
+    t, t_end, face, triangle, kind, barycentric, normal : ndarray
+        As in `Hits`; normals under the body's pose.
+    """
+
+    _rows: ClassVar[str] = "hits"
+    source: IntArray
+    body: IntArray
+    t: FloatArray
+    t_end: FloatArray
+    face: IntArray
+    triangle: IntArray
+    kind: Int8Array
+    barycentric: FloatArray
+    normal: FloatArray
+
+
+def hits(
+    self: Any,
+    segments: object,
+    *,
+    rays: bool = False,
+    keep: Keep = "all",
+    workers: int | None = None,
+    deadline: float | None = None,
+    cancel: Cancel | None = None,
+    progress: Progress | None = None,
+    report: bool = False,
+) -> Any:
+    """Find where segments or rays meet the surfaces of the bodies; as `engine.hits`, under poses.
+
+    Parameters
+    ----------
+    segments, rays, keep, workers, deadline, cancel, progress, report
+        As for `engine.hits`. "first": of hits that begin at one point that of the first body.
+
+    Returns
+    -------
+    SceneHits
+        With "any" an ndarray of bool, shape (n,); with ``report=True`` a pair of the answer and an `Accuracy`.
+
+    Raises
+    ------
+    UnsupportedSolidError
+        A body that is no surface or polyhedron.
+    EngineError
+        As `engine.hits`.
+    """
+    check_options(workers, progress, report=report, rays=rays)
+    code, scene = code_of_keep(keep), self._placements
+    with reading(deadline, cancel) as reader:
+        lines = plain_lines(read_only(as_point_groups(segments, 2, 3, ("segments",))), rays)
+    with Budget(reader.left(), cancel) as budget:
+        answer, n_open = _on_bodies(lines, scene, code, budget, workers)
+    if progress is not None and len(lines.rows):
+        progress(len(lines.rows))
+    n = len(lines.rows)
+    return (answer, Accuracy("exact", 0.5, n, n_open, n_open, "body_boxes")) if report else answer
+
+
+def _on_bodies(lines: Lines, scene: Placements, keep: int, budget: Budget, workers: int | None) -> tuple[Any, int]:
+    """Return the hits of all lines, with ANY bools, and how many lines took the exact fallback."""
+    for body, solid in enumerate(scene.base.solids):
+        if row_of(solid).hits is None:
+            error = refused(solid, "hits does not take", lambda row: row.hits)
+            raise UnsupportedSolidError(f"solids[{body}]: {error.message}", ("solids", body))
+    n, parts, starts = len(lines.rows), list[Hits](), dict[int, Any]()
+    met, is_open, near = np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+    bodies: list[IntArray] = []
+    for body, box in enumerate(scene.boxes(budget) if len(scene.base.solids) else ()):
+        _are_near(lines, box, near, budget)
+        items = np.flatnonzero(near > met if keep == ANY else near)
+        if not len(items):
+            continue
+        solid, pose = scene.placed(body)
+        make: Any = row_of(solid).hits
+        target, some = make(solid, budget), _lines_on(lines, items, pose)
+        columns, left = find(some, target, keep, budget, workers)
+        is_open[items[left]] = True
+        if keep == ANY:
+            met[items[columns]] = True
+            continue
+        hits = _with_faces(columns, target, pose, budget)
+        hits.source[:] = items[hits.source]
+        parts.append(hits)
+        bodies.append(np.full(len(hits), body))
+        starts[body] = partial(_exact_start, some, items, target, budget)
+    return (met if keep == ANY else _merged(parts, bodies, starts, keep)), int(is_open.sum())
+
+
+def _lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:
+    """Return some lines in the frame of a body."""
+    rows = read_only(lines.rows[items])
+    if pose is None:
+        return plain_lines(rows, lines.is_ray)
+
+    def exact(item: int) -> tuple[Any, Any]:
+        p, q = rows[item].tolist()
+        end = [Fraction(x) + Fraction(y) for x, y in zip(p, q)] if lines.is_ray else q
+        start = to_body_frame(p, pose)
+        return start, [y - x for x, y in zip(start, to_body_frame(end, pose))]
+
+    frame = _frame_of(pose)
+    heads, tails, blurs = np.full(rows.shape, np.inf), np.zeros(rows.shape), np.zeros(len(rows))
+    if frame is not None:  # else: numbers out of range, which stay open
+        entry_of(to_frame)(rows, lines.is_ray, read_only(frame), heads, tails, blurs)
+    return Lines(heads, tails, blurs, lines.is_ray, exact)
+
+
+def _with_faces(columns: Any, target: Target, pose: Pose | None, budget: Budget) -> Hits:
+    """Return hits on a body with faces and unit normals under its pose."""
+    if pose is None:
+        return on_one.with_faces(columns, target, target.normals[columns[3]], budget)
+    frame, (triangles, rows) = _frame_of(pose), np.unique(columns[3], return_inverse=True)
+    normals = np.full((len(triangles), 3), np.nan)
+    if frame is not None:
+        elements = read_only(target.mesh.elements[triangles])
+        entry_of(fill_normals)(elements, read_only(frame), budget.flag, normals)
+        budget.check()
+    return on_one.with_faces(
+        columns, target, normals[rows.ravel()], budget, lambda corners: [to_world_frame(x, pose) for x in corners]
+    )
+
+
+def _exact_start(
+    lines: Lines, items: IntArray, target: Target, budget: Budget, source: int, triangle: int, t: float
+) -> Fraction:
+    """Return the exact parameter of a hit on a body, given its source, triangle and nearest double; items: the source
+    of each line."""
+    place = np.searchsorted(items, [source])
+    (hits,) = on_one.exact_on(lines, place, target, budget).values()
+    return min((each.t for each in hits if each.triangle == triangle), key=lambda at: abs(at - Fraction(t)))
+
+
+def _merged(parts: list[Hits], bodies: list[IntArray], starts: dict[int, Any], keep: int) -> SceneHits:
+    """Return the hits on all bodies in order; parameters that round alike are compared exactly."""
+    if not parts:
+        none, three, whole = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
+        return SceneHits(whole, whole, none, none, whole, whole, np.zeros(0, np.int8), three, three)
+    source, *others = (np.concatenate([getattr(part, name) for part in parts]) for name in Hits.__slots__)
+    body, t, triangle = np.concatenate(bodies), others[0], others[3]
+    order = np.lexsort((body, t, source))
+    ties = np.flatnonzero((source[order][1:] == source[order][:-1]) & (t[order][1:] == t[order][:-1]))
+    exact = {
+        row: starts[body[row]](int(source[row]), int(triangle[row]), float(t[row]))
+        for row in order[np.union1d(ties, ties + 1)].tolist()
+    }
+    if exact:
+        ranked = sorted(order.tolist(), key=lambda row: (source[row], t[row], exact.get(row, 0), body[row]))
+        order = np.array(ranked, np.int64)
+    if keep == FIRST:
+        order = order[np.append(True, source[order][1:] != source[order][:-1])[: len(order)]]
+    return SceneHits(source[order], body[order], *(column[order] for column in others))
+
+
+def _are_near(lines: Lines, box: FloatArray, near: BoolArray, budget: Budget) -> None:
+    """Set near (n,) to whether each line may meet a box (2, 3): slabs, widened by far more than rounds here; what is no
+    number separates nothing."""
+    for first in range(0, len(near), _ROWS):
+        budget.check()
+        p, q = lines.rows[first : first + _ROWS].swapaxes(0, 1)
+        with np.errstate(all="ignore"):
+            slack, way = 2.0**-40 * np.maximum(abs(p), abs(box).max(axis=0)) + 2.0**-1000, q if lines.is_ray else q - p
+            low, high = box[0] - slack - p, box[1] + slack - p
+            ends = np.stack([low / way, high / way])
+            enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+            is_apart = (enter - leave > 2.0**-40 * (abs(enter) + abs(leave))) | (leave < 0.0)
+            is_apart |= ((way == 0.0) & ((low > 0.0) | (high < 0.0))).any(axis=1)
+            near[first : first + _ROWS] = ~(is_apart | (enter > (np.inf if lines.is_ray else 1.0)))
+
+
+@kernel
+def to_frame(
+    lines: FloatArray, is_ray: bool, frame: FloatArray, heads: FloatArray, tails: FloatArray, blurs: FloatArray
+) -> None:
+    """Set heads and tails (n, 2, 3), double-doubles, to the start and the vector of lines (n, 2, 3) in the frame (3, 7)
+    of a pose, and blurs (n,) to a bound on the error of their coordinates."""
+    for i in range(lines.shape[0]):
+        p, q = lines[i, 0], lines[i, 1]
+        at, blur = _turned(frame, (
+            two_diff(p[0], frame[0, 6]), two_diff(p[1], frame[1, 6]), two_diff(p[2], frame[2, 6])
+        ))  # fmt: skip
+        way = (q[0], 0.0), (q[1], 0.0), (q[2], 0.0)
+        if not is_ray:
+            way = two_diff(q[0], p[0]), two_diff(q[1], p[1]), two_diff(q[2], p[2])
+        along, along_blur = _turned(frame, way)
+        blurs[i] = max(blur, along_blur)
+        for k in range(3):
+            heads[i, 0, k], tails[i, 0, k] = at[k]
+            heads[i, 1, k], tails[i, 1, k] = along[k]

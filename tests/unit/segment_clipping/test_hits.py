@@ -1,0 +1,183 @@
+"""Hits of segments and rays: each kind by hand, a seeded sample against rationals, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import engine
+from engine import HitKind
+from tests.reference import hits as reference
+from tests.reference.exact import Q, add, sub, vector
+
+CORNERS = [[x, y, z] for x in (0.0, 4.0) for y in (0.0, 4.0) for z in (0.0, 4.0)]
+QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+CUBE = engine.Polyhedron(CORNERS, QUADS)
+SHEET = engine.Surface([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
+TENT = engine.Surface([[0, 0, 0], [4, 0, 0], [4, 2, 2], [0, 2, 2], [0, 4, 0], [4, 4, 0]], [[0, 1, 2, 3], [3, 2, 5, 4]])
+TWICE = engine.Surface(SHEET.vertices, [[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 3, 0]])
+FLAT = engine.Surface([[0, 0, 0], [2, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
+"""The side from 0 to 4 of the triangle has another, without area."""
+
+
+def names(found: engine.Hits) -> list[tuple[float, float, int, str]]:
+    rows = zip(found.t.tolist(), found.t_end.tolist(), found.face.tolist(), found.kind.tolist())
+    return [(t, t_end, face, HitKind(kind).name) for t, t_end, face, kind in rows]
+
+
+@pytest.mark.parametrize(
+    ("surface", "segment", "expected"),
+    [
+        (SHEET, [[1, 2, 1], [1, 2, -1]], [(0.5, 0.5, 1, "ACROSS")]),
+        (SHEET, [[2, 2, 1], [2, 2, -1]], [(0.5, 0.5, 0, "ACROSS")]),  # the side that both have
+        (SHEET, [[0, 2, 1], [0, 2, -1]], [(0.5, 0.5, 1, "RIM")]),
+        (SHEET, [[4, 4, 1], [4, 4, -1]], [(0.5, 0.5, 0, "RIM")]),
+        (SHEET, [[1, 2, 1], [1, 2, 0]], [(1.0, 1.0, 1, "END")]),
+        (SHEET, [[1, 2, 0], [1, 2, 3]], [(0.0, 0.0, 1, "END")]),
+        (SHEET, [[-4, 2, 0], [4, 2, 0]], [(0.5, 1.0, 1, "ALONG")]),
+        (SHEET, [[1, 2, 0], [1, 2, 0]], [(0.0, 0.0, 1, "END")]),
+        (SHEET, [[1, 2, 1], [1, 2, 1]], []),
+        (TENT, [[2, 1, 2], [2, 3, 2]], [(0.5, 0.5, 0, "TOUCH")]),
+        (TENT, [[2, 0, 1], [2, 4, 1]], [(0.25, 0.25, 0, "ACROSS"), (0.75, 0.75, 1, "ACROSS")]),
+        (TENT, [[0, 2, 2], [4, 2, 2]], [(0.0, 1.0, 0, "ALONG")]),
+        (TWICE, [[1, 2, 1], [1, 2, -1]], [(0.5, 0.5, 1, "TOUCH")]),  # two sheets, crossed both
+        (FLAT, [[2, 0, 1], [2, 0, -1]], [(0.5, 0.5, 1, "RIM")]),
+        (CUBE, [[-4, 1, 1], [8, 1, 1]], [(1 / 3, 1 / 3, 0, "ACROSS"), (2 / 3, 2 / 3, 1, "ACROSS")]),
+
+        (CUBE, [[-1, 1, 2], [1, -1, 2]], [(0.5, 0.5, 0, "TOUCH")]),
+        (CUBE, [[-1, -1, -1], [9, 9, 9]], [(0.1, 0.1, 0, "ACROSS"), (0.5, 0.5, 1, "ACROSS")]),  # from corner to corner
+        (CUBE, [[-1, 1, 4], [9, 1, 4]], [(0.1, 0.5, 0, "ALONG")]),
+    ],
+)  # fmt: skip
+def test_kinds(surface: Any, segment: Any, expected: list[tuple[float, float, int, str]]) -> None:
+    assert names(engine.hits([segment], surface)) == expected
+    assert names(engine.hits([segment], surface, keep="first")) == expected[:1]
+    assert engine.hits([segment], surface, keep="any").tolist() == [bool(expected)]
+
+
+def test_a_ray_has_no_far_end() -> None:
+    origins, directions = [[1, 2, 2.0**60], [1, 2, 5], [1, 2, 5]], [[0, 0, -(2.0**-60)], [0, 0, 1], [0, 0, 0]]
+    found = engine.hits(np.stack([origins, directions], axis=1), SHEET, rays=True)
+    assert (found.source.tolist(), found.t.tolist()) == ([0], [2.0**120])
+    with pytest.raises(engine.NotRepresentableError):
+        engine.hits([[[1, 2, 1e300], [0, 0, -1e-300]]], SHEET, rays=True)
+
+
+def test_normals_are_unit_vectors_of_the_faces_order() -> None:
+    found = engine.hits([[[-1, 1, 1], [9, 1, 1]], [[1, 1, 9], [1, 1, -1]]], CUBE)
+    assert found.normal.tolist() == [[-1, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, -1]]
+    askew = engine.Surface([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 2, 1]])
+    assert engine.hits([[[0.25, 0.25, 9], [0.25, 0.25, -9]]], askew).normal.tolist() == [[0.0, 0.5**0.5, -(0.5**0.5)]]
+    line = engine.Surface([[0, 0, 0], [1, 0, 0], [3, 0, 0]], [[0, 1, 2]])
+    found = engine.hits([[[2, 0, 1], [2, 0, -1]]], line)
+    assert (found.normal.tolist(), found.barycentric.tolist()) == ([[0, 0, 0]], [[0, 0.5, 0.5]])
+
+
+def meshes() -> dict[str, tuple[Any, Any]]:
+    """Return vertices and triangles of small meshes with every degeneracy."""
+    draw = np.random.default_rng(7)
+    cube = np.array(CORNERS), [[q[0], *pair] for q in QUADS for pair in (q[1:3], q[2:4])]
+    grid = np.array([[x, y, draw.integers(0, 3)] for x in range(4) for y in range(4)], np.float64)
+    tin = [t for k in (0, 1, 2, 4, 5, 6, 8, 9, 10) for t in ([k, k + 4, k + 5], [k, k + 5, k + 1])]
+    plain = grid * [1, 1, 0]
+    soup = draw.integers(-3, 4, (12, 3)).astype(float), [draw.choice(12, 3, False).tolist() for _ in range(12)]
+    half = np.vstack([grid, (grid[0] + grid[4]) / 2, grid[0]])
+    odd = [*tin, tin[0], [0, 16, 5], [0, 16, 4], [0, 17, 4]]  # twice, cut elsewhere, without area, a side of no length
+    return {
+        "cube": cube, "terrain": (grid, tin), "plane": (plain, tin), "soup": soup, "odd": (half, odd),
+        "stretched": (grid * [1.0, 2.0**-30, 12345.678], tin), "far": (0.1 * half + [1e6, -1e6, 1e6], odd),
+        "denormal": (5e-324 * cube[0], cube[1]), "huge": (1e300 * cube[0], cube[1]), "decimal": (cube[0] / 3, cube[1]),
+    }  # fmt: skip
+
+
+MESHES = meshes()
+
+
+def lines_through(vertices: Any, triangles: Any, n: int, seed: int) -> Any:
+    """Return segments through corners and sides, in planes, that end there, and others."""
+    draw, found = np.random.default_rng(seed), []
+    low, extent = vertices.min(axis=0), np.maximum(np.ptp(vertices, axis=0), np.ptp(vertices, axis=0).max() * 2.0**-9)
+    for k in range(n):
+        a, b, c = vertices[triangles[draw.integers(len(triangles))]]
+        p, q = (low + extent * draw.integers(-2, 7, 3) / 4 for _ in range(2))
+        inside, other = (a + (b - a) * i / 4 + (c - a) * j / 4 for i, j in draw.integers(-1, 6, (2, 2)))
+        found.append(
+            [(p, q), (p, a), (p, (a + b) / 2), (inside, other), (a, q), (inside, q), (p, inside), (a - (b - a), b),
+             (a, a)][k % 9]
+        )  # fmt: skip
+    return np.array(found) + 0.0
+
+
+@pytest.mark.parametrize("is_ray", [False, True])
+@pytest.mark.parametrize("name", MESHES)
+def test_equal_to_rationals(name: str, is_ray: bool) -> None:
+    surface = engine.Surface(*MESHES[name])
+    lines = lines_through(surface.vertices, surface.triangles, 27, 5)
+    if is_ray:
+        lines[:, 1] -= lines[:, 0]
+    triangles = [[vector(corner) for corner in each] for each in surface.vertices[surface.triangles].tolist()]
+    found, first = engine.hits(lines, surface, rays=is_ray), engine.hits(lines, surface, rays=is_ray, keep="first")
+    any_of = engine.hits(lines, surface, rays=is_ray, keep="any")
+    for k, (p, q) in enumerate(lines.tolist()):
+        way = vector(q) if is_ray else sub(vector(q), vector(p))
+        expected = reference.hits(vector(p), way, is_ray, triangles, surface.triangle_faces.tolist())
+        rows = [
+            (*map(float, each[:2]), each.triangle, each.kind, [float(weight) for weight in each.weights])
+            for each in expected
+        ]
+        for answer, wanted in ((found, rows), (first, rows[:1])):
+            columns = (answer.t, answer.t_end, answer.triangle, answer.kind, answer.barycentric)
+            mine = [column[answer.source == k].tolist() for column in columns]
+            assert list(zip(*mine)) == wanted, (name, p, q)
+        assert any_of[k] == bool(rows)
+
+
+def test_poses_are_exact() -> None:
+    turned = engine.Pose.from_quaternion([3, 1, 2, -1], [0.3, -7, 1e3])
+    rotation = [vector(row) for row in turned.rotation.tolist()]
+    surface = engine.Surface(*MESHES["odd"])
+    images = [
+        [add(tuple(sum((x * y for x, y in zip(row, vector(corner))), Q(0)) for row in rotation),
+             vector(turned.translation.tolist())) for corner in each]
+        for each in surface.vertices[surface.triangles].tolist()
+    ]  # fmt: skip
+    corners = np.array([[[float(x) for x in corner] for corner in each] for each in images]).reshape(-1, 3)
+    lines = lines_through(corners, np.arange(len(corners)).reshape(-1, 3), 27, 6)
+    found = engine.Scene([CUBE, surface], [None, turned]).hits(lines)
+    assert len(found) > 9
+    assert set(found.body.tolist()) == {1}
+    for k, (p, q) in enumerate(lines.tolist()):
+        expected = reference.hits(vector(p), sub(vector(q), vector(p)), False, images, surface.triangle_faces.tolist())
+        rows = [(float(each.t), float(each.t_end), each.triangle, each.kind) for each in expected]
+        columns = (found.t, found.t_end, found.triangle, found.kind)
+        assert list(zip(*(column[found.source == k].tolist() for column in columns))) == rows
+    lengths = [sum(Q(x) ** 2 for x in row) for row in found.normal.tolist()]
+    assert all(abs(length - 1) < Q(1, 2**50) or length == 0 for length in lengths)
+
+
+def test_bodies_that_are_met_at_one_place_stand_in_their_order() -> None:
+    beside = engine.Pose([[0, -1, 0], [1, 0, 0], [0, 0, 1]], [4, 0, 0])
+    scene = engine.Scene([SHEET, SHEET, CUBE], [beside, None, None])
+    found = scene.hits([[[1, 2, -3], [1, 2, 6]]])
+    assert (found.body.tolist(), found.t.tolist()) == ([0, 1, 2, 2], [1 / 3, 1 / 3, 1 / 3, 7 / 9])
+    assert scene.hits([[[1, 2, -3], [1, 2, 6]]], keep="first").body.tolist() == [0]
+    assert scene.moved({0: None, 1: beside}).hits([[[1, 2, 1], [1, 2, 0.5]]]).body.tolist() == []
+    with pytest.raises(engine.UnsupportedSolidError, match=r"solids\[1\]: hits does not take a sphere"):
+        engine.Scene([SHEET, engine.Sphere([0, 0, 0], 1)]).hits([[[1, 2, 1], [1, 2, 0]]])
+
+
+def test_segments_clipped_on_a_surface_are_sent_here() -> None:
+    with pytest.raises(engine.UnsupportedSolidError, match="hits tells where segments meet a surface"):
+        engine.clip_segments([[[1, 2, 1], [1, 2, 0]]], SHEET)
+    with pytest.raises(engine.UnsupportedSolidError, match="give a polyhedron or surface"):
+        engine.hits([[[1, 2, 1], [1, 2, 0]]], engine.Sphere([0, 0, 0], 1))
+
+
+def test_threads_and_chunks_change_nothing() -> None:
+    surface = engine.Surface(*MESHES["terrain"])
+    lines = np.tile(lines_through(surface.vertices, surface.triangles, 9, 8), (400, 1, 1))
+    once = engine.hits(lines, surface, workers=1)
+    assert engine.hits(lines, surface, workers=2) == once
+    assert len(once) == 400 * len(engine.hits(lines[:9], surface))
