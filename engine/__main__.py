@@ -1,5 +1,5 @@
-"""The command line ``python -m engine contains | collide | clearance | distances | clip | bounds | volume | section |
-cut | overlay | union | join``: for files; the last three are for layers.
+"""The command line ``python -m engine contains | collide | clearance | distances | clip | hits | bounds | volume |
+section | cut | overlay | union | join``: for files; the last three are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
 ``python -m engine audit`` compares other packages with the exact answers on your data.
@@ -50,6 +50,7 @@ from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
 from engine.running.parallel import Progress
 from engine.segment_clipping.clip_segments import clip_segments
+from engine.segment_clipping.hits import HitKind, hits
 from engine.solid_cutting.cut import cut
 from engine.solid_cutting.measures import area, centroid, volume
 from engine.solid_cutting.section import section
@@ -154,6 +155,22 @@ def _clip(options: Options) -> None:
         pieces = clip_segments(segments, region, progress=progress, deadline=options.deadline)
     names = ("source", "start", "end", "t", "faces")
     write_table(options.output, {name: getattr(pieces, name) for name in names})
+
+
+def _hits(options: Options) -> None:
+    surface = read_solid(options.surface, _note(options))
+    lines = read_rows(options.items, (2, 3))
+    with _bar(len(lines), "lines", options) as progress:
+        answer: Any = hits(
+            lines, surface, rays=options.rays, keep=options.keep, progress=progress, deadline=options.deadline
+        )
+    if options.keep == "any":
+        write_table(options.output, {"met": answer})
+        return
+    columns = {name: getattr(answer, name) for name in type(answer).__slots__}
+    if options.output is None or options.output.endswith(".csv"):
+        columns["kind"] = np.array([kind.name.lower() for kind in HitKind])[answer.kind]
+    write_table(options.output, columns)
 
 
 def _clip_polygons(region: Any, options: Options) -> None:
@@ -328,6 +345,8 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
                   SOLID | {"points": ROWS + "2 or 3 coordinates"}),
     "clip": (_clip, "clip segments to a solid, or polygons to a convex one",
              {"region": FORMATS, "items": ROWS + "two positions; with --polygons a .geojson file"}),
+    "hits": (_hits, "find where segments or rays meet a mesh, with face, normal and barycentrics",
+             {"surface": FORMATS, "items": ROWS + "two positions; with --rays origin and direction"}),
     "overlay": (_overlay, "Boolean operation on two layers, every feature with every one that it meets",
                 {"left": LAYER + ATTRIBUTES, "right": LAYER}),
     "union": (_union, "unite the features of a layer, all or those with equal properties", {"layer": LAYER}),
@@ -371,6 +390,8 @@ def _parser() -> argparse.ArgumentParser:
     made["section"].add_argument("heights", nargs="+", type=float, help="the planes dot(normal, p) = height")
     made["section"].add_argument("--normal", nargs=3, type=float, metavar="NUMBER", help="z by default")
     made["cut"].add_argument("--keep", choices=("inside", "outside"), default="inside")
+    made["hits"].add_argument("--rays", action="store_true", help="half-lines: origin and direction")
+    made["hits"].add_argument("--keep", choices=("all", "first", "any"), default="all")
     made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
     made["union"].add_argument("--by", nargs="+", metavar="NAME", help="unite features that agree in these properties")
     made["join"].add_argument("--outside", action="store_true", help="also write points that no feature contains")

@@ -32,8 +32,11 @@ from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
 from engine.polygon_overlay.run import Operation
 from engine.running.parallel import Progress, check_options
 from engine.scenes.ends import ScenePieces
+from engine.scenes.hits import SceneHits
 from engine.scenes.scene import Keep, Scene
 from engine.segment_clipping import clip_segments as clipping
+from engine.segment_clipping import hits as one
+from engine.segment_clipping.hits import Hits
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, shown
 from engine.types import BoolArray, FloatArray, Int8Array
@@ -109,6 +112,21 @@ def clip_segments_scene(
     parts_done = _in_order(_answers(client, function, (scene,), (rows,), part, progress))
     if len(parts_done) < 2:
         return parts_done[0][1] if parts_done else function((scene,), rows)
+    return np.concatenate([met for _, met in parts_done]) if keep == "any" else _joined(parts_done)
+
+
+def hits(
+    client: Client, segments: object, surface: Solid | Scene, *, rays: bool = False, keep: Keep = "all",
+    part: int = 50_000, progress: Progress | None = None,
+) -> Hits | SceneHits | BoolArray:  # fmt: skip
+    """Find where segments or rays meet a surface, or the bodies of a scene, see `engine.hits`, `engine.Scene.hits`."""
+    rows = as_point_groups(segments, 2, 3, ("segments",))
+    function = partial(_about_rows, one.hits, rays=rays, keep=keep)
+    if isinstance(surface, Scene):
+        function = partial(_about_solids, Scene.hits, rays=rays, keep=keep)
+    parts_done = _in_order(_answers(client, function, (surface,), (rows,), part, progress))
+    if len(parts_done) < 2:
+        return parts_done[0][1] if parts_done else function((surface,), rows)
     return np.concatenate([met for _, met in parts_done]) if keep == "any" else _joined(parts_done)
 
 

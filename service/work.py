@@ -31,6 +31,7 @@ _INSTEAD: Final = {
     "collide_poses": "ask for fewer poses at once",
     "clearance_poses": "ask for fewer poses at once",
     "clip_segments": "send fewer segments at once",
+    "hits": "send fewer segments at once, or ask for the first hits",
     "clip_lines": "send fewer lines at once",
     "clip_polygons": "send fewer polygons at once",
     "overlay_features": "send fewer features at once",

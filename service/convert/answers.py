@@ -26,6 +26,7 @@ from service.schemas.clipping import (
     ClipLinesResponse,
     ClipSegmentsResponse,
 )
+from service.schemas.hits import HitsResponse
 from service.schemas.points import (
     AabbBounds,
     BoundsResponse,
@@ -339,3 +340,14 @@ def clipped_in_scene(scene: Scene, segments: Any, keep: Keep | None, call: Call)
     return ClipSegmentsSceneResponse.made(
         pieces=Series(len(clipped), some, weight=12), met=None, accuracy=from_accuracy(accuracy)
     )
+
+
+def from_hits(result: Any, accuracy: engine.Accuracy) -> HitsResponse:
+    """Return the answer of `hits`, on a surface or in a scene."""
+    if isinstance(result, np.ndarray):
+        return HitsResponse.made(hits=None, met=result, accuracy=from_accuracy(accuracy))
+    names = [name for name in ("source", "body", "t", "t_end", "face", "triangle") if hasattr(result, name)]
+    kinds = np.array([kind.name.lower() for kind in engine.HitKind])[result.kind]
+    columns = [*(getattr(result, name) for name in names), kinds, result.barycentric, result.normal]
+    some = _rows(("segment", *names[1:], "kind", "barycentric", "normal"), columns)
+    return HitsResponse.made(hits=Series(len(result), some, weight=13), met=None, accuracy=from_accuracy(accuracy))

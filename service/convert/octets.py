@@ -110,6 +110,15 @@ def from_scene_pieces(pieces: Any, call: Call) -> Any:
     return np.column_stack([pieces.source, pieces.body, pieces.t, pieces.start, pieces.end])
 
 
+def from_hits(result: Any, call: Call) -> Any:
+    """Return hits as rows of float64, or whether each line has one as int8."""
+    if isinstance(result, np.ndarray):
+        return result.astype(np.int8)
+    columns = [getattr(result, name) for name in type(result).__slots__]
+    call.take(8 * len(result) * 13)
+    return np.column_stack(columns)
+
+
 def from_locations(located: engine.SceneLocations, call: Call) -> Any:
     """Return rows of point, body and location."""
     call.take(24 * len(located.indices))

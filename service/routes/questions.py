@@ -43,6 +43,7 @@ from service.schemas.cutting import (
     VolumeRequest,
     VolumeResponse,
 )
+from service.schemas.hits import HitsRequest, HitsResponse
 from service.schemas.points import (
     NEEDED,
     BoundsRequest,
@@ -161,6 +162,15 @@ def clip_segments(question: ClipSegmentsRequest, call: CallOf) -> ClipSegmentsRe
     region = questions.to_solid(question.region, call, ("region",))
     segments = questions.to_items(question.segments, region.dimension, call)
     return answers.from_pieces(*call.compute(engine.clip_segments, segments, region))
+
+
+@router.post("/v1/hits", operation_id="hits", tags=["clipping"])
+def hits(question: HitsRequest, call: CallOf) -> HitsResponse:
+    """Tell where segments or rays meet a surface, how, and with which normal and barycentrics."""
+    surface = questions.to_solid(question.surface, call, ("surface",))
+    lines = questions.to_items(question.segments, 3, call)
+    keep = question.keep or "all"
+    return answers.from_hits(*call.compute(engine.hits, lines, surface, rays=bool(question.rays), keep=keep))
 
 
 @router.post("/v1/clip/lines", operation_id="clip_lines", tags=["clipping"])

@@ -27,6 +27,7 @@ from service.schemas.bodies import (
     StoredSceneSummary,
 )
 from service.schemas.geojson import ALSO
+from service.schemas.hits import HitsResponse, SceneHitsRequest
 from service.schemas.points import ContainsSceneResponse, SceneDistancesResponse
 from service.schemas.solids import InspectRequest, InspectResponse, Solid, StoredSolidSummary
 from service.store import Stored
@@ -215,6 +216,26 @@ def clip_segments_stored(solid_id: Id, question: Octets, call: CallOf) -> Any:
     return octets.answer(call, octets.from_pieces(pieces, len(segments), region.dimension, call), accuracy)
 
 
+_HITS: Final = "t, t_end, face, triangle, kind (0 across, 1 touch, 2 rim, 3 end, 4 along), 3 barycentrics, normal."
+_ANY: Final = " Where `keep` is any: N int8, 1 where a line has a hit."
+RaysQuery = Annotated[bool, Query(description="As in JSON: the rows are origins and directions.")]
+
+
+@binary.post(
+    "/v1/solids/{solid_id}/hits",
+    operation_id="hits_stored",
+    response_class=octets.Response,
+    responses=answers_with(f"Rows of 12 float64 for each hit: segment, {_HITS}{_ANY}"),
+)
+def hits_stored(
+    solid_id: Id, question: Octets, call: CallOf, keep: questions.KeepQuery = "all", rays: RaysQuery = False
+) -> Any:
+    """Tell where segments or rays, N x 2 x 3 little-endian float64, meet a stored surface or polyhedron."""
+    surface = call.store.get(solid_id)
+    result, accuracy = call.compute(engine.hits, octets.to_rows(question, (2, 3)), surface, keep=keep, rays=rays)
+    return octets.answer(call, octets.from_hits(result, call), accuracy)
+
+
 @binary.post(
     "/v1/solids/import",
     operation_id="import_solid",
@@ -301,6 +322,15 @@ def clip_segments_stored_scene(
     return answers.clipped_in_scene(scene, question.segments, question.keep, call)
 
 
+@router.post("/v1/scenes/{scene_id}/hits", operation_id="hits_stored_scene", tags=["scenes"])
+def hits_stored_scene(scene_id: SceneId, question: SceneHitsRequest, call: CallOf) -> HitsResponse:
+    """Tell where segments or rays meet the surfaces of a stored scene, how, and with which normal and barycentrics."""
+    scene = questions.to_moved(call.store.get_scene(scene_id), question.moved, call)
+    lines = questions.to_items(question.segments, 3, call)
+    keep = question.keep or "all"
+    return answers.from_hits(*call.compute(scene.hits, lines, rays=bool(question.rays), keep=keep))
+
+
 @router.post("/v1/clip/segments/scene", operation_id="clip_segments_scene", tags=["scenes"])
 def clip_segments_scene(question: ClipSegmentsSceneRequest, call: CallOf) -> ClipSegmentsSceneResponse:
     """Tell what of segments lies within which body, in the exact order along each."""
@@ -349,3 +379,23 @@ def clip_segments_stored_scene_binary(
     segments = octets.to_rows(question, (2, scene.solids[0].dimension))
     result, accuracy = call.compute(scene.clip_segments, segments, keep=keep)
     return octets.answer(call, octets.from_scene_pieces(result, call), accuracy)
+
+
+@scene_binary.post(
+    "/v1/scenes/{scene_id}/binary/hits",
+    operation_id="hits_stored_scene_binary",
+    response_class=octets.Response,
+    responses=answers_with(f"Rows of 13 float64 for each hit: segment, body, {_HITS}{_ANY}"),
+)
+def hits_stored_scene_binary(
+    scene_id: SceneId,
+    question: Octets,
+    call: CallOf,
+    keep: questions.KeepQuery = "all",
+    rays: RaysQuery = False,
+    moved: MovedText = "[]",
+) -> Any:
+    """Tell where segments or rays, N x 2 x 3 little-endian float64, meet the surfaces of a stored scene."""
+    scene = questions.to_moved(call.store.get_scene(scene_id), questions.read_moved(moved, call), call)
+    result, accuracy = call.compute(scene.hits, octets.to_rows(question, (2, 3)), keep=keep, rays=rays)
+    return octets.answer(call, octets.from_hits(result, call), accuracy)

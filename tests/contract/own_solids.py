@@ -97,6 +97,7 @@ def engine_questions(solid: Any) -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "cut", lambda: engine.cut(solid, engine.HalfSpace([1] * d, 0))
     yield "overlap_volume", lambda: engine.overlap_volume(solid, engine.Aabb([0] * d, [1] * d))
     yield "clip_segments", lambda: engine.clip_segments(segments, solid)
+    yield "hits", lambda: engine.hits(segments, solid)
     yield "clip_lines", lambda: engine.clip_lines(segments, solid)
     yield "clip_polygons", lambda: engine.clip_polygons([SQUARE[d]], solid)
     yield "repr", lambda: repr(solid)
@@ -149,6 +150,7 @@ def service_questions(model: dict[str, Any], d: int) -> Iterator[tuple[str, dict
     yield "cut", {"solid": model, "region": {"type": "half_space", "normal": [1] * d, "offset": 0}}
     yield "overlap", {"first": model, "second": sphere}
     yield "clip/segments", {"region": model, "segments": segments}
+    yield "hits", {"surface": model, "segments": segments}
     yield "clip/lines", {"region": model, "lines": segments}
     yield "clip/polygons", {"region": model, "polygons": [SQUARE[d]]}
     bodies = {"bodies": [{"solid": sphere}, {"solid": model}]}

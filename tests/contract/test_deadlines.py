@@ -160,6 +160,7 @@ WORK: dict[str, Callable[[], Any]] = {
 TINS = {"bodies": [{"solid": TIN, **({"pose": POSE} if i % 2 else {})} for i in range(60)]}
 COMBS = {"bodies": [{"solid": {"type": "polygon", "rings": [comb(3_000)]}}]}
 ALONG = [[[-1, 0], [9_000, 0]]] * 20_000
+IN_A_FACE = [[[-2, 0.1, 0], [2, 0.2, 0]]] * 20_000
 WORK |= {
     "put_scene": lambda: {"bodies": [{"solid": prism(comb(1_200))}]},
     "distances_stored": lambda: (MANY_SIDES, np.tile([5.0, 5.0], 100).tobytes()),
@@ -170,6 +171,10 @@ WORK |= {
         {"bodies": [{"solid": POLYNOMIAL}]}, np.tile([3.0, 5.0], 100_000).tobytes()
     ),
     "collide_stored_scene": lambda: (TINS, {}),
+    "hits": lambda: {"surface": TIN, "segments": IN_A_FACE},
+    "hits_stored": lambda: (TIN, np.array(IN_A_FACE, np.float64).tobytes()),
+    "hits_stored_scene": lambda: (TINS, {"segments": IN_A_FACE}),
+    "hits_stored_scene_binary": lambda: (TINS, np.array(IN_A_FACE, np.float64).tobytes()),
     "clip_segments_scene": lambda: {**COMBS, "segments": ALONG},
     "clip_segments_stored_scene": lambda: (COMBS, {"segments": ALONG}),
     "clip_segments_stored_scene_binary": lambda: (COMBS, np.array(ALONG, np.float64).tobytes()),

@@ -164,6 +164,7 @@ def crossing_triangles() -> tuple[Any, Any]:
 
 POSE = engine.Pose(np.eye(3), [0, 0, 1])
 ALONG = np.tile([[-1.0, 0.0], [9_000.0, 0.0]], (20_000, 1, 1))
+IN_A_FACE = np.tile([[-2.0, 0.1, 0.0], [2.0, 0.2, 0.0]], (60_000, 1, 1))
 CHORDS = np.tile([[-2.0, 0.1], [2.0, 0.2]], (60_000, 1, 1))
 POINTS = np.tile([3.0, 5.0], (100_000, 1))
 TINS = [None, POSE] * 30
@@ -179,6 +180,7 @@ WORK: dict[str, Callable[..., Any]] = {
     "Polyhedron": lambda **end: engine.Polyhedron(*arrows(), **end),
     "Scene.clip_segments": lambda **end: engine.Scene([solid("comb")]).clip_segments(ALONG, **end),
     "Scene.collide": lambda **end: engine.Scene([solid("tin")] * 60, TINS).collide(**end),
+    "Scene.hits": lambda **end: engine.Scene([solid("tin")]).hits(IN_A_FACE, **end),
     "Scene.locate": lambda **end: engine.Scene([solid("vanishing")]).locate(POINTS, **end),
     "Surface": lambda **end: engine.Surface(*arrows(), **end),
     "bounds": lambda **end: engine.bounds(new(solid("ball")), **end),
@@ -203,6 +205,7 @@ WORK: dict[str, Callable[..., Any]] = {
     "compare": lambda **end: engine.compare("clip_segments", CHORDS, solid("many sides"), **end),
     "contains": lambda **end: engine.contains(POINTS, solid("vanishing"), **end),
     "filled": lambda **end: engine.filled(fan(1_500), "non_zero", **end),
+    "hits": lambda **end: engine.hits(IN_A_FACE, solid("tin"), **end),
     "inspect": lambda **end: engine.inspect(crossing_triangles(), **end),
     "locate": lambda **end: engine.locate(POINTS, solid("vanishing"), **end),
     "locate_scene": lambda **end: engine.locate_scene(POINTS, [solid("vanishing")], **end),
@@ -223,6 +226,7 @@ FIRST: dict[str, Callable[..., Any]] = {
     "collide": lambda body, **end: engine.collide(body, new(body), second_pose=POSE, **end),
     "collide_poses": lambda body, **end: engine.collide_poses(body, new(body), *poses(10, 1.0), **end),
     "distances": lambda body, **end: engine.distances(MANY, body, **end),
+    "hits": lambda body, **end: engine.hits(SPREAD.reshape(-1, 2, 3), body, **end),
     "locate": lambda body, **end: engine.locate(SPREAD, body, **end),
     "locate, cells": lambda body, **end: engine.locate(MANY, body, **end),
     "locate_scene": lambda body, **end: engine.locate_scene(SPREAD, [body], [POSE], **end),

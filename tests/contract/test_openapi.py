@@ -45,6 +45,10 @@ OPERATIONS = {
     ("post", "/v1/collide/scene"): "collide_scene",
     ("post", "/v1/clip/segments"): "clip_segments",
     ("post", "/v1/clip/lines"): "clip_lines",
+    ("post", "/v1/hits"): "hits",
+    ("post", "/v1/scenes/{scene_id}/hits"): "hits_stored_scene",
+    ("post", "/v1/scenes/{scene_id}/binary/hits"): "hits_stored_scene_binary",
+    ("post", "/v1/solids/{solid_id}/hits"): "hits_stored",
     ("post", "/v1/layers/overlay"): "overlay_layers",
     ("post", "/v1/layers/union"): "unite_layer",
     ("post", "/v1/layers/contains"): "locate_in_layer",
@@ -79,10 +83,13 @@ ANSWERS = {
     "/v1/scenes/{scene_id}/binary/clip/segments": "application/octet-stream",
     "/v1/scenes/{scene_id}/binary/distances": "application/octet-stream",
     "/v1/solids/{solid_id}/distances": "application/octet-stream",
+    "/v1/scenes/{scene_id}/binary/hits": "application/octet-stream",
+    "/v1/solids/{solid_id}/hits": "application/octet-stream",
     "/v1/solids/{solid_id}/contains": "application/octet-stream",
     "/v1/solids/{solid_id}/clip/segments": "application/octet-stream",
 }
 
+SHEET = {"type": "surface", "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
 FILES = dict.fromkeys(("/v1/solids", "/v1/solids/inspect"), (*body.FILES, body.MULTIPART))
 """Files that are taken beside JSON, by path."""
 
@@ -221,8 +228,10 @@ def answers() -> dict[str, list[Any]]:
     async def ask() -> dict[str, list[Any]]:
         found: dict[str, list[Any]] = {}
         async with client_of(app) as client:
+            sheet = await client.post("/v1/scenes", json={"bodies": [{"solid": SHEET}]})
             for path, example in examples(app.openapi()):
-                answer = await client.post(path.replace("{scene_id}", SCENE_ID), json=example)
+                scene = sheet.json()["id"] if path.endswith("/hits") else SCENE_ID
+                answer = await client.post(path.replace("{scene_id}", scene), json=example)
                 content = paths[path]["post"]["responses"][str(answer.status_code)]["content"]
                 media_type = answer.headers["content-type"].partition(";")[0]
                 assert media_type in content, answer.text

@@ -149,6 +149,9 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "bounds": engine.bounds,
     "clip_segments(segments)": lambda x: engine.clip_segments(x, BOX),
     "clip_segments(region)": lambda x: engine.clip_segments(np.zeros((0, 2, 3)), x),
+    "hits(segments)": lambda x: engine.hits(x, POLYHEDRON),
+    "hits(surface)": lambda x: engine.hits(np.zeros((0, 2, 3)), x),
+    "hits(keep)": lambda x: engine.hits(SEGMENT, POLYHEDRON, keep=x),
     "clip_polygons(polygons)": lambda x: engine.clip_polygons(x, BOX),
     "clip_polygons(one polygon)": lambda x: engine.clip_polygons([x], BOX),
     "clip_polygons(region)": lambda x: engine.clip_polygons([], x),
@@ -172,6 +175,8 @@ OPTIONS: dict[str, Callable[..., object]] = {
     "locate_scene": lambda **given: engine.locate_scene([], [BOX], **given),
     "bounds": lambda **given: engine.bounds(BOX, **given),
     "clip_segments": lambda **given: engine.clip_segments([], BOX, **given),
+    "hits": lambda **given: engine.hits([], POLYHEDRON, **given),
+    "Scene.hits": lambda **given: engine.Scene([POLYHEDRON]).hits(SEGMENT, **given),
     "clip_polygons": lambda **given: engine.clip_polygons([], BOX, **given),
     "overlay": lambda **given: engine.overlay(POLYGON, POLYGON, **given),
     "collide": lambda **given: engine.collide(BOX, BOX, **given),
@@ -205,7 +210,7 @@ OPTIONS: dict[str, Callable[..., object]] = {
 }
 
 
-FLAGS = ("report", "signed", "nearest", "boolean", "witness", "witnesses", "detail", "outside")
+FLAGS = ("report", "signed", "nearest", "rays", "boolean", "witness", "witnesses", "detail", "outside")
 POSE = engine.Pose.identity(3)
 POSES: dict[str, Any] = {"rotations": [np.eye(3)], "translations": [[0, 0, 0]]}
 PAIR: dict[str, Any] = {"first": BOX, "second": POLYHEDRON}
@@ -240,6 +245,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "Scene.locate": {"self": SCENE, "points": POINT},
     "Scene.collide": {"self": SCENE, "moved": [1], "skip": None, "only": None, "gap": 0.5},
     "Scene.clip_segments": {"self": SCENE, "segments": SEGMENT, "keep": "all"},
+    "Scene.hits": {"self": engine.Scene([POLYHEDRON]), "segments": SEGMENT, "keep": "all"},
     "Sphere": {"center": [0, 0], "radius": 1},
     "Surface": {"vertices": VERTICES, "faces": FACES},
     "Triangle": {"vertices": [[0, 0], [1, 0], [0, 1]]},
@@ -263,6 +269,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "compare": {"operation": "contains", "arguments": POINT, "method": None},
     "contains": {"points": POINT, "solid": BOX},
     "filled": {"rings": [[[0, 0], [1, 0], [0, 1]]], "rule": "non_zero"},
+    "hits": {"segments": SEGMENT, "surface": POLYHEDRON, "keep": "all"},
     "inspect": {"mesh": (VERTICES, FACES), "weld": None, "orient": False, "fill_t_junctions": False},
     "layers.dissolve_features": {"layer": LAYER, "by": ["a"]},
     "layers.locate_features": {"points": POINTS, "polygons": LAYER},

@@ -103,6 +103,19 @@ def test_clip_segments_reads_back_the_same_doubles(cube: str, tmp_path: Path) ->
     np.testing.assert_array_equal(table[:, 7:9], pieces.t)
 
 
+def test_hits_are_rows_with_kinds_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sheet = '{"type": "surface", "vertices": [[0, 0, 0], [4, 0, 0], [0, 4, 0]], "faces": [[0, 1, 2]]}'
+    rays = written(tmp_path, "rays.npy", np.array([[[1.0, 1, 3], [0, 0, -1]], [[0, 1, 3], [0, 0, -1]]]))
+    assert main(["hits", sheet, rays, "--rays"]) == 0
+    header, *rows = capsys.readouterr().out.split()
+    assert header.startswith("source,t,t_end,face,triangle,kind,barycentric_0")
+    assert rows == [
+        "0,3.0,3.0,0,0,across,0.5,0.25,0.25,0.0,0.0,1.0", "1,3.0,3.0,0,0,rim,0.75,0.0,0.25,0.0,0.0,1.0"
+    ]  # fmt: skip
+    assert main(["hits", sheet, rays, "--keep", "any"]) == 0
+    assert capsys.readouterr().out.split() == ["met", "True", "True"]
+
+
 def test_clip_line_strings_and_polygons_of_geojson(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     region = written(tmp_path, "region.geojson", SQUARE)
     line = written(tmp_path, "line.geojson", {"type": "LineString", "coordinates": [[-1, 1], [7, 1]]})

@@ -96,6 +96,15 @@ def test_segments_through_a_scene_equal_one_process(
     assert len(distributed.clip_segments_scene(client, [], scene)) == 0
 
 
+def test_hits_equal_one_process(client: Client, solid: engine.Polyhedron, points: np.ndarray) -> None:
+    lines = points[:200].reshape(-1, 2, 3)
+    scene = engine.Scene([solid], [engine.Pose.from_quaternion([2, 1, 0, 0], [0, 0, 0])])
+    assert distributed.hits(client, lines, solid, rays=True, part=33) == engine.hits(lines, solid, rays=True)
+    assert distributed.hits(client, lines, scene, keep="first", part=33) == scene.hits(lines, keep="first")
+    met = distributed.hits(client, lines, solid, keep="any", part=33)
+    np.testing.assert_array_equal(met, engine.hits(lines, solid, keep="any"))
+
+
 def test_overlays_equal_one_process(client: Client, points: np.ndarray) -> None:
     subjects = [engine.Polygon([corners]) for corners in points[:240, :2].reshape(-1, 4, 2)]
     subjects[7] = subjects[-8] = engine.Polygon([[(0, 0), (1, 1), (0, 1)]])
