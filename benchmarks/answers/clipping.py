@@ -17,6 +17,10 @@ from benchmarks.answers.solids import Shape, points_about
 
 ROUNDED = "decisions coordinates_ulp"
 segments_clipped = asker(engine.clip_segments, "source start end t faces", ROUNDED)
+lines_hit, rays_hit = (
+    asker(ask, "source t t_end face triangle kind barycentric normal", ROUNDED)
+    for ask in (engine.hits, partial(engine.hits, rays=True))
+)
 lines_clipped = asker(engine.clip_lines, "source vertices offsets segments t faces", ROUNDED)
 polygons_clipped = asker(
     engine.clip_polygons, "vertices ring_offsets polygon_offsets contours status may_have_bridges", ROUNDED
@@ -58,6 +62,16 @@ def batches(draw: Draw) -> Iterator[Question]:
     rings = solids.polygon_of(draw.pick([shapes.large_coast(draw), shapes.squares(draw, 15, 0.5)]))
     yield partial(segments_clipped, draw.uniform(-4.0, 4.0, 5000, 2, 2), rings.solid)
     yield partial(segments_clipped, _segments(draw, rings.targets, 20), rings.solid)
+
+
+@drawn_by("hits", 6)
+def lines_on_meshes(draw: Draw) -> Iterator[Question]:
+    """Segments and rays through corners, along edges and in faces of meshes, open and closed, near and far."""
+    for place in (draw.pick(NEAR_PLACES), draw.pick(NEAR_PLACES), draw.pick(FAR_PLACES)):
+        for shape in (solids.polyhedron(draw, 3, place), solids.surface(draw, 3, place)):
+            lines = _segments(draw, shape.targets, 40)
+            yield partial(lines_hit, lines, shape.solid)
+            yield partial(rays_hit, lines - [[[0.0], [1.0]]] * lines[:, :1], shape.solid)
 
 
 @drawn_by("clip_lines", 6)
