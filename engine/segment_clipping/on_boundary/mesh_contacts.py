@@ -86,13 +86,19 @@ def local_segment(p: Point3, q: Point3, origin: Any, inverse: Any, blur: float) 
     )
 
 
-@inline
-def _far_before(p: Point3, q: Point3, inverse: Any) -> Point3:
-    """Return a point about on the line p q before p, beyond the tree if p is near it; its rounding is far below the
-    slack of `local_segment`."""
-    x, y, z = q.x - p.x, q.y - p.y, q.z - p.z
-    reach = 4.0 * LIMIT / max(abs(x * inverse[0]), abs(y * inverse[1]), abs(z * inverse[2]))
-    return Point3(p.x - reach * x, p.y - reach * y, p.z - reach * z)
+@merged
+def _segment_before(p: Point3, q: Point3, origin: Any, inverse: Any, blur: float) -> Way:
+    """Return the line p q before p, from beyond the tree if p is near it, as a `Way`. Its far end is rounded in tree
+    coordinates, far below the slack; of a tiny mesh far from the origin it would be lost in the caller's."""
+    x, y, z = (q.x - p.x) * inverse[0], (q.y - p.y) * inverse[1], (q.z - p.z) * inverse[2]
+    end = Point3(
+        p.x * inverse[0] - origin[0] * inverse[0],
+        p.y * inverse[1] - origin[1] * inverse[1],
+        p.z * inverse[2] - origin[2] * inverse[2],
+    )
+    reach = 4.0 * LIMIT / max(abs(x), abs(y), abs(z))
+    start = Point3(end.x - reach * x, end.y - reach * y, end.z - reach * z)
+    return local_segment(start, end, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), blur * max(inverse[0], inverse[1], inverse[2]))
 
 
 @merged
@@ -192,8 +198,10 @@ def append_contacts(
     leaves open is Kind.DEGENERATE. is_any: one contact is enough, in row 0; it is Kind.DEGENERATE only if no other is
     decided. is_before: see `exact_contact`. waiting: scratch."""
     stack, blocks, last = waiting.stack, waiting.blocks, np.float32(1.0)
-    start, end = (_far_before(p, q, mesh.inverse), p) if is_before else (p, q)
-    way = local_segment(start, end, mesh.origin, mesh.inverse, blur)
+    if is_before:
+        way = _segment_before(p, q, mesh.origin, mesh.inverse, blur)
+    else:
+        way = local_segment(p, q, mesh.origin, mesh.inverse, blur)
     shear, ends, n_blocks, depth = shear_of(way), (p, q, blur, is_before), 0, int(way.is_near)
     stack[0], blocks[0] = 0, 0
     if mesh.n_inner == 0:
