@@ -18,6 +18,7 @@ import numpy as np
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.errors import InvalidOperationError, NotRepresentableError
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
+from engine.polygon_overlay.grid import grid_of
 from engine.polygon_overlay.overlay import less_all, overlay, union_all
 from engine.polygon_overlay.pair_arrays import (
     PolygonArrays,
@@ -29,7 +30,7 @@ from engine.polygon_overlay.pair_arrays import (
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, concatenate_touching, touching
-from engine.running.budget import Budget, Cancel
+from engine.running.budget import Budget, Cancel, polled
 from engine.scenes.locate_scene import locate_scene
 from engine.solids.accepted import PointsLike
 from engine.solids.checks import shown
@@ -103,9 +104,15 @@ class LayerRows:
 
 
 class Limits:
-    """Remaining time of one public call for the calls of which it consists, and the sum of their accuracy reports."""
+    """Remaining time of one public call for the calls of which it consists, and the sum of their accuracy reports;
+    grid: the spacing to which areas are snapped, None for no grid."""
 
-    def __init__(self, deadline: float | None, cancel: Cancel | None, workers: int | None = None) -> None:
+    def __init__(
+        self, deadline: float | None, cancel: Cancel | None, workers: int | None = None, grid: float | None = None
+    ) -> None:
+        if grid is not None:
+            grid_of(grid)  # checks it
+        self.grid = grid
         seconds = Budget(deadline, cancel).deadline  # checks both
         self._end = None if seconds is None else time.monotonic() + seconds
         self._cancel, self.workers = cancel, workers
@@ -149,16 +156,14 @@ def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touch
     parts = []
     if of_pairs:
         sides = PolygonSelection(left.arrays, pairs[:, 0]), PolygonSelection(right.arrays, pairs[:, 1])
-        batch = _overlay_batch(*sides, "intersection", limits)
-        more = _touching(*sides, batch, limits) if with_touching else None
-        parts.append(_rows(batch, pairs[:, 0], pairs[:, 1], more))
+        parts.append(_pair_rows(*sides, "intersection", pairs[:, 0], pairs[:, 1], limits, with_touching))
     if of_left:
         parts.append(_difference_rows(left, right, pairs, rivals[1], limits))
     if of_right:
         turned = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))][:, ::-1]
         rest = _difference_rows(right, left, turned, rivals[0], limits)
         parts.append(replace(rest, left=rest.right, right=rest.left))
-    return parts[0] if len(parts) == 1 else _concatenate_rows(parts)
+    return parts[0] if len(parts) == 1 else concatenate_rows(parts)
 
 
 def check_how(how: object) -> None:
@@ -202,14 +207,21 @@ def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntAr
     clips, is_there = others.arrays.take(seconds).merged(groups), layer.arrays.sizes() > 0
     jointly, singly = np.flatnonzero(is_there & ~overlap), np.flatnonzero(is_there & overlap)
     sides = PolygonSelection(layer.arrays, jointly), PolygonSelection(clips, jointly)
-    rows = _rows(_overlay_batch(*sides, "difference", limits), jointly, np.full(len(jointly), NONE))
+    rows = _pair_rows(*sides, "difference", jointly, np.full(len(jointly), NONE), limits)
     if len(singly):
         rests = []
         for k in singly.tolist():
             with limits.budget() as budget:
-                rest = list(PolygonSelection(others.arrays, seconds[groups[k] : groups[k + 1]]))
-                rests.append(limits.record(less_all(layer.arrays.polygon(k), rest, budget)))
-        rows = _concatenate_rows([rows, _rows_of(rests, singly)])
+                own, rest = (
+                    layer.arrays.polygon(k),
+                    list(PolygonSelection(others.arrays, seconds[groups[k] : groups[k + 1]])),
+                )
+                if limits.grid is None:
+                    rests.append(limits.record(less_all(own, rest, budget)))
+                    continue
+                clip = Polygon(limits.record(union_all(rest, **limits.options())).rings)
+                rests.append(limits.record(overlay(own, clip, "difference", grid=limits.grid, **limits.options())))
+        rows = concatenate_rows([rows, _rows_of(rests, singly)])
     missing = np.flatnonzero(layer.is_missing)
     left = np.concatenate([rows.left, missing])
     stays = np.concatenate([np.diff(rows.row_offsets) > 0, np.ones(len(missing), np.bool_)])
@@ -283,12 +295,32 @@ def _overlay_batch(
     return cast(OverlayBatch, limits.record(batch))
 
 
+def _pair_rows(
+    firsts: PolygonSelection, seconds: PolygonSelection, operation: Operation, left: IntArray, right: IntArray,
+    limits: Limits, with_touching: bool = False,
+) -> LayerRows:  # fmt: skip
+    """Return those of the pairs (firsts[k], seconds[k]), of features left[k] and right[k], that have pieces, as rows;
+    with_touching: or touch, where no grid is given."""
+    if limits.grid is None:
+        batch = _overlay_batch(firsts, seconds, operation, limits)
+        more = _touching(firsts, seconds, batch, limits) if with_touching else None
+        return _rows(batch, left, right, more)
+    options = {"grid": limits.grid, **limits.options()}
+    made = [limits.record(overlay(one, other, operation, **options)) for one, other in zip(polled(firsts), seconds)]
+    rows = _rows_of(made, left)
+    stays = np.diff(rows.row_offsets) > 0
+    offsets = np.append(rows.row_offsets[:1], rows.row_offsets[1:][stays])
+    return replace(rows, left=left[stays], right=right[stays], row_offsets=offsets)
+
+
 def _touching(firsts: PolygonSelection, seconds: PolygonSelection, batch: OverlayBatch, limits: Limits) -> Touching:
     """Return the lines and points in which the pairs (firsts[k], seconds[k]) meet without common area, or to which
     their common area collapses. batch: their intersections."""
     shells = []
     for pair in np.flatnonzero(_is_lost(batch)).tolist():
-        result = limits.record(overlay(firsts[pair], seconds[pair], "intersection", **limits.options()))
+        result = limits.record(
+            overlay(firsts[pair], seconds[pair], "intersection", grid=limits.grid, **limits.options())
+        )
         shells += [(pair, ring) for ring in (result._lost.shells() if result._lost else ())]
     with limits.budget() as budget:
         return concatenate_touching([touching(firsts, seconds, budget, limits.workers), collapsed(shells, budget)])
@@ -321,7 +353,7 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching |
     return LayerRows(left[stored], right[stored], *rings, summed(n_pieces[stored]), lost, more)
 
 
-def _concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
+def concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
     """Return the rows of all parts, in order; `touching` is that of the first part."""
     return LayerRows(
         np.concatenate([part.left for part in parts]), np.concatenate([part.right for part in parts]),
@@ -337,7 +369,7 @@ def dissolve_rows(layer: Layer, groups: IntArray, n_groups: int, limits: Limits)
     order = np.argsort(groups, kind="stable")
     ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
     members = (list(PolygonSelection(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
-    unions = [limits.record(union_all(some, **limits.options())) for some in members]
+    unions = [limits.record(union_all(some, grid=limits.grid, **limits.options())) for some in members]
     return _rows_of(unions, np.arange(n_groups))
 
 

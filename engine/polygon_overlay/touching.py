@@ -191,7 +191,7 @@ def collapsed(rings: Iterable[tuple[int, list[Place]]], budget: Budget) -> Touch
     points: list[tuple[int, Place]] = []
     for pair, ring in rings:
         edges = _node_ring(ring, budget)
-        lines += [(pair, line) for line in _join_edges(edges)]
+        lines += [(pair, line) for line in join_edges(edges)]
         points += [] if edges else [(pair, ring[0])]
     return Touching(
         np.array([pair for pair, _ in lines], np.int64),
@@ -220,7 +220,7 @@ def _node_ring(ring: list[Place], budget: Budget) -> list[tuple[Place, Place]]:
     return sorted(edges)
 
 
-def _join_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
+def join_edges(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
     """Return the polylines of edges (pairs of points) that are joined at each point where exactly two meet."""
     neighbours: dict[Place, list[Place]] = {}
     for start, end in edges:

@@ -1,0 +1,114 @@
+"""GeoDataFrames as layers of flat arrays; errors name the feature."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from engine.errors import EngineError, InvalidInputError, NotFiniteError, UnsupportedSolidError
+from engine.layers.rows import Limits, layer_of
+from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_paths
+from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
+from engine.solids.checks import shown
+from engine.solids.ragged import summed, within
+from engine.types import BoolArray, Int8Array, read_only
+
+if TYPE_CHECKING:
+    from geopandas import GeoDataFrame
+
+_DIMS = np.array([POINT, LINE, LINE, AREA, POINT, LINE, AREA, -1, -1], np.int8)
+"""Dimension by type number of shapely, -1 for collections and for none."""
+NOUNS = "points", "lines", "polygons"
+
+
+def geopandas_and_shapely() -> tuple[Any, Any]:
+    """Import geopandas and shapely and return them; raise if they are not installed."""
+    try:
+        import geopandas
+        import shapely
+    except ImportError:
+        raise InvalidInputError("GeoDataFrames need geopandas: pip install 'exact-geometry[geo]'", ()) from None
+    return geopandas, shapely
+
+
+def check_frames(function: str, others: Any, taken: tuple[str, ...] = (), **frames: object) -> None:
+    """Raise for an argument among `frames` that is no GeoDataFrame, and for an option among `others`, which this
+    function does not have (though geopandas may). function: its name, for messages; taken: names of further options
+    that it accepts."""
+    geopandas, _ = geopandas_and_shapely()
+    if others.keys() - set(taken):
+        name = sorted(others.keys() - set(taken))[0]
+        also = f"{', '.join(taken)} beside " if taken else ""
+        raise InvalidInputError(
+            f"{function} takes no option {name!r}: coordinates and what meets are decided here, not by geopandas; it "
+            f"takes {also}the options in its signature",
+            (name,),
+        )
+    for name, frame in frames.items():
+        if not isinstance(frame, geopandas.GeoDataFrame) or frame._geometry_column_name not in frame.columns:
+            raise InvalidInputError(f"{name} must be a GeoDataFrame with a geometry, got {_named(frame)}", (name,))
+
+
+def _named(frame: object) -> str:
+    return f"one without ({type(frame).__name__})" if hasattr(frame, "columns") else shown(frame)
+
+
+def refused(error: type[EngineError], frame: GeoDataFrame, where: tuple[str, int], what: str) -> EngineError:
+    name, place = where
+    return error(f"{name}[{place}] (index {frame.index[place]}) {what}", where)
+
+
+def dims_of(geometries: Any) -> Int8Array:
+    """Return the dimension of each geometry, -1 for collections and for none."""
+    _, shapely = geopandas_and_shapely()
+    return _DIMS[shapely.get_type_id(np.asarray(geometries))]
+
+
+def mixed_of(
+    frame: GeoDataFrame, name: str, limits: Limits, kinds: tuple[int, ...] = (POINT, LINE, AREA)
+) -> MixedLayer:
+    """Return the geometry of a frame as a layer; raise for a GeometryCollection, a dimension not among `kinds`, or NaN.
+    name: of the argument, for messages. Altitudes are left out."""
+    _, shapely = geopandas_and_shapely()
+    array = np.asarray(frame.geometry.array)
+    types, is_missing = shapely.get_type_id(array), shapely.is_missing(array)
+    dims = dims_of(array)
+    if len(wrong := np.flatnonzero(~is_missing & ~np.isin(dims, kinds))):
+        nouns = " or ".join(NOUNS[kind] for kind in kinds)
+        what = f"is a {array[wrong[0]].geom_type}; {name} takes {nouns}{'; explode it' if types[wrong[0]] > 6 else ''}"
+        raise refused(UnsupportedSolidError, frame, (name, int(wrong[0])), what)
+    dims[shapely.is_empty(array)] = -1
+    paths = _paths(frame, name, array, dims)
+    is_area = dims == AREA
+    there = np.flatnonzero(is_area)
+    if not len(there):
+        none = np.zeros(len(array) + 1, np.int64)
+        parts = PolygonArrays(np.zeros((0, 2)), none[:1], none[:1])
+        return MixedLayer(layer_of(parts, none, is_missing, limits), paths)
+    _, positions, (rings, parts_of, *several) = shapely.to_ragged_array(array[there], include_z=False)
+    ends = several[0] if several else np.arange(len(there) + 1)
+    if len(broken := np.flatnonzero(~np.isfinite(positions).all(axis=1))):
+        owner = there[within(ends, within(parts_of, within(rings, broken[:1])))]
+        raise refused(NotFiniteError, frame, (name, int(owner[0])), f"holds {positions[broken[0]].tolist()}")
+    counts = np.zeros(len(array), np.int64)
+    counts[there] = np.diff(ends)
+    areas = layer_of(arrays_of(positions, rings, parts_of), np.append(0, np.cumsum(counts)), is_missing, limits)
+    return MixedLayer(areas, paths)
+
+
+def _paths(frame: GeoDataFrame, name: str, array: Any, dims: Any) -> Paths:
+    """Return the points and lines of a frame. dims: by feature, -1 for empty ones."""
+    _, shapely = geopandas_and_shapely()
+    is_path: BoolArray = (dims >= 0) & (dims < AREA)
+    there = np.flatnonzero(is_path)
+    if not len(there):
+        return no_paths(len(array))
+    parts, owners = shapely.get_parts(array[there], return_index=True)
+    vertices, of_parts = shapely.get_coordinates(parts, return_index=True)
+    if len(broken := np.flatnonzero(~np.isfinite(vertices).all(axis=1))):
+        owner = int(there[owners[of_parts[broken[0]]]])
+        raise refused(NotFiniteError, frame, (name, owner), f"holds {vertices[broken[0]].tolist()}")
+    counts = np.bincount(there[owners], minlength=len(array))
+    sizes = np.bincount(of_parts, minlength=len(parts))
+    return Paths(np.where(is_path, dims, -1).astype(np.int8), read_only(vertices + 0.0), summed(sizes), summed(counts))

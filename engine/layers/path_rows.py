@@ -1,0 +1,280 @@
+"""Overlays of points and lines by polygons, as rows.
+
+Lines are clipped segment by segment on all polygons at once (`Scene.clip_segments`), whose ranks order all ends on a
+segment exactly. Intervals that share a point are merged by rank, for one polygon or for all of them; pieces that reach
+the end of a segment are joined with those that begin the next. No rounded number is compared.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from engine.bounding.box_grid import pairs_of_boxes
+from engine.layers.rows import (
+    HOWS,
+    NONE,
+    Layer,
+    LayerRows,
+    Limits,
+    check_how,
+    concatenate_rows,
+    locate_points_in_layer,
+    unite,
+)
+from engine.layers.rows import overlay_rows as overlay_areas
+from engine.layers.shapes import LINE, POINT, MixedLayer, Paths
+from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, places_of
+from engine.polygon_overlay.touching import Place, Touching, concatenate_touching, join_edges
+from engine.predicates.orientation import BOUND_2D, GUARD_2D
+from engine.predicates.rational import orient2d_rational
+from engine.running.budget import Budget, polled
+from engine.scenes.scene import Scene
+from engine.solids.ragged import summed
+from engine.types import BoolArray, FloatArray, IntArray, read_only
+
+
+class _Intervals(NamedTuple):
+    """Stretches of segments. key, segment (m,): sorted by; ends (2, m, 2): their points; own (2, m): whether an end is
+    the segment's own."""
+
+    key: IntArray
+    segment: IntArray
+    ends: FloatArray
+    own: BoolArray
+
+
+def overlay_mixed(
+    left: MixedLayer, right: MixedLayer, how: str, limits: Limits, kinds: frozenset[int], with_touching: bool
+) -> LayerRows:
+    """Overlay a layer of any features with one of polygons, as `overlay_rows` those of polygons alone. kinds: the
+    dimensions of parts that stay in rows of points and lines; with_touching: of polygons too."""
+    check_how(how)
+    areas = overlay_areas(left.areas, right.areas, how, limits, with_touching)
+    if (left.paths.dims < 0).all():
+        return areas
+    of_pairs, of_left, _ = HOWS[how]
+    parts = [areas]
+    if of_pairs:
+        parts.append(path_rows(left.paths, right.areas, np.arange(len(right.areas)), False, limits, kinds))
+    if of_left:
+        parts.append(path_rows(left.paths, right.areas, np.zeros(len(right.areas), np.int64), True, limits, kinds))
+    return sorted_rows(parts)
+
+
+def clip_mixed(
+    layer: MixedLayer, mask: MixedLayer, limits: Limits, kinds: frozenset[int], with_touching: bool
+) -> LayerRows:
+    """Cut a layer to the union of polygons, a row for each feature that is left; kinds, with_touching: as
+    `overlay_mixed`."""
+    there = np.flatnonzero(mask.areas.arrays.sizes())
+    arrays = unite(PolygonSelection(mask.areas.arrays, there), limits)
+    none = np.zeros(0, np.int64)
+    whole = Layer(arrays, np.zeros(1, np.bool_), arrays.take(none), none)
+    parts = [overlay_areas(layer.areas, whole, "intersection", limits, with_touching)]
+    if (layer.paths.dims >= 0).any():
+        zeros = np.zeros(len(mask.areas), np.int64)
+        parts.append(path_rows(layer.paths, mask.areas, zeros, False, limits, kinds))
+    return sorted_rows(parts)
+
+
+def sorted_rows(parts: list[LayerRows]) -> LayerRows:
+    """Return the rows of all parts in the order of `overlay_rows`."""
+    rows = concatenate_rows(parts)
+    starts = np.cumsum([0, *map(len, parts)])
+    some = [
+        part.touching._replace(lines=start + part.touching.lines, points=start + part.touching.points)
+        for part, start in zip(parts, starts.tolist())
+        if part.touching is not None
+    ]
+    section = np.where(rows.right == NONE, 1, np.where(rows.left == NONE, 2, 0))
+    order = np.lexsort((rows.right, rows.left, section))
+    back = np.argsort(order)
+    touching = concatenate_touching(some) if some else None
+    if touching is not None:
+        touching = touching._replace(lines=back[touching.lines], points=back[touching.points])
+    pieces = PolygonArrays(rows.vertices, rows.ring_offsets, rows.piece_offsets).take(
+        places_of(rows.row_offsets, order)
+    )
+    sizes = summed(np.diff(rows.row_offsets)[order])
+    return LayerRows(rows.left[order], rows.right[order], *pieces, sizes, rows.n_collapsed, touching)
+
+
+def path_rows(
+    paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits, kinds: frozenset[int]
+) -> LayerRows:
+    """Return the parts of points and lines within polygons, a row for each feature and key; or those outside of all.
+    keys: by polygon its number in rows; equal ones are one region. kinds: dimensions of parts that stay."""
+    made = [
+        _of_points(paths, areas, keys, is_outside, limits),
+        _of_lines(paths, areas, keys, is_outside, limits),
+    ]
+    pairs = np.concatenate([each[0] for each in made])
+    sizes = np.concatenate([np.diff(each[1].offsets) for each in made])
+    vertices = np.concatenate([each[1].vertices for each in made])
+    stays = np.isin(np.minimum(sizes, 2) - 1, [*kinds])
+    names, rows = np.unique(pairs[stays], axis=0, return_inverse=True)
+    owners = np.zeros(len(pairs), np.int64)
+    owners[stays] = rows.reshape(-1)
+    offsets = summed(sizes)
+    lines, points = np.flatnonzero(stays & (sizes > 1)), np.flatnonzero(stays & (sizes == 1))
+    touching = Touching(
+        owners[lines], vertices[places_of(offsets, lines)], summed(sizes[lines]), owners[points],
+        vertices[offsets[points]],
+    )  # fmt: skip
+    right = np.full(len(names), NONE) if is_outside else names[:, 1]
+    nothing, zeros = np.zeros(1, np.int64), np.zeros(len(names) + 1, np.int64)
+    return LayerRows(names[:, 0], right, np.zeros((0, 2)), nothing, nothing, zeros, 0, touching)
+
+
+class _Parts(NamedTuple):
+    vertices: FloatArray
+    offsets: IntArray
+
+
+def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
+    """Return (feature, key) of each part, and the parts, of the points of a layer."""
+    _, features = paths.owners()
+    are_points = np.flatnonzero(paths.dims[features] == POINT)
+    vertices, features = read_only(paths.vertices[are_points]), features[are_points]
+    first, second, _ = locate_points_in_layer(vertices, areas, limits)
+    if is_outside:
+        first = np.setdiff1d(np.arange(len(vertices)), first)
+        found = np.column_stack([first, np.zeros(len(first), np.int64)])
+    else:
+        found = np.unique(np.column_stack([first, keys[second]]), axis=0)
+    pairs = np.column_stack([features[found[:, 0]], found[:, 1]])
+    return pairs, _Parts(vertices[found[:, 0]], np.arange(len(found) + 1))
+
+
+def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
+    """Return (feature, key) of each part, and the parts, of the lines of a layer."""
+    path, features = paths.owners()
+    firsts = np.flatnonzero((path[:-1] == path[1:]) & (paths.dims[features[:-1]] == LINE))
+    segments = read_only(np.stack([paths.vertices[firsts], paths.vertices[firsts + 1]], axis=1))
+    is_whole = np.isin(np.arange(len(areas)), areas.owners, invert=True) & (areas.arrays.sizes() > 0)
+    there = np.flatnonzero(is_whole)
+    solids = [*PolygonSelection(areas.arrays, there), *PolygonSelection(areas.parts, np.arange(len(areas.owners)))]
+    pieces: Any = limits.record(Scene(solids).clip_segments(segments, **limits.options()))
+    owners = keys[np.concatenate([there, areas.owners]).astype(np.int64)[pieces.body]]
+    merged = _merged(owners, pieces)
+    if is_outside:
+        merged = _between(merged, segments)
+    order = np.lexsort((merged.segment, merged.key, features[firsts[merged.segment]]))  # stable: along a segment too
+    merged = _Intervals(merged.key[order], merged.segment[order], merged.ends[:, order], merged.own[:, order])
+    feature, own_path = features[firsts[merged.segment]], path[firsts[merged.segment]]
+    goes_on = np.zeros(len(order), np.bool_)
+    goes_on[1:] = (
+        (merged.key[1:] == merged.key[:-1]) & (own_path[1:] == own_path[:-1])
+        & (firsts[merged.segment[1:]] == firsts[merged.segment[:-1]] + 1) & merged.own[1, :-1] & merged.own[0, 1:]
+    )  # fmt: skip
+    heads = np.flatnonzero(~goes_on)
+    part = np.cumsum(~goes_on) - 1
+    both = np.stack([merged.ends[0], merged.ends[1]], axis=1).reshape(-1, 2)
+    twice = np.repeat(part, 2)
+    is_new = np.ones(len(both), np.bool_)
+    is_new[1:] = (twice[1:] != twice[:-1]) | (both[1:] != both[:-1]).any(axis=1)
+    parts = _Parts(both[is_new], summed(np.bincount(twice[is_new], minlength=len(heads))))
+    return np.column_stack([feature[heads], merged.key[heads]]), parts
+
+
+def _merged(keys: IntArray, pieces: Any) -> _Intervals:
+    """Return the union of pieces of one key on each segment. pieces: `ScenePieces`; keys: of each."""
+    order = np.lexsort((pieces.ranks[:, 1], pieces.ranks[:, 0], keys, pieces.source))
+    key, segment, (first, last) = keys[order], pieces.source[order], pieces.ranks[order].T
+    is_group = np.ones(len(order), np.bool_)
+    is_group[1:] = (key[1:] != key[:-1]) | (segment[1:] != segment[:-1])
+    base = (np.cumsum(is_group) - 1) * (int(last.max(initial=0)) + 1)
+    reached = np.maximum.accumulate(base + last) if len(order) else base
+    is_head = is_group.copy()
+    is_head[1:] |= base[1:] + first[1:] > reached[:-1]
+    heads = np.flatnonzero(is_head)
+    if not len(heads):
+        return _Intervals(key, segment, np.zeros((2, 0, 2)), np.zeros((2, 0), np.bool_))
+    of = np.cumsum(is_head) - 1
+    ends, own = (first[heads], np.maximum.reduceat(last, heads)), (pieces.faces[order] < 0).T
+    is_first, is_last = first == ends[0][of], last == ends[1][of]
+    own_ends = np.stack(
+        [np.logical_or.reduceat(own[0] & is_first, heads), np.logical_or.reduceat(own[1] & is_last, heads)]
+    )
+    final = np.zeros(len(heads), np.int64)
+    final[of[is_last]] = order[is_last]
+    return _Intervals(key[heads], segment[heads], np.stack([pieces.start[order[heads]], pieces.end[final]]), own_ends)
+
+
+def _between(inside: _Intervals, segments: FloatArray) -> _Intervals:
+    """Return the stretches of all segments outside of intervals, which are disjoint, of one key and sorted."""
+    n, m = len(segments), len(inside.segment)
+    every, own = np.arange(n), np.ones(n, np.bool_)
+    begins = np.argsort(np.concatenate([every, inside.segment]), kind="stable")
+    stops = np.argsort(np.concatenate([inside.segment, every]), kind="stable")
+    starts = np.concatenate([segments[:, 0], inside.ends[1]])[begins]
+    ends = np.concatenate([inside.ends[0], segments[:, 1]])[stops]
+    is_own = np.concatenate([own, np.zeros(m, np.bool_)])[begins], np.concatenate([np.zeros(m, np.bool_), own])[stops]
+    is_gap = ~np.concatenate([~own, inside.own[1]])[begins] & ~np.concatenate([inside.own[0], ~own])[stops]
+    segment = np.concatenate([every, inside.segment])[begins][is_gap]
+    made = np.stack([starts, ends])[:, is_gap], np.stack(is_own)[:, is_gap]
+    return _Intervals(np.zeros(len(segment), np.int64), segment, *made)
+
+
+def dissolve_paths(paths: Paths, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
+    """Return one row for each group, the union of its points or of its lines: points once each; of lines the stretches
+    that lie on one another once. Lines that cross get no vertex there, which rounding would put beside them."""
+    path, features = paths.owners()
+    lines: list[tuple[int, list[Place]]] = []
+    points: list[tuple[int, Place]] = []
+    with limits.budget() as budget:
+        for group in range(n_groups):
+            budget.check()
+            own = np.flatnonzero(groups[features] == group)
+            if paths.dims[features[own]].max(initial=POINT) == POINT:
+                points += [(group, (x, y)) for x, y in sorted(set(map(tuple, paths.vertices[own].tolist())))]
+                continue
+            tails = own[:-1][path[own[:-1]] == path[own[1:]]]
+            ends = np.concatenate([paths.vertices[tails], paths.vertices[tails + 1]], axis=1).tolist()
+            edges = {((a, b), (c, d)) if (a, b) <= (c, d) else ((c, d), (a, b)) for a, b, c, d in polled(ends)}
+            lines += [(group, line) for line in join_edges(_split(sorted(e for e in edges if e[0] != e[1]), budget))]
+    touching = Touching(
+        np.array([group for group, _ in lines], np.int64),
+        np.array([place for _, line in lines for place in line]).reshape(-1, 2),
+        summed([len(line) for _, line in lines]),
+        np.array([group for group, _ in points], np.int64),
+        np.array([place for _, place in points]).reshape(-1, 2),
+    )
+    nothing, zeros = np.zeros(1, np.int64), np.zeros(n_groups + 1, np.int64)
+    groups_, none = np.arange(n_groups), np.full(n_groups, NONE)
+    return LayerRows(groups_, none, np.zeros((0, 2)), nothing, nothing, zeros, 0, touching)
+
+
+def _split(edges: list[tuple[Place, Place]], budget: Budget) -> list[tuple[Place, Place]]:
+    """Return distinct edges, each a sorted pair of points, split where an end of another lies on one that is collinear,
+    and each stretch once."""
+    rows = np.array(edges).reshape(-1, 2, 2)
+    low, high = rows.min(axis=1), rows.max(axis=1)
+    cuts: dict[int, set[Place]] = {}
+    for pairs in pairs_of_boxes(low, high, budget.flag) if len(rows) else ():
+        budget.check()
+        for i, j in polled(pairs[_may_be_collinear(rows, pairs)].tolist()):
+            (a, b), (c, d) = edges[i], edges[j]
+            if max(a, c) < min(b, d) and orient2d_rational(a, b, c) == orient2d_rational(a, b, d) == 0:
+                cuts.setdefault(i, set()).update(p for p in (c, d) if a < p < b)
+                cuts.setdefault(j, set()).update(p for p in (a, b) if c < p < d)
+    budget.check()
+    made = set(edges)
+    for k, places in cuts.items():
+        made.discard(edges[k])
+        made.update(pairwise(sorted({*edges[k], *places})))
+    return sorted(made)
+
+
+def _may_be_collinear(rows: FloatArray, pairs: IntArray) -> BoolArray:
+    """Return for pairs of edges False where doubles prove that an end of the second is beside the line of the first."""
+    (a, b), (c, d) = (rows[pairs[:, k]].transpose(1, 0, 2) for k in range(2))
+    result = np.ones(len(pairs), np.bool_)
+    with np.errstate(all="ignore"):
+        for p in (c, d):
+            left, right = (a - p)[:, 0] * (b - p)[:, 1], (a - p)[:, 1] * (b - p)[:, 0]
+            result &= ~(np.abs(left - right) > BOUND_2D * (np.abs(left) + np.abs(right)) + GUARD_2D)
+    return result

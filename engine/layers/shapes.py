@@ -1,0 +1,188 @@
+"""Points, lines and polygons of a layer as flat arrays, with a tree over the edges of each feature; compiled."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from engine.arrangement.simple_rings import BLOCK, fill_tree
+from engine.bounding.box_grid import pairs_of_boxes
+from engine.compiling.jit import allocating, allocating_kernel, entry_of
+from engine.errors import NotRepresentableError
+from engine.layers.rows import Layer, Limits
+from engine.polygon_overlay.pair_arrays import PolygonArrays, concatenate_polygons
+from engine.predicates.rational import exponent_of, shifted
+from engine.solids.ragged import next_in_rings, summed
+from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
+
+POINT: Final = 0
+LINE: Final = 1
+AREA: Final = 2
+"""Dimensions of features; -1 for one without geometry."""
+_SMALLEST, _LARGEST = 2.0**-480, 2.0**480
+"""Range of nonzero coordinates in which signs of orientation are decided by expansions (simple_rings.py)."""
+_PAIR_BYTES: Final = 16
+
+
+class Paths(NamedTuple):
+    """The points and lines of a layer of n features. dims (n,): 0 or 1, -1 for features of other kinds; vertices,
+    offsets: of paths, a point is a path of one vertex; path_offsets (n + 1,): of features into the paths."""
+
+    dims: Int8Array
+    vertices: FloatArray
+    offsets: IntArray
+    path_offsets: IntArray
+
+    def owners(self) -> tuple[IntArray, IntArray]:
+        """Return the path and the feature of each vertex."""
+        paths = np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
+        return paths, np.repeat(np.arange(len(self.dims)), np.diff(self.path_offsets))[paths]
+
+
+class MixedLayer(NamedTuple):
+    """A layer with features of any kind: its polygons (empty for other features), and its points and lines."""
+
+    areas: Layer
+    paths: Paths
+
+    @property
+    def dims(self) -> Int8Array:
+        """Dimension of each feature, -1 for missing and empty ones."""
+        return np.where(self.areas.arrays.sizes() > 0, AREA, self.paths.dims).astype(np.int8)
+
+
+Shapes = namedtuple("Shapes", "dims vertices following firsts ends end_firsts boxes box_firsts")
+"""Features as edges.
+
+| field | shape | meaning |
+|---|---|---|
+| dims | (n,) int8 | POINT, LINE, AREA; -1 for none |
+| vertices, following | (m, 2), (m,) | edge k is from vertex k to `following[k]` in the feature; itself at
+  the end of a line, and of a point |
+| firsts | (n + 1,) | first vertex of each feature |
+| ends, end_firsts | (k, 2), (n + 1,) | boundary points of each line (ends of an odd number of its paths), sorted |
+| boxes, box_firsts | | trees over the edges of features (simple_rings.py) |
+"""
+Shape = namedtuple("Shape", "dim points following ends boxes")
+"""One feature of `Shapes`."""
+
+
+@allocating
+def shape_of(shapes: Shapes, k: int) -> Shape:
+    """Return feature k."""
+    own, ends = slice(shapes.firsts[k], shapes.firsts[k + 1]), slice(shapes.end_firsts[k], shapes.end_firsts[k + 1])
+    boxes = shapes.boxes[shapes.box_firsts[k] : shapes.box_firsts[k + 1]]
+    return Shape(shapes.dims[k], shapes.vertices[own], shapes.following[own], shapes.ends[ends], boxes)
+
+
+def shapes_of(layer: MixedLayer, limits: Limits) -> Shapes:
+    """Return a layer as edges. Raises: NotRepresentableError beyond the range of exact signs."""
+    paths, areas = layer.paths, layer.areas.arrays
+    n, dims = len(layer.areas), layer.dims
+    rings = PolygonArrays(paths.vertices, paths.offsets, paths.path_offsets)
+    joined, order = concatenate_polygons([rings, areas]), np.arange(n) + np.where(dims == AREA, n, 0)
+    vertices, offsets, groups = joined.take(order) if (dims == AREA).any() else rings
+    firsts, following = read_only(offsets[groups]), next_in_rings(offsets)
+    owners = np.repeat(np.arange(n), np.diff(groups))
+    tails = offsets[1:] - 1
+    is_open = (dims[owners] < AREA) & (np.diff(offsets) > 0)
+    following[tails[is_open]] = tails[is_open]
+    following -= np.repeat(firsts[:-1], np.diff(firsts))
+    ends, end_firsts = _ends(vertices, offsets, owners, dims, n)
+    filled = np.flatnonzero(dims == LINE)  # case: all vertices of a line are one point: a point, as GEOS has it
+    if len(filled):
+        low, high = (each.reduceat(vertices, firsts[filled]) for each in (np.minimum, np.maximum))
+        dims = dims.copy()
+        dims[filled[(low == high).all(axis=1)]] = POINT
+    sizes = np.diff(firsts)
+    leaves = 1 << np.ceil(np.log2(np.maximum(1, -(-sizes // BLOCK)))).astype(np.int64)
+    box_firsts = summed(2 * leaves)
+    limits.budget().take(8 * (4 * int(box_firsts[-1]) + 3 * len(vertices)))
+    boxes = np.empty((box_firsts[-1], 4))
+    made = Shapes(dims, read_only(vertices), read_only(following), firsts, ends, end_firsts, boxes, box_firsts)
+    with limits.budget() as budget:
+        entry_of(_build_trees)(made, budget.flag)
+        budget.check()
+    return made
+
+
+def _ends(
+    vertices: FloatArray, offsets: IntArray, owners: IntArray, dims: Int8Array, n: int
+) -> tuple[FloatArray, IntArray]:
+    """Return the boundary points of n features: of lines the ends of an odd number of paths (OGC's mod-2 rule). owners:
+    by path its feature."""
+    paths = np.flatnonzero((dims[owners] == LINE) & (np.diff(offsets) > 1))
+    feature = np.repeat(owners[paths], 2)
+    points = vertices[np.column_stack([offsets[paths], offsets[paths + 1] - 1]).ravel()]
+    order = np.lexsort((points[:, 1], points[:, 0], feature))
+    feature, points = feature[order], points[order]
+    starts = np.ones(len(feature), np.bool_)
+    starts[1:] = (feature[1:] != feature[:-1]) | (points[1:] != points[:-1]).any(axis=1)
+    heads = np.flatnonzero(starts)
+    is_odd = np.diff(np.append(heads, len(feature))) % 2 == 1
+    return read_only(points[heads[is_odd]]), summed(np.bincount(feature[heads[is_odd]], minlength=n))
+
+
+@allocating_kernel
+def _build_trees(shapes: Shapes, flag: FlagArray) -> None:
+    """Fill the boxes of all features."""
+    for k in range(len(shapes.firsts) - 1):
+        if flag[0] != 0:
+            return
+        shape = shape_of(shapes, k)
+        fill_tree(shape.points, shape.following, shape.boxes)
+
+
+def in_range(left: Shapes, right: Shapes) -> tuple[Shapes, Shapes]:
+    """Return two layers scaled by one power of two, so that exact signs are in range. Raises: NotRepresentableError if
+    there is no such power."""
+    both = np.concatenate([left.vertices.ravel(), right.vertices.ravel()])
+    sizes = np.abs(both[both != 0.0])
+    if not len(sizes) or (sizes.min() > _SMALLEST and sizes.max() < _LARGEST):
+        return left, right
+    exponent = -exponent_of(both)
+    moved = [shifted(each, exponent) for shape in (left, right) for each in (shape.vertices, shape.ends, shape.boxes)]
+    if any(each is None for each in moved):
+        raise NotRepresentableError("coordinates of the layers span more than 2^960; leave the outliers out", ())
+    a, b, c, d, e, f = moved
+    return left._replace(vertices=a, ends=b, boxes=c), right._replace(vertices=d, ends=e, boxes=f)
+
+
+def boxes_of(shapes: Shapes) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return low and high corners of the features that are not empty, and their numbers."""
+    numbers = np.flatnonzero(np.diff(shapes.firsts))
+    roots = shapes.boxes[shapes.box_firsts[numbers] + 1]
+    return roots[:, :2], roots[:, 2:], numbers
+
+
+def pairs_between(left: Shapes, right: Shapes, reach: Any, limits: Limits) -> IntArray:
+    """Return (n, 2) pairs of a left and a right feature whose boxes are within `reach` (a number, or one for each left
+    feature), sorted."""
+    (low, high, numbers), (their_low, their_high, theirs) = boxes_of(left), boxes_of(right)
+    grown = np.broadcast_to(np.asarray(reach, float), (len(left.dims),))[numbers, None]
+    if (grown > 0.0).any():  # rounded outward
+        low, high = np.nextafter(low - grown, -np.inf), np.nextafter(high + grown, np.inf)
+    n, blocks = len(numbers), [np.zeros((0, 2), np.int64)]
+    low, high = np.concatenate([low, their_low]), np.concatenate([high, their_high])
+    with limits.budget() as budget:
+        for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+            budget.check()
+            blocks.append(pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)])
+            budget.take(_PAIR_BYTES * len(blocks[-1]))
+        budget.check()
+    both = np.concatenate(blocks)
+    found = np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
+    return found[np.lexsort((found[:, 1], found[:, 0]))] if len(blocks) > 2 else found
+
+
+def no_paths(n: int) -> Paths:
+    """Return the points and lines of a layer of n features that has none."""
+    zeros = np.zeros(n + 1, np.int64)
+    return Paths(np.full(n, -1, np.int8), np.zeros((0, 2)), zeros[:1], zeros)
+
+
+def is_plain(layer: MixedLayer) -> BoolArray:
+    """Return whether each feature is a polygon, or has no geometry."""
+    return layer.paths.dims < 0
