@@ -12,21 +12,29 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrangement.simple_rings import find_rings
+from engine.collision.codes import UNSETTLED
+from engine.collision.meshes.placement import PoseArrays
+from engine.collision.outline_batch import OutlineArrays, relate_outline_pairs
 from engine.compiling.jit import entry_of
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
 from engine.layers.nearest import are_within, meets, nearest_pairs
 from engine.layers.relate import BB, EI, IE, II, PREDICATES, holds, matrices, transposed
 from engine.layers.rows import Layer, Limits, locate_points_in_layer, unite
 from engine.layers.shapes import AREA, POINT, MixedLayer, Shapes, in_range, pairs_between, shapes_of
-from engine.polygon_overlay.pair_arrays import PolygonSelection, concatenate_polygons
+from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons
+from engine.running.parallel import run_chunks
 from engine.scenes.collide_scene import collide_scene
 from engine.solids.checks import shown
-from engine.types import FloatArray, IntArray, Rcc8
+from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Rcc8, read_only
 
 _OF_RCC8: Final = np.array(
     [IE | EI, BB | IE | EI, II | IE | EI | BB, II | BB, II | EI | BB, II | EI, II | IE | BB, II | IE]
 )
-"""By code of `Rcc8`, the bits of a matrix of two polygons that tell predicates apart."""
+_OF_RELATION: Final = np.array([IE | EI, II | EI, II | IE, II | IE | EI | BB, BB | IE | EI, 0])
+"""Bits of a matrix of two polygons that tell predicates apart: by code of `Rcc8`; and by code of `Relation`, and
+UNSETTLED, where overlaps are proven to be PO."""
+_LARGE: Final = 64
+"""Vertices of a polygon for which it pays to prepare it, about."""
 _OF_POINTS: Final = {"intersects": (True, True), "covered_by": (True, True), "within": (True, False),
                      "touches": (False, True)}  # fmt: skip
 """Whether a predicate holds for a point inside a polygon, and for one on its boundary; of others for neither."""
@@ -66,6 +74,7 @@ def related_pairs(left: MixedLayer, right: MixedLayer, predicate: str, distance:
     pairs = pairs_between(shapes, others, 0.0, limits)
     if predicate == "intersects":
         return _chosen(pairs, meets, shapes, others, limits)
+    pairs = pairs[_boxes_allow(predicate, shapes, others, pairs)]
     dims, theirs = shapes.dims[pairs[:, 0]], others.dims[pairs[:, 1]]
     are_areas, bits = (dims == AREA) & (theirs == AREA), np.zeros(len(pairs), np.int64)
     straight, turned = np.flatnonzero((dims <= theirs) & ~are_areas), np.flatnonzero(dims > theirs)
@@ -80,6 +89,20 @@ def related_pairs(left: MixedLayer, right: MixedLayer, predicate: str, distance:
 
 def _chosen(pairs: IntArray, function: Any, left: Shapes, right: Shapes, *more: Any) -> IntArray:
     return pairs[function(left, right, pairs, *more)]
+
+
+def _boxes_allow(predicate: str, left: Shapes, right: Shapes, pairs: IntArray) -> BoolArray:
+    """Return for pairs of features False where their boxes exclude a predicate."""
+    (a, b), (c, d) = (
+        np.split(shape.boxes[shape.box_firsts[rows] + 1], 2, axis=1)
+        for shape, rows in ((left, pairs[:, 0]), (right, pairs[:, 1]))
+    )
+    result = np.ones(len(pairs), np.bool_)
+    if predicate in ("within", "covered_by", "equals"):
+        result &= ((c <= a) & (b <= d)).all(axis=1)
+    if predicate in ("contains", "covers", "equals"):
+        result &= ((a <= c) & (d <= b)).all(axis=1)
+    return result
 
 
 def _check_unscaled(shapes: Shapes, layer: MixedLayer) -> None:
@@ -103,12 +126,15 @@ def nearest_features(
 
 
 def _of_points(left: MixedLayer, right: MixedLayer, predicate: str, limits: Limits) -> IntArray | None:
-    """Return the pairs of a layer of single points and one of polygons, in either order; None for other layers."""
+    """Return the pairs of a layer of single points and one of large polygons, or such with overlapping parts, in either
+    order; None for other layers."""
     if predicate == "dwithin":
         return None
     for points, areas, is_turned in ((left, right, False), (right, left, True)):
         is_point = (points.dims[points.dims >= 0] == POINT).all() and len(points.paths.offsets) <= 1 + len(points.dims)
         if not is_point or (np.diff(points.paths.path_offsets) > 1).any() or (areas.paths.dims >= 0).any():
+            continue
+        if len(areas.areas.arrays.vertices) < _LARGE * len(areas.areas) and not len(areas.areas.owners):
             continue
         name = {"contains": "within", "covers": "covered_by"}.get(predicate, predicate) if is_turned else predicate
         if is_turned and predicate in ("within", "covered_by"):
@@ -121,15 +147,20 @@ def _of_points(left: MixedLayer, right: MixedLayer, predicate: str, limits: Limi
     return None
 
 
-def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
-    """Return a layer whose polygons have simple rings that do not cross."""
-    arrays = layer.areas.arrays
-    sizes = arrays.sizes()
+def _sides(arrays: PolygonArrays, limits: Limits) -> tuple[IntArray, Int8Array]:
+    """Return following and sides of all edges of polygons, as `find_rings` has them."""
     following, sides = np.empty(len(arrays.vertices), np.int64), np.zeros(len(arrays.vertices), np.int8)
     with limits.budget() as budget:
         if len(sides):
             entry_of(find_rings)(arrays.vertices, *arrays[1:], len(sides), following, sides, budget.flag)
         budget.check()
+    return following, sides
+
+
+def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
+    """Return a layer whose polygons have simple rings that do not cross."""
+    arrays = layer.areas.arrays
+    sizes, (_, sides) = arrays.sizes(), _sides(arrays, limits)
     filled = np.flatnonzero(sizes)
     wrong = filled[sides[arrays.ring_offsets[arrays.polygon_offsets[filled]]] == 0]
     if not len(wrong):
@@ -141,15 +172,30 @@ def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
 
 
 def _of_areas(left: Layer, right: Layer, pairs: IntArray, limits: Limits) -> IntArray:
-    """Return the bits of pairs of polygons."""
-    names, places = np.unique(pairs + np.array([0, len(left)]), return_inverse=True)
+    """Return the bits of pairs of polygons: by the kernel of scenes, without an object each, then one by one."""
     both = concatenate_polygons([left.arrays, right.arrays])
-    n, only = len(both.polygon_offsets) - 1, places.reshape(-1, 2)
-    relations = limits.record(
-        collide_scene(list(PolygonSelection(both, names)), only=only, detail=True, **limits.options())
-    )
-    codes = np.full(len(pairs), int(Rcc8.DC))
-    keys, found = only[:, 0] * n + only[:, 1], relations.first * n + relations.second
-    order = np.argsort(keys)
-    codes[order[np.searchsorted(keys[order], found)]] = relations.detail
-    return _OF_RCC8[codes]
+    n, shifted = len(both.polygon_offsets) - 1, pairs + np.array([0, len(left)])
+    following, sides = _sides(both, limits)
+    firsts = both.ring_offsets[both.polygon_offsets]
+    pool = OutlineArrays(both.vertices, read_only(following), read_only(sides), read_only(firsts))
+    relations, none = np.full(len(pairs), UNSETTLED, np.int8), np.zeros((0, 3), np.int32)
+    poses = PoseArrays(np.tile(np.eye(2), (n, 1, 1)), np.zeros((n, 2)), True)
+    with limits.budget() as budget:
+
+        def task(start: int, stop: int) -> None:
+            some, codes = shifted[start:stop], relations[start:stop]
+            entry_of(relate_outline_pairs)(pool, np.arange(n), poses, some, False, True, codes, none, budget.flag)
+            budget.check()
+
+        run_chunks(task, len(pairs), budget=budget, workers=limits.workers)
+    bits = _OF_RELATION[relations]
+    rest = np.flatnonzero(relations == UNSETTLED)
+    if len(rest):
+        names, places = np.unique(shifted[rest], return_inverse=True)
+        only, solids = places.reshape(-1, 2), list(PolygonSelection(both, names))
+        found = limits.record(collide_scene(solids, only=only, detail=True, **limits.options()))
+        codes, keys = np.full(len(rest), int(Rcc8.DC)), only[:, 0] * n + only[:, 1]
+        order = np.argsort(keys)
+        codes[order[np.searchsorted(keys[order], found.first * n + found.second)]] = found.detail
+        bits[rest] = _OF_RCC8[codes]
+    return bits

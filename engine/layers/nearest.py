@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from math import hypot, inf
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from engine.compiling.jit import allocating_kernel, called, entry_of, inline
 from engine.layers.relate import matrices
 from engine.layers.rows import Limits
 from engine.layers.shapes import Shape, Shapes, pairs_between, shape_of
-from engine.predicates.rational import nearest_with_root
+from engine.predicates.rational import common_integers, nearest_with_root
 from engine.predicates.vectors import as_point2
 from engine.running.parallel import run_chunks
 from engine.types import BoolArray, FlagArray, FloatArray, IntArray, Point2
@@ -26,6 +26,8 @@ from engine.types import BoolArray, FlagArray, FloatArray, IntArray, Point2
 _ERROR: Final = 2.0**-48
 _TINY: Final = 2.0**-530
 _LEAST: Final = 5e-324
+_LONG: Final = 2.0**-60
+"""Largest rounding of long doubles that are of use."""
 _PAIRS_EACH: Final = 4.0
 """Features of the right layer within the first reach of a feature of the left, about."""
 
@@ -43,7 +45,7 @@ def are_within(left: Shapes, right: Shapes, pairs: IntArray, distance: float, li
     """Return whether pairs of features are at most `distance` apart, exactly."""
     result = meets(left, right, pairs, limits)
     rest = np.flatnonzero(~result)
-    low, high = _bounds(left, right, pairs[rest], np.full(len(rest), distance), limits)
+    low, high, _, _ = _bounds(left, right, pairs[rest], np.full(len(rest), distance), limits)
     result[rest] = high <= distance
     limit = Fraction(distance) ** 2
     for k in np.flatnonzero((low <= distance) & (high > distance)).tolist():
@@ -70,15 +72,15 @@ def nearest_pairs(
         pairs = _of(pairs_between(left, right, np.maximum(reaches, 0.0), limits), reaches)
         pairs = pairs[~np.isin(pairs[:, 0] * len(right.dims) + pairs[:, 1], left_out)]
         best, made = np.full(len(left.dims), inf), meets(left, right, pairs, limits)
-        low, high = np.zeros(len(pairs)), np.zeros(len(pairs))
-        low[~made], high[~made] = _bounds(left, right, pairs[~made], reaches[pairs[~made, 0]], limits)
-        np.minimum.at(best, pairs[:, 0], high)
+        bounds = _bounds(left, right, pairs, np.where(made, -1.0, reaches[pairs[:, 0]]), limits)
+        bounds.low[made] = bounds.high[made] = 0.0
+        np.minimum.at(best, pairs[:, 0], bounds.high)
         is_last = reach >= min(most, 2.0 * extent)
         done = open_ if is_last else open_[best[open_] <= reach]
         some = np.zeros(len(left.dims), np.bool_)
         some[done] = True
-        near = some[pairs[:, 0]] & (low <= best[pairs[:, 0]]) & (low <= most)
-        chosen, exact = _ties(left, right, pairs[near], low[near], high[near], most, limits)
+        near = some[pairs[:, 0]] & (bounds.low <= best[pairs[:, 0]]) & (bounds.low <= most)
+        chosen, exact = _ties(left, right, pairs[near], bounds.take(near), most, limits)
         result.append(chosen)
         distances.append(exact)
         open_ = np.setdiff1d(open_, done)
@@ -93,23 +95,40 @@ def _of(pairs: IntArray, reaches: FloatArray) -> IntArray:
 
 
 def _ties(
-    left: Shapes, right: Shapes, pairs: IntArray, low: FloatArray, high: FloatArray, most: float, limits: Limits
+    left: Shapes, right: Shapes, pairs: IntArray, bounds: _Bounds, most: float, limits: Limits
 ) -> tuple[IntArray, FloatArray]:
     """Return those of pairs, sorted by left feature, whose exact distance is the least, and at most `most`."""
-    distances, stays = np.zeros(len(pairs)), high == 0.0
-    squares: dict[int, Fraction] = {}
-    for k in np.flatnonzero(~stays).tolist():
-        squares[k] = _square(left, right, pairs[k], float(high[k]), limits)
-    least: dict[int, Fraction] = {}
-    for k, square in squares.items():
-        least[int(pairs[k, 0])] = min(square, least.get(int(pairs[k, 0]), square))
-    meeting = set(pairs[stays, 0].tolist())
+    distances, is_sure = _rounded(bounds)
+    n = np.bincount(pairs[:, 0], minlength=len(left.dims))[pairs[:, 0]]
+    stays = bounds.high == 0.0
+    is_open = ~stays & ~((n == 1) & is_sure & (bounds.high <= most))
+    stays |= ~is_open
+    meeting = set(pairs[bounds.high == 0.0, 0].tolist())
+    squares, least = dict[int, Fraction](), dict[int, Fraction]()
+    for k in np.flatnonzero(is_open).tolist():
+        i = int(pairs[k, 0])
+        squares[k] = _square(left, right, pairs[k], float(bounds.high[k]), limits)
+        least[i] = min(squares[k], least.get(i, squares[k]))
     limit = None if most == inf else Fraction(most) ** 2
     for k, square in squares.items():
         i = int(pairs[k, 0])
         if i not in meeting and square == least[i] and (limit is None or square <= limit):
             stays[k], distances[k] = True, root_of(square)
     return pairs[stays], distances[stays]
+
+
+def _rounded(bounds: _Bounds) -> tuple[FloatArray, BoolArray]:
+    """Return distances, and where these are the nearest doubles for certain: in long doubles, where these are longer,
+    with 12 units of their rounding for the differences, products, sum, quotient and root, and the products' size."""
+    unit = float(np.finfo(np.longdouble).eps)
+    with np.errstate(all="ignore"):
+        x, y, ax, ay, bx, by = bounds.rows.astype(np.longdouble).T
+        u, v, ux, uy = x - ax, y - ay, bx - ax, by - ay
+        length = np.hypot(ux, uy)
+        distance = np.where(length > 0.0, np.abs(u * uy - v * ux) / length, np.hypot(u, v))
+        error = 12.0 * unit * (distance + np.where(length > 0.0, (np.abs(u * uy) + np.abs(v * ux)) / length, 0.0))
+        low, high = (distance - error).astype(np.float64), (distance + error).astype(np.float64)
+    return low, bounds.is_alone & (low == high) & (unit < _LONG) & (low > _TINY)
 
 
 def root_of(square: Fraction) -> float:
@@ -128,97 +147,156 @@ def _square(left: Shapes, right: Shapes, pair: IntArray, reach: float, limits: L
             break
         rows = np.empty((n, 6))
     limits.budget().check()
-    return min(_exact_square(*map(Fraction, row)) for row in set(map(tuple, rows[:n].tolist())))
+    return min(map(_exact_square, set(map(tuple, rows[:n].tolist()))))
 
 
-def _exact_square(x: Any, y: Any, ax: Any, ay: Any, bx: Any, by: Any) -> Fraction:
-    """Return the exact square of the distance of a point from a segment."""
+def _exact_square(row: tuple[float, ...]) -> Fraction:
+    """Return the exact square of the distance of a point from a segment, given as x, y, x, y, x, y."""
+    (x, y, ax, ay, bx, by), unit = common_integers(row)
     x, y, ux, uy = x - ax, y - ay, bx - ax, by - ay
     along, length = x * ux + y * uy, ux * ux + uy * uy
     if along <= 0:
-        return Fraction(x * x + y * y)
+        return Fraction(x * x + y * y, unit * unit)
     if along >= length:
-        return Fraction((x - ux) ** 2 + (y - uy) ** 2)
-    return Fraction((x * uy - y * ux) ** 2, 1) / length
+        return Fraction((x - ux) ** 2 + (y - uy) ** 2, unit * unit)
+    return Fraction((x * uy - y * ux) ** 2, length * unit * unit)
 
 
-def _bounds(
-    left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, limits: Limits
-) -> tuple[FloatArray, FloatArray]:
-    """Return bounds (low, high) of the distances of pairs that do not meet; infinite beyond their reach."""
-    low, high = np.empty(len(pairs)), np.empty(len(pairs))
+class _Bounds(NamedTuple):
+    """Bounds of the distances of n pairs. low, high (n,): infinite beyond the reach; rows (n, 6): a point and a segment
+    at about the least distance, whose two ends are one point where it is that of two points; is_alone (n,): whether no
+    others may be as near."""
+
+    low: FloatArray
+    high: FloatArray
+    rows: FloatArray
+    is_alone: BoolArray
+
+    def take(self, some: BoolArray) -> _Bounds:
+        """Return the bounds of some pairs."""
+        return _Bounds(self.low[some], self.high[some], self.rows[some], self.is_alone[some])
+
+
+def _bounds(left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, limits: Limits) -> _Bounds:
+    """Return bounds of the distances of pairs that do not meet."""
+    n = len(pairs)
+    made = _Bounds(np.full(n, np.inf), np.full(n, np.inf), np.zeros((n, 6)), np.zeros(n, np.bool_))
     with limits.budget() as budget:
 
         def task(start: int, stop: int) -> None:
             some = slice(start, stop)
-            entry_of(_measure)(left, right, pairs[some], reaches[some], low[some], high[some], budget.flag)
+            entry_of(_measure)(left, right, pairs[some], reaches[some], *(each[some] for each in made), budget.flag)
             budget.check()
 
-        run_chunks(task, len(pairs), budget=budget, workers=limits.workers)
-    return low, high
+        run_chunks(task, n, budget=budget, workers=limits.workers)
+    return made
+
+
+_ROW, _LOW, _HIGH, _RIVAL, _N_STATE = 6, 7, 8, 9, 10
+"""Columns of the state of a scan: the nearest row so far before _ROW, its distance there, bounds of that, and the least
+lower bound of all other rows."""
 
 
 @allocating_kernel
 def _measure(
     left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, low: FloatArray, high: FloatArray,
-    flag: FlagArray,
+    rows: FloatArray, is_alone: BoolArray, flag: FlagArray,
 ) -> None:  # fmt: skip
-    """Fill low and high (n,)."""
-    rows = np.empty((0, 6))
+    """Fill the arrays of `_Bounds`."""
+    none, state = np.empty((0, 6)), np.empty(_N_STATE)
     for item in range(len(pairs)):
         if flag[0] != 0:
             return
-        i, j = pairs[item, 0], pairs[item, 1]
-        own, their = shape_of(left, i), shape_of(right, j)
-        below, above, _ = _scan(own, their, reaches[item], rows, 0)
-        least, most, _ = _scan(their, own, min(reaches[item], above), rows, 0)
-        low[item], high[item] = min(below, least), min(above, most)
+        own, their = shape_of(left, pairs[item, 0]), shape_of(right, pairs[item, 1])
+        state[:_ROW], state[_ROW:] = 0.0, np.inf
+        _scan(own, their, reaches[item], none, 0, state)
+        _scan(their, own, reaches[item], none, 0, state)
+        low[item], high[item] = min(state[_LOW], state[_RIVAL]), state[_HIGH]
+        is_alone[item] = state[_RIVAL] > state[_HIGH]
+        for k in range(_ROW):
+            rows[item, k] = state[k]
 
 
 @allocating_kernel
 def _list_near(left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: FloatArray) -> int:
     """Fill rows (n, 6) with vertices and edges (x, y, x, y, x, y) that may be within `reach`; return their number."""
-    own, their = shape_of(left, i), shape_of(right, j)
-    return _scan(their, own, reach, rows, _scan(own, their, reach, rows, 0)[2])[2]
+    own, their, state = shape_of(left, i), shape_of(right, j), np.full(_N_STATE, np.inf)
+    return _scan(their, own, reach, rows, _scan(own, their, reach, rows, 0, state), state)
 
 
 @called
-def _scan(own: Shape, their: Shape, reach: float, rows: FloatArray, n: int) -> tuple[float, float, int]:
-    """Return bounds of the least distance of a vertex of one feature from an edge of another, infinite beyond `reach`.
-    rows: if there are any, filled from row n on with all within `reach`, the number of which is the third result."""
-    low, high, leaves, m = np.inf, np.inf, len(their.boxes) // 2, len(their.following)
-    is_list = len(rows) > 0
+def _scan(own: Shape, their: Shape, reach: float, rows: FloatArray, n: int, state: FloatArray) -> int:
+    """Update the state by the distances within `reach` of vertices of one feature from edges of another; or, where
+    there are rows, put those there from row n on, and return the number of all. A vertex and the end of an edge are a row
+    with that end twice, the lower of the two points first."""
+    leaves, m, is_list = len(their.boxes) // 2, len(their.following), len(rows) > 0
     for vertex in range(len(own.following)):
         p = as_point2(own.points, vertex)
-        near = reach + _ERROR * reach + _ERROR * (abs(p.x) + abs(p.y)) + _TINY
+        near = _grown(min(reach, state[_HIGH]), p)
         leaf = next_leaf(their.boxes, 1, p.x - near, p.y - near, p.x + near, p.y + near)
         while leaf > 0:  # bound: each leaf once
             for other in range(BLOCK * (leaf - leaves), min(BLOCK * (leaf - leaves + 1), m)):
                 a, b = as_point2(their.points, other), as_point2(their.points, their.following[other])
-                distance, error = _distance(p, a, b)
-                if distance - error > reach:
+                distance, error, part = _distance(p, a, b)
+                if not distance - error <= min(reach, state[_HIGH]):
                     continue
+                q = p
+                if part != 0:
+                    a = b = a if part < 0 else b
+                    if a.x < p.x or (a.x == p.x and a.y < p.y):
+                        q, a, b = a, p, p
                 if is_list:
                     if n < len(rows):
-                        rows[n, 0], rows[n, 1], rows[n, 2] = p.x, p.y, a.x
-                        rows[n, 3], rows[n, 4], rows[n, 5] = a.y, b.x, b.y
+                        _put(rows, n, q, a, b)
                     n += 1
-                    continue
-                low, high = min(low, max(0.0, distance - error)), min(high, distance + error)
-                reach = min(reach, high)
-            near = reach + _ERROR * reach + _ERROR * (abs(p.x) + abs(p.y)) + _TINY
+                elif not _is_put(state, q, a, b):
+                    _enter(state, q, a, b, distance, error)
+            near = _grown(min(reach, state[_HIGH]), p)
             leaf = next_leaf(their.boxes, after(leaf), p.x - near, p.y - near, p.x + near, p.y + near)
-    return low, high, n
+    return n
 
 
 @inline
-def _distance(p: Point2, a: Point2, b: Point2) -> tuple[float, float]:
-    """Return the distance of p from the segment ab, rounded, and a bound on its error."""
+def _grown(reach: float, p: Point2) -> float:
+    """Return a distance that covers `reach` and the rounding of p plus or minus it."""
+    return reach + _ERROR * (reach + abs(p.x) + abs(p.y)) + _TINY
+
+
+@inline
+def _put(rows: FloatArray, n: int, p: Point2, a: Point2, b: Point2) -> None:
+    rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3], rows[n, 4], rows[n, 5] = p.x, p.y, a.x, a.y, b.x, b.y
+
+
+@inline
+def _is_put(state: FloatArray, p: Point2, a: Point2, b: Point2) -> bool:
+    """Return whether this is the nearest row so far."""
+    return (
+        (state[0] == p.x) & (state[1] == p.y) & (state[2] == a.x) & (state[3] == a.y) & (state[4] == b.x)
+        & (state[5] == b.y) & (state[_ROW] < np.inf)
+    )  # fmt: skip
+
+
+@inline
+def _enter(state: FloatArray, p: Point2, a: Point2, b: Point2, distance: float, error: float) -> None:
+    """Make a row the nearest so far, or another."""
+    low = max(0.0, distance - error)
+    if distance < state[_ROW]:
+        state[_RIVAL] = min(state[_RIVAL], state[_LOW])
+        state[0], state[1], state[2], state[3], state[4], state[5] = p.x, p.y, a.x, a.y, b.x, b.y
+        state[_ROW], state[_LOW], state[_HIGH] = distance, low, distance + error
+    else:
+        state[_RIVAL] = min(state[_RIVAL], low)
+
+
+@inline
+def _distance(p: Point2, a: Point2, b: Point2) -> tuple[float, float, int]:
+    """Return the distance of p from the segment ab, rounded, a bound on its error, and whether it is that of a (-1), of
+    b (1) or of a point between (0)."""
     x, y, ux, uy = p.x - a.x, p.y - a.y, b.x - a.x, b.y - a.y
     along, length = x * ux + y * uy, ux * ux + uy * uy
     error = _ERROR * (abs(x) + abs(y) + abs(ux) + abs(uy)) + _TINY
     if along <= 0.0 or length == 0.0:
-        return hypot(x, y), error
+        return hypot(x, y), error, -1
     if along >= length:
-        return hypot(x - ux, y - uy), error
-    return abs(x * uy - y * ux) / length**0.5, error
+        return hypot(p.x - b.x, p.y - b.y), error, 1
+    return abs(x * uy - y * ux) / length**0.5, error, 0

@@ -1,18 +1,20 @@
 """Overlays of points and lines by polygons, as rows.
 
-Lines are clipped segment by segment on all polygons at once (`Scene.clip_segments`), whose ranks order all ends on a
-segment exactly. Intervals that share a point are merged by rank, for one polygon or for all of them; pieces that reach
-the end of a segment are joined with those that begin the next. No rounded number is compared.
+Lines are clipped segment by segment on all polygons at once, as scenes are. Where polygons count together, ends on one
+segment get ranks: by their parameter where these differ, rounding being monotone; where not, they are one point if they
+are on one edge, which neighbours share; the rest is sorted exactly (scenes/ends.py). Intervals that share a point are
+merged by rank; pieces that reach the end of a segment are joined with those that begin the next.
 """
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
+from engine.layers.joins import related_pairs
 from engine.layers.rows import (
     HOWS,
     NONE,
@@ -21,18 +23,19 @@ from engine.layers.rows import (
     Limits,
     check_how,
     concatenate_rows,
-    locate_points_in_layer,
     unite,
 )
 from engine.layers.rows import overlay_rows as overlay_areas
-from engine.layers.shapes import LINE, POINT, MixedLayer, Paths
-from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, places_of
+from engine.layers.shapes import LINE, POINT, MixedLayer, Paths, no_areas, no_paths
+from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
 from engine.polygon_overlay.touching import Place, Touching, concatenate_touching, join_edges
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.rational import orient2d_rational
 from engine.running.budget import Budget, polled
+from engine.scenes.clip import loose_pieces, sorted_exactly
+from engine.scenes.ends import LoosePieces, merge_parts, take_pieces
 from engine.scenes.scene import Scene
-from engine.solids.ragged import summed
+from engine.solids.ragged import next_in_rings, summed
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
@@ -139,7 +142,9 @@ def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, lim
     _, features = paths.owners()
     are_points = np.flatnonzero(paths.dims[features] == POINT)
     vertices, features = read_only(paths.vertices[are_points]), features[are_points]
-    first, second, _ = locate_points_in_layer(vertices, areas, limits)
+    offsets = np.arange(len(vertices) + 1)
+    points = MixedLayer(no_areas(len(vertices)), Paths(np.zeros(len(vertices), np.int8), vertices, offsets, offsets))
+    first, second = related_pairs(points, MixedLayer(areas, no_paths(len(areas))), "intersects", 0.0, limits).T
     if is_outside:
         first = np.setdiff1d(np.arange(len(vertices)), first)
         found = np.column_stack([first, np.zeros(len(first), np.int64)])
@@ -156,10 +161,20 @@ def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limi
     segments = read_only(np.stack([paths.vertices[firsts], paths.vertices[firsts + 1]], axis=1))
     is_whole = np.isin(np.arange(len(areas)), areas.owners, invert=True) & (areas.arrays.sizes() > 0)
     there = np.flatnonzero(is_whole)
-    solids = [*PolygonSelection(areas.arrays, there), *PolygonSelection(areas.parts, np.arange(len(areas.owners)))]
-    pieces: Any = limits.record(Scene(solids).clip_segments(segments, **limits.options()))
-    owners = keys[np.concatenate([there, areas.owners]).astype(np.int64)[pieces.body]]
-    merged = _merged(owners, pieces)
+    solids = concatenate_polygons([areas.arrays.take(there), areas.parts])
+    scene = Scene(list(PolygonSelection(solids, np.arange(len(there) + len(areas.owners)))))
+    owners = keys[np.concatenate([there, areas.owners]).astype(np.int64)]
+    with limits.budget() as budget:
+        if len(scene):
+            pieces = loose_pieces(segments, scene._placements, budget, limits.workers)
+        else:
+            pieces = merge_parts([], 2)
+        if len(np.unique(owners)) == len(owners):  # each polygon alone: its pieces are apart
+            order = np.lexsort((pieces.t[:, 0], owners[pieces.body], pieces.source))
+            ends, own = pieces.ends[:, order], (pieces.faces[order] < 0).T
+            merged = _Intervals(owners[pieces.body[order]], pieces.source[order], ends, own)
+        else:
+            merged = _merged(owners, _ranked(pieces, segments, solids, scene, budget, limits.workers))
     if is_outside:
         merged = _between(merged, segments)
     order = np.lexsort((merged.segment, merged.key, features[firsts[merged.segment]]))  # stable: along a segment too
@@ -180,13 +195,60 @@ def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limi
     return np.column_stack([feature[heads], merged.key[heads]]), parts
 
 
-def _merged(keys: IntArray, pieces: Any) -> _Intervals:
-    """Return the union of pieces of one key on each segment. pieces: `ScenePieces`; keys: of each."""
+class _Ranked(NamedTuple):
+    """Pieces with the order of their ends: fields as those of `ScenePieces`."""
+
+    source: IntArray
+    body: IntArray
+    start: FloatArray
+    end: FloatArray
+    faces: IntArray
+    ranks: IntArray
+
+
+def _ranked(
+    pieces: LoosePieces, segments: FloatArray, solids: PolygonArrays, scene: Scene, budget: Budget, workers: int | None
+) -> _Ranked:
+    """Return pieces of segments with ranks of their ends. solids: the bodies of the scene."""
+    m, twice = len(pieces.source), np.repeat(np.arange(len(pieces.source)), 2)
+    segment, t, faces = pieces.source[twice], pieces.t.ravel(), pieces.faces.ravel()
+    order = np.lexsort((t, segment))
+    is_new = np.ones(2 * m, np.bool_)
+    is_new[1:] = (segment[order][1:] != segment[order][:-1]) | (t[order][1:] != t[order][:-1])
+    ranks = np.empty(2 * m, np.int64)
+    ranks[order] = np.cumsum(is_new) - 1
+    after, firsts = next_in_rings(solids.ring_offsets), solids.ring_offsets[solids.polygon_offsets]
+    tied = np.flatnonzero(np.bincount(ranks, minlength=1)[ranks] > 1)
+    edges = firsts[pieces.body[twice[tied]]] + np.maximum(faces[tied], 0)
+    ends = np.stack([solids.vertices[edges], solids.vertices[after[edges]]], axis=1)
+    is_own = faces[tied] < 0  # the end of the segment, on no edge
+    ends[is_own] = segments[segment[tied[is_own]], (tied[is_own] & 1), None]
+    turned = (ends[:, 0, 0] > ends[:, 1, 0]) | ((ends[:, 0, 0] == ends[:, 1, 0]) & (ends[:, 0, 1] > ends[:, 1, 1]))
+    ends[turned] = ends[turned, ::-1]
+    of = np.argsort(ranks[tied], kind="stable")
+    heads = np.flatnonzero(np.append(True, np.diff(ranks[tied][of]) > 0)[: len(of)])
+    first = np.repeat(ends[of][heads], np.diff(np.append(heads, len(of))), axis=0)
+    differ = (ends[of] != first).any(axis=(1, 2))
+    is_open = np.zeros(len(segments), np.bool_)
+    is_open[segment[tied[of[differ]]]] = True
+    left = is_open[pieces.source]
+    stays = np.flatnonzero(~left)
+    columns = pieces.source, pieces.body, *pieces.ends, pieces.faces, ranks.reshape(-1, 2)
+    made = [tuple(each[stays] for each in columns)]
+    if left.any():
+        exact = sorted_exactly(take_pieces(pieces, np.flatnonzero(left)), segments, scene._placements, budget, workers)
+        made.append((exact.source, exact.body, exact.start, exact.end, exact.faces, exact.ranks))
+    return _Ranked(*(np.concatenate(each) for each in zip(*made)))
+
+
+def _merged(keys: IntArray, pieces: _Ranked) -> _Intervals:
+    """Return the union of pieces of one key on each segment. keys: by body."""
+    keys = keys[pieces.body]
     order = np.lexsort((pieces.ranks[:, 1], pieces.ranks[:, 0], keys, pieces.source))
     key, segment, (first, last) = keys[order], pieces.source[order], pieces.ranks[order].T
     is_group = np.ones(len(order), np.bool_)
     is_group[1:] = (key[1:] != key[:-1]) | (segment[1:] != segment[:-1])
-    base = (np.cumsum(is_group) - 1) * (int(last.max(initial=0)) + 1)
+    base = (np.cumsum(is_group) - 1) * (int(last.max(initial=0)) + 1)  # ranks are below the number of ends
     reached = np.maximum.accumulate(base + last) if len(order) else base
     is_head = is_group.copy()
     is_head[1:] |= base[1:] + first[1:] > reached[:-1]

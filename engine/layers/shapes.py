@@ -15,7 +15,7 @@ from engine.layers.rows import Layer, Limits
 from engine.polygon_overlay.pair_arrays import PolygonArrays, concatenate_polygons
 from engine.predicates.rational import exponent_of, shifted
 from engine.solids.ragged import next_in_rings, summed
-from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
+from engine.types import FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 POINT: Final = 0
 LINE: Final = 1
@@ -81,9 +81,11 @@ def shapes_of(layer: MixedLayer, limits: Limits) -> Shapes:
     """Return a layer as edges. Raises: NotRepresentableError beyond the range of exact signs."""
     paths, areas = layer.paths, layer.areas.arrays
     n, dims = len(layer.areas), layer.dims
-    rings = PolygonArrays(paths.vertices, paths.offsets, paths.path_offsets)
-    joined, order = concatenate_polygons([rings, areas]), np.arange(n) + np.where(dims == AREA, n, 0)
-    vertices, offsets, groups = joined.take(order) if (dims == AREA).any() else rings
+    vertices, offsets, groups = areas
+    if (paths.dims >= 0).any():
+        rings = PolygonArrays(paths.vertices, paths.offsets, paths.path_offsets)
+        order = np.arange(n) + np.where(dims == AREA, n, 0)
+        vertices, offsets, groups = concatenate_polygons([rings, areas]).take(order) if (dims == AREA).any() else rings
     firsts, following = read_only(offsets[groups]), next_in_rings(offsets)
     owners = np.repeat(np.arange(n), np.diff(groups))
     tails = offsets[1:] - 1
@@ -139,8 +141,8 @@ def in_range(left: Shapes, right: Shapes) -> tuple[Shapes, Shapes]:
     """Return two layers scaled by one power of two, so that exact signs are in range. Raises: NotRepresentableError if
     there is no such power."""
     both = np.concatenate([left.vertices.ravel(), right.vertices.ravel()])
-    sizes = np.abs(both[both != 0.0])
-    if not len(sizes) or (sizes.min() > _SMALLEST and sizes.max() < _LARGEST):
+    sizes = np.abs(both)
+    if not ((sizes >= _LARGEST) | ((sizes <= _SMALLEST) & (sizes > 0.0))).any():
         return left, right
     exponent = -exponent_of(both)
     moved = [shifted(each, exponent) for shape in (left, right) for each in (shape.vertices, shape.ends, shape.boxes)]
@@ -183,6 +185,8 @@ def no_paths(n: int) -> Paths:
     return Paths(np.full(n, -1, np.int8), np.zeros((0, 2)), zeros[:1], zeros)
 
 
-def is_plain(layer: MixedLayer) -> BoolArray:
-    """Return whether each feature is a polygon, or has no geometry."""
-    return layer.paths.dims < 0
+def no_areas(n: int) -> Layer:
+    """Return the polygons of a layer of n features that has none."""
+    zeros = np.zeros(n + 1, np.int64)
+    none = PolygonArrays(np.zeros((0, 2)), zeros[:1], zeros)
+    return Layer(none, np.zeros(n, np.bool_), none.take(zeros[:0]), zeros[:0])

@@ -58,7 +58,20 @@ def clip_all(
 ) -> ScenePieces:
     """Return all pieces of segments (n, 2, dim) within the bodies of a scene, sorted. counts: filled."""
     parts = _parts(segments, scene, counts, budget, workers)
-    pieces = merge_parts(parts, segments.shape[2], budget, workers)
+    return sorted_exactly(merge_parts(parts, segments.shape[2], budget, workers), segments, scene, budget, workers)
+
+
+def loose_pieces(segments: FloatArray, scene: Placements, budget: Budget, workers: int | None) -> LoosePieces:
+    """Return all pieces of segments (n, 2, dim) within the bodies of a scene, in no order but along each segment in one
+    body."""
+    parts = _parts(segments, scene, Counts(len(segments)), budget, workers)
+    return merge_parts(parts, segments.shape[2], budget, workers)
+
+
+def sorted_exactly(
+    pieces: LoosePieces, segments: FloatArray, scene: Placements, budget: Budget, workers: int | None
+) -> ScenePieces:
+    """Return pieces of `loose_pieces` sorted, with exact ranks."""
     words = scene.words(budget)
     return sort_pieces(pieces, segments, words, lambda: _exact_ends(segments, scene, budget), budget, workers)
 
