@@ -1,5 +1,5 @@
 """The command line ``python -m engine contains | collide | clearance | distances | clip | hits | bounds | volume |
-section | cut | overlay | union | join``: for files; the last three are for layers.
+section | cut | overlay | union | join | crop | relate``: for files; the last five are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
 ``python -m engine audit`` compares other packages with the exact answers on your data.
@@ -45,7 +45,9 @@ from engine.files.solids import (
     write_mesh,
     write_table,
 )
+from engine.layers.feature_joins import clip_features, join_features
 from engine.layers.features import dissolve_features, locate_features, overlay_features
+from engine.layers.relate import PREDICATES
 from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
 from engine.running.parallel import Progress
@@ -194,11 +196,24 @@ def _clipped(rings: Any, item: int) -> dict[str, Any]:
 
 def _overlay(options: Options) -> None:
     left, right = read_features(options.left), read_features(options.right)
-    _write_features(overlay_features(left, right, options.operation, deadline=options.deadline), options)
+    more = {"grid": options.grid, "deadline": options.deadline}
+    _write_features(overlay_features(left, right, options.operation, **more), options)
 
 
 def _union(options: Options) -> None:
-    _write_features(dissolve_features(read_features(options.layer), options.by, deadline=options.deadline), options)
+    more = {"grid": options.grid, "coverage": options.coverage, "deadline": options.deadline}
+    _write_features(dissolve_features(read_features(options.layer), options.by, **more), options)
+
+
+def _crop(options: Options) -> None:
+    layer, mask = read_features(options.layer), read_features(options.mask)
+    _write_features(clip_features(layer, mask, grid=options.grid, deadline=options.deadline), options)
+
+
+def _relate(options: Options) -> None:
+    left, right = read_features(options.left), read_features(options.right)
+    more = {"distance": options.distance, "outside": options.outside, "deadline": options.deadline}
+    _write_features(join_features(left, right, options.predicate, **more), options)
 
 
 def _join(options: Options) -> None:
@@ -334,6 +349,7 @@ SOLID: Final = {"solid": FORMATS}
 POSES: Final = "file with rows [R | t], the poses of the second: 12 numbers in 3D, 6 in 2D; the identity by default"
 PAIR: Final = {"first": FORMATS, "second": FORMATS, "--poses": POSES}
 LAYER: Final = "layer of polygons: .geojson, or what geopandas reads (extra geo)"
+ANY: Final = LAYER.replace("polygons", "points, lines and polygons")
 ATTRIBUTES: Final = "; properties and ids are copied"
 ROWS: Final = ".npy, .csv or .geojson file with rows of "
 COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str | None]]]] = {
@@ -352,6 +368,10 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
     "union": (_union, "unite the features of a layer, all or those with equal properties", {"layer": LAYER}),
     "join": (_join, "join points to the features that contain them, boundary included",
              {"points": ".geojson file of points" + ATTRIBUTES, "polygons": LAYER}),
+    "crop": (_crop, "cut the features of a layer to the union of some polygons",
+             {"layer": ANY + ATTRIBUTES, "mask": LAYER}),
+    "relate": (_relate, "join the features of two layers that have a relation: they meet, one is within the other, ...",
+               {"left": ANY + ATTRIBUTES, "right": ANY}),
     "bounds": (_bounds, "smallest box and smallest sphere of a solid", SOLID),
     "volume": (_volume, "volume, area and centroid of a solid", SOLID),
     "section": (_section, "sections of a mesh at heights, as rows of plane, piece, ring and position", SOLID),
@@ -393,6 +413,12 @@ def _parser() -> argparse.ArgumentParser:
     made["hits"].add_argument("--rays", action="store_true", help="half-lines: origin and direction")
     made["hits"].add_argument("--keep", choices=("all", "first", "any"), default="all")
     made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
+    for name in ("overlay", "union", "crop"):
+        made[name].add_argument("--grid", type=float, metavar="SPACING", help="snap polygons to multiples of this")
+    made["union"].add_argument("--coverage", action="store_true", help="refuse polygons that overlap")
+    made["relate"].add_argument("--predicate", choices=(*PREDICATES, "dwithin"), default="intersects")
+    made["relate"].add_argument("--distance", type=float, help="with dwithin: the largest distance")
+    made["relate"].add_argument("--outside", action="store_true", help="also write features without such a relation")
     made["union"].add_argument("--by", nargs="+", metavar="NAME", help="unite features that agree in these properties")
     made["join"].add_argument("--outside", action="store_true", help="also write points that no feature contains")
     commands.add_parser("audit", help="compare libraries on your own data, on one page")

@@ -25,6 +25,9 @@ from engine.containment.posed_locators import posed_locator
 from engine.distance.clearance import clearance
 from engine.distance.distances import distances
 from engine.errors import InvalidInputError
+from engine.layers.geojson import EVERY, collection_of, mixed_of
+from engine.layers.joins import nearest_features, related_pairs
+from engine.layers.limits import Limits
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.planes import orientations
 from engine.polygon_overlay.batch import overlay_batch
@@ -271,6 +274,19 @@ def _warm_overlay_rest() -> None:
     # Edges an ulp apart are left to the path in integers, whose kernels look for pairs of boxes.
     near = 1.0 + 2.0**-52
     overlay(Polygon([[[0, 0], [1, 1], [0, 1]]]), Polygon([[[0, 0], [1, near], [near, 0.5]]]), "union")
+    _warm_layers()
+
+
+def _warm_layers() -> None:
+    points, square = [[0.5, 0.5], [9.0, 9.0]], [[[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]]
+    kinds = ("MultiPoint", points), ("LineString", points), ("Polygon", square)
+    geometries = [{"type": kind, "coordinates": coordinates} for kind, coordinates in kinds]
+    features = [{"type": "Feature", "geometry": each} for each in geometries]
+    side = collection_of({"type": "FeatureCollection", "features": features}, ("layer",), Limits(None, None), EVERY)
+    layer = mixed_of(side, Limits(None, None))
+    related_pairs(layer, layer, "within", 0.0, Limits(None, None))
+    nearest_features(layer, layer, np.inf, True, Limits(None, None))
+    related_pairs(layer, layer, "dwithin", 0.25, Limits(None, None))
 
 
 def _warm_distances() -> None:

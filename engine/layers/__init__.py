@@ -1,6 +1,8 @@
-"""Layers: polygons with attributes, as maps have them; GeoDataFrames in and out, and GeoJSON for HTTP and files."""
+"""Layers: points, lines and polygons with attributes, as maps have them; GeoDataFrames, and GeoJSON for HTTP, files."""
 
-from engine.layers.features import FeatureRows, dissolve_features, locate_features, overlay_features
+from engine.layers.feature_joins import clip_features, join_features
+from engine.layers.feature_rows import FeatureRows
+from engine.layers.features import dissolve_features, locate_features, overlay_features
 from engine.layers.frame_joins import sjoin, sjoin_nearest
 from engine.layers.frames import clip, dissolve, overlay
 from engine.layers.geojson import polygon_of
@@ -8,8 +10,10 @@ from engine.layers.geojson import polygon_of
 __all__ = [
     "FeatureRows",
     "clip",
+    "clip_features",
     "dissolve",
     "dissolve_features",
+    "join_features",
     "locate_features",
     "overlay",
     "overlay_features",

@@ -8,111 +8,36 @@ and `right` are the numbers of these features.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Final, Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from engine.errors import CancelledError, DeadlineExceededError, EngineError, InvalidInputError
-from engine.layers.geojson import check_each, collection_of, crs_of, groups_of, members_of, polygons_of, texts_of
+from engine.layers.feature_rows import ROW, FeatureRows, with_geometries
+from engine.layers.geojson import (
+    EVERY,
+    check_each,
+    collection_of,
+    crs_of,
+    groups_of,
+    members_of,
+    mixed_of,
+    polygons_of,
+    texts_of,
+)
 from engine.layers.json_text import text_of
+from engine.layers.limits import Limits
+from engine.layers.path_rows import dissolve_mixed, overlay_mixed
 from engine.layers.rows import (
     NONE,
-    LayerRows,
-    Limits,
-    dissolve_rows,
     locate_points_in_layer,
-    overlay_rows,
     with_unmatched_points,
 )
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
 from engine.solids.checks import as_points, shown
 from engine.solids.ragged import summed
-from engine.types import Accuracy, FloatArray, IntArray, read_only
-
-_BATCH: Final = 1000
-"""Number of features made at a time."""
-_ROW: Final = 55
-"""Lower bound on the bytes of a row in JSON, without copied members and positions."""
-_POSITION: Final = 10
-"""Lower bound on the bytes of a position in JSON."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FeatureRows:
-    """Features of an answer, made on request.
-
-    Attributes
-    ----------
-    offsets : ndarray of int64, shape (n + 1,)
-        How many vertices stand before each feature.
-    collapsed : int
-        Rows that rounding left nothing of.
-    crs_text : str
-        The collection's `crs` as JSON.
-    n_bytes : ndarray of int64, shape (n + 1,)
-        Bytes of JSON before each feature, at least.
-    areas : tuple or None
-        Positions, and offsets of rings, of polygons and of rows, where the geometries are made.
-    members, geometry : callable
-        ``members(row)``: the members beside type and geometry, as JSON; ``geometry(row)``: one that is passed through.
-    """
-
-    members: Callable[[int], bytes]
-    offsets: IntArray
-    n_bytes: IntArray
-    crs_text: bytes | None
-    areas: tuple[FloatArray, tuple[IntArray, IntArray, IntArray]] | None = None
-    geometry: Callable[[int], bytes] = lambda row: b"null"
-    collapsed: int = 0
-
-    def __len__(self) -> int:
-        return len(self.offsets) - 1
-
-    def __iter__(self) -> Iterator[dict[str, Any]]:
-        for start in range(0, len(self), _BATCH):
-            yield from self.make(start, min(len(self), start + _BATCH))
-
-    @property
-    def crs(self) -> Any:
-        """The member `crs` of the input."""
-        return None if self.crs_text is None else json.loads(self.crs_text)
-
-    def make(self, start: int, stop: int) -> list[dict[str, Any]]:
-        """Return features as dicts.
-
-        Parameters
-        ----------
-        start, stop : int
-            The first, and one past the last.
-
-        Returns
-        -------
-        list of dict
-            GeoJSON features.
-        """
-        return [
-            {"type": "Feature", **json.loads(b"{%b}" % self.members(row)), "geometry": self._geometry(row)}
-            for row in range(start, stop)
-        ]
-
-    def _geometry(self, row: int) -> Any:
-        if self.areas is None:
-            return json.loads(self.geometry(row))
-        positions, (rings, pieces, ends) = self.areas
-        parts = [
-            [positions[i:j] for i, j in pairwise(rings[first : last + 1].tolist())]
-            for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
-        ]
-        if not parts:
-            return None
-        kind, coordinates = ("Polygon", parts[0]) if len(parts) == 1 else ("MultiPolygon", parts)
-        return {"type": kind, "coordinates": coordinates}
-
+from engine.types import Accuracy, read_only
 
 Answer = FeatureRows | tuple[FeatureRows, Accuracy]
 
@@ -123,6 +48,7 @@ def overlay_features(
     right: Any,
     how: str = "intersection",
     *,
+    grid: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     report: Literal[False] = False,
@@ -133,6 +59,7 @@ def overlay_features(
     right: Any,
     how: str = "intersection",
     *,
+    grid: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     report: Literal[True],
@@ -142,19 +69,22 @@ def overlay_features(
     right: Any,
     how: str = "intersection",
     *,
+    grid: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     report: bool = False,
 ) -> Answer:
-    """Overlay two FeatureCollections of polygons.
+    """Overlay a FeatureCollection with one of polygons.
 
     Parameters
     ----------
     left, right : dict
-        GeoJSON FeatureCollections. Features with null geometry keep their properties where what is left of their layer
-        is part of the answer.
+        GeoJSON FeatureCollections, the left one of any geometries, the right one of polygons. Features with null
+        geometry keep their properties where what is left of their layer is part of the answer.
     how : {"intersection", "union", "identity", "difference", "symmetric_difference"}
         As `engine.layers.overlay`.
+    grid : float, optional
+        As for `engine.layers.overlay`.
     deadline, cancel, report
         As for `engine.locate`.
 
@@ -189,13 +119,14 @@ def overlay_features(
     [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0]]
     """
     check_options(None, None, report=report)
-    limits = Limits(deadline, cancel)
-    sides = [collection_of(value, (name,), limits) for value, name in ((left, "left"), (right, "right"))]
+    limits = Limits(deadline, cancel, grid=grid)
+    sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits)]
     crs = crs_of(sides, limits)
     write_members, n_bytes = members_of(sides, ("left", "right"), limits)
-    layers = [polygons_of(side, limits) for side in sides]
-    rows = overlay_rows(layers[0], layers[1], how, limits)
-    made = _with_areas(
+    layers = [mixed_of(side, limits) for side in sides]
+    kinds = frozenset(layers[0].dims.tolist()) - {-1}
+    rows = overlay_mixed(layers[0], layers[1], how, limits, kinds, False)
+    made = with_geometries(
         rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
     )
     return (made, limits.accuracy) if report else made
@@ -206,6 +137,8 @@ def dissolve_features(
     layer: Any,
     by: list[str] | None = None,
     *,
+    coverage: bool = False,
+    grid: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     report: Literal[False] = False,
@@ -215,6 +148,8 @@ def dissolve_features(
     layer: Any,
     by: list[str] | None = None,
     *,
+    coverage: bool = False,
+    grid: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     report: Literal[True],
@@ -223,6 +158,8 @@ def dissolve_features(
     layer: Any,
     by: list[str] | None = None,
     *,
+    coverage: bool = False,
+    grid: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     report: bool = False,
@@ -232,9 +169,11 @@ def dissolve_features(
     Parameters
     ----------
     layer : dict
-        A GeoJSON FeatureCollection of polygons.
+        A GeoJSON FeatureCollection of polygons, of lines, or of points.
     by : list of str, optional
         Names of properties.
+    coverage, grid
+        As for `engine.layers.dissolve`.
     deadline, cancel, report
         As for `engine.locate`.
 
@@ -266,9 +205,9 @@ def dissolve_features(
     >>> rows.make(0, len(rows))[0]["properties"]
     {'owner': 'Ada', 'count': 2}
     """
-    check_options(None, None, report=report)
-    limits = Limits(deadline, cancel)
-    side = collection_of(layer, ("layer",), limits)
+    check_options(None, None, report=report, coverage=coverage)
+    limits = Limits(deadline, cancel, grid=grid)
+    side = collection_of(layer, ("layer",), limits, EVERY)
     crs = crs_of([side], limits)
     names = _checked_names(by)
     for member, column in (("properties", side.properties), ("id", ({"id": each.get("id")} for each in side.features))):
@@ -276,7 +215,7 @@ def dissolve_features(
         limits.budget().take(-sum(map(len, checked)))
         del checked
     groups, values = groups_of(side, names, limits)
-    rows = dissolve_rows(polygons_of(side, limits), groups, len(values), limits)
+    rows = dissolve_mixed(mixed_of(side, limits), groups, len(values), limits, coverage)
     counts = np.bincount(groups, minlength=len(rows)).tolist()
     texts = [b"%b:null" % text_of(name) for name in names]
 
@@ -287,7 +226,7 @@ def dissolve_features(
         return b'"properties":{%b}' % b",".join([*own, b'"count":%d' % counts[row]])
 
     lengths = [sum(len(value) - 4 for value in each.values()) for each in polled(values)]
-    made = _with_areas(rows, write_members, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
+    made = with_geometries(rows, write_members, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
     return (made, limits.accuracy) if report else made
 
 
@@ -395,17 +334,6 @@ def locate_features(
         return write_members(int(first[row]), int(second[row])) + more
 
     sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
-    offsets, n_bytes_before = read_only(np.arange(len(first) + 1)), summed(_ROW + sizes)
+    offsets, n_bytes_before = read_only(np.arange(len(first) + 1)), summed(ROW + sizes)
     made = FeatureRows(members, offsets, n_bytes_before, crs, geometry=lambda row: geometries[first[row]])
     return (made, limits.accuracy) if report else made
-
-
-def _with_areas(rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None) -> FeatureRows:
-    """Return the features of rows with polygons. members(row): JSON bytes of a row's members besides type and geometry;
-    n_bytes: lower bound on the bytes of JSON of each row but for the geometry; crs: the common member of the layers as
-    JSON."""
-    positions, (rings, pieces, ends) = rows.ragged
-    offsets = rings[pieces[ends]]
-    n_bytes = summed(_ROW + n_bytes) + _POSITION * offsets
-    areas = positions, (rings, pieces, ends)
-    return FeatureRows(members, offsets, n_bytes, crs, areas, collapsed=rows.n_collapsed)

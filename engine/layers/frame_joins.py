@@ -9,7 +9,8 @@ import numpy as np
 from engine.errors import InvalidInputError, InvalidOperationError
 from engine.layers.frame_reading import check_frames, geopandas_and_shapely, mixed_of
 from engine.layers.joins import check_predicate, checked_reach, nearest_features, related_pairs
-from engine.layers.rows import NONE, Limits
+from engine.layers.limits import Limits
+from engine.layers.rows import NONE
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
 from engine.solids.checks import shown

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.errors import EngineError, InvalidInputError, NotFiniteError, UnsupportedSolidError
-from engine.layers.rows import Limits, layer_of
+from engine.layers.limits import Limits
+from engine.layers.rows import layer_of
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
 from engine.polygon_overlay.pair_arrays import arrays_of
 from engine.solids.checks import shown

@@ -24,14 +24,16 @@ from engine.errors import (
     WrongDimensionError,
 )
 from engine.layers.json_text import NotJsonError, Path, key_of, text_of
-from engine.layers.rows import NONE, Layer, Limits, layer_of
+from engine.layers.limits import Limits
+from engine.layers.rows import NONE, Layer, layer_of
+from engine.layers.shapes import LINE, POINT, MixedLayer, Paths
 from engine.polygon_overlay.overlay import union_all
 from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
 from engine.running.budget import UNLIMITED, Budget, polled
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
-from engine.types import BoolArray, FloatArray, IntArray
+from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 _NAME_BYTES: Final = 200
 """Bytes that a property name takes, with its entries in sets."""
@@ -188,6 +190,8 @@ def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntAr
 
 
 AREAS: Final = ("Polygon", "MultiPolygon")
+POINTS: Final = ("Point", "MultiPoint")
+EVERY: Final = (*POINTS, "LineString", "MultiLineString", *AREAS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,14 +250,43 @@ def polygons_of(side: Collection, limits: Limits) -> Layer:
     return layer_of(*_parts_of(side, limits), limits)
 
 
+def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
+    """Return the points, lines and polygons of a collection."""
+    n = len(side.features)
+    dims, counts, sizes, positions = np.full(n, -1, np.int8), np.zeros(n, np.int64), list[int](), list[FloatArray]()
+    with limits.budget():
+        for number in polled(range(n)):
+            geometry = side.features[number].get("geometry")
+            if geometry is not None and geometry["type"] not in AREAS:
+                paths = check_each([number], side, _paths_in, is_array=False)[0]
+                counts[number] = len(paths)
+                sizes += map(len, paths)
+                positions += paths
+                dims[number] = (POINT if geometry["type"] in POINTS else LINE) if paths else -1
+    vertices = np.concatenate([np.zeros((0, 2)), *positions])
+    return MixedLayer(polygons_of(side, limits), Paths(dims, read_only(vertices), summed(sizes), summed(counts)))
+
+
+def _paths_in(geometry: dict[str, Any]) -> list[FloatArray]:
+    """Return the positions of each point or line of a geometry."""
+    kind, given = geometry["type"], geometry["coordinates"]
+    if kind in POINTS:
+        return [as_points([place], 2) for place in ([given] if kind == "Point" and len(given) else given)]
+    lines = [as_points(line, 2) for line in ([given] if kind == "LineString" else given) if len(line)]
+    for line in lines:
+        if len(line) == 1:
+            raise InvalidArrayError("a line of one position; a line needs 2", ())
+    return lines
+
+
 def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray, BoolArray]:
     """Return (arrays, offsets, is_missing): all parts (Polygons) of all features as polygons, the offsets (n + 1,) of
     each feature's parts, and (n,) whether a feature has no geometry."""
     rings: list[Any] = []
     part_sizes: list[int] = []
-    there = [k for k, feature in enumerate(side.features) if feature.get("geometry") is not None]
-    is_missing = np.ones(len(side.features), np.bool_)
-    is_missing[there] = False
+    geometries = [feature.get("geometry") for feature in side.features]
+    there = [k for k, geometry in enumerate(geometries) if geometry is not None and geometry["type"] in AREAS]
+    is_missing = np.array([geometry is None for geometry in geometries], np.bool_)
     counts = np.zeros(len(side.features), np.int64)
     with limits.budget():
         try:
@@ -292,9 +325,11 @@ def _check_rings(geometry: dict[str, Any]) -> None:
                 raise RingTooShortError("a ring of one position; a ring needs 3", ())
 
 
-def check_each(there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any]) -> Any:
-    """Return the array of check(geometry) for the features of a layer at the indices `there`; an error names its
-    feature."""
+def check_each(
+    there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any], is_array: bool = True
+) -> Any:
+    """Return the array, or the list, of check(geometry) for the features of a layer at the indices `there`; an error
+    names its feature."""
     made = []
     for number in polled(there):
         try:
@@ -312,7 +347,7 @@ def check_each(there: list[int], side: Collection, check: Callable[[dict[str, An
         except (KeyError, TypeError, ValueError):
             kind, what = InvalidArrayError, "has coordinates that are no lists of positions"  # type: ignore[assignment]
         raise refused(kind, side, number, what)
-    return np.array(made)
+    return np.array(made) if is_array else made
 
 
 def polygon_of(geometry: Any) -> Polygon:

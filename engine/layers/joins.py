@@ -17,9 +17,10 @@ from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline_batch import OutlineArrays, relate_outline_pairs
 from engine.compiling.jit import entry_of
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
+from engine.layers.limits import Limits
 from engine.layers.nearest import are_within, meets, nearest_pairs
 from engine.layers.relate import BB, EI, IE, II, PREDICATES, holds, matrices, transposed
-from engine.layers.rows import Layer, Limits, locate_points_in_layer, unite
+from engine.layers.rows import Layer, locate_points_in_layer, unite
 from engine.layers.shapes import AREA, POINT, MixedLayer, Shapes, in_range, pairs_between, shapes_of
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons
 from engine.running.parallel import run_chunks
@@ -83,7 +84,7 @@ def related_pairs(left: MixedLayer, right: MixedLayer, predicate: str, distance:
         back = matrices(others, shapes, pairs[turned][:, ::-1].copy(), False, budget, limits.workers)
         bits[turned] = transposed(back)
     if are_areas.any():
-        bits[are_areas] = _of_areas(left.areas, right.areas, pairs[are_areas], limits)
+        bits[are_areas] = _of_areas(left.areas, right.areas, pairs[are_areas], predicate != "touches", limits)
     return pairs[holds(predicate, bits, dims, theirs)]
 
 
@@ -171,20 +172,21 @@ def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
     return layer._replace(areas=replace(layer.areas, arrays=concatenate_polygons([arrays, *united]).take(places)))
 
 
-def _of_areas(left: Layer, right: Layer, pairs: IntArray, limits: Limits) -> IntArray:
-    """Return the bits of pairs of polygons: by the kernel of scenes, without an object each, then one by one."""
+def _of_areas(left: Layer, right: Layer, pairs: IntArray, has_detail: bool, limits: Limits) -> IntArray:
+    """Return the bits of pairs of polygons: by the kernel of scenes, without an object each, then one by one. Without
+    has_detail they serve for touches alone."""
     both = concatenate_polygons([left.arrays, right.arrays])
     n, shifted = len(both.polygon_offsets) - 1, pairs + np.array([0, len(left)])
     following, sides = _sides(both, limits)
     firsts = both.ring_offsets[both.polygon_offsets]
     pool = OutlineArrays(both.vertices, read_only(following), read_only(sides), read_only(firsts))
     relations, none = np.full(len(pairs), UNSETTLED, np.int8), np.zeros((0, 3), np.int32)
-    poses = PoseArrays(np.tile(np.eye(2), (n, 1, 1)), np.zeros((n, 2)), True)
+    poses, bodies = PoseArrays(np.tile(np.eye(2), (n, 1, 1)), np.zeros((n, 2)), True), np.arange(n)
     with limits.budget() as budget:
 
         def task(start: int, stop: int) -> None:
             some, codes = shifted[start:stop], relations[start:stop]
-            entry_of(relate_outline_pairs)(pool, np.arange(n), poses, some, False, True, codes, none, budget.flag)
+            entry_of(relate_outline_pairs)(pool, bodies, poses, some, False, has_detail, codes, none, budget.flag)
             budget.check()
 
         run_chunks(task, len(pairs), budget=budget, workers=limits.workers)

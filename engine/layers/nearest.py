@@ -15,8 +15,8 @@ import numpy as np
 
 from engine.arrangement.simple_rings import BLOCK, after, next_leaf
 from engine.compiling.jit import allocating_kernel, called, entry_of, inline
+from engine.layers.limits import Limits
 from engine.layers.relate import matrices
-from engine.layers.rows import Limits
 from engine.layers.shapes import Shape, Shapes, pairs_between, shape_of
 from engine.predicates.rational import common_integers, nearest_with_root
 from engine.predicates.vectors import as_point2
@@ -226,9 +226,10 @@ def _list_near(left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: 
 
 @called
 def _scan(own: Shape, their: Shape, reach: float, rows: FloatArray, n: int, state: FloatArray) -> int:
-    """Update the state by the distances within `reach` of vertices of one feature from edges of another; or, where
-    there are rows, put those there from row n on, and return the number of all. A vertex and the end of an edge are a row
-    with that end twice, the lower of the two points first."""
+    """Update the state by the distances within `reach` of vertices of one feature from edges of another.
+
+    rows: where there are any, the same is put there from row n on instead, and the number of all returned. A vertex and
+    the end of an edge are a row with that end twice, the lower of the two points first."""
     leaves, m, is_list = len(their.boxes) // 2, len(their.following), len(rows) > 0
     for vertex in range(len(own.following)):
         p = as_point2(own.points, vertex)

@@ -14,19 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
+from engine.errors import UnsupportedSolidError
 from engine.layers.joins import related_pairs
-from engine.layers.rows import (
-    HOWS,
-    NONE,
-    Layer,
-    LayerRows,
-    Limits,
-    check_how,
-    concatenate_rows,
-    unite,
-)
+from engine.layers.limits import Limits
+from engine.layers.rows import HOWS, NONE, Layer, LayerRows, check_how, concatenate_rows, dissolve_rows, unite
 from engine.layers.rows import overlay_rows as overlay_areas
-from engine.layers.shapes import LINE, POINT, MixedLayer, Paths, no_areas, no_paths
+from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
 from engine.polygon_overlay.touching import Place, Touching, concatenate_touching, join_edges
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -281,7 +274,20 @@ def _between(inside: _Intervals, segments: FloatArray) -> _Intervals:
     return _Intervals(np.zeros(len(segment), np.int64), segment, *made)
 
 
-def dissolve_paths(paths: Paths, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
+def dissolve_mixed(
+    layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False
+) -> LayerRows:
+    """Return one row for each group, the union of its features, all of one dimension; is_coverage: as `dissolve_rows`.
+    Raises: UnsupportedSolidError for a layer of several dimensions."""
+    kinds = np.setdiff1d(layer.dims, [-1])
+    if len(kinds) > 1:
+        raise UnsupportedSolidError("layer has features of several dimensions; dissolve each alone", ("layer",))
+    if len(kinds) and kinds[0] < AREA:
+        return _dissolve_paths(layer.paths, groups, n_groups, limits)
+    return dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage)
+
+
+def _dissolve_paths(paths: Paths, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
     """Return one row for each group, the union of its points or of its lines: points once each; of lines the stretches
     that lie on one another once. Lines that cross get no vertex there, which rounding would put beside them."""
     path, features = paths.owners()

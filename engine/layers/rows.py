@@ -7,7 +7,6 @@ left layer, then of the right.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -16,9 +15,10 @@ from typing import Any, Final, cast
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
-from engine.errors import InvalidOperationError, NotRepresentableError
+from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
+from engine.layers.limits import Limits
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
-from engine.polygon_overlay.grid import grid_of
+from engine.polygon_overlay.coverage import union_of_coverage
 from engine.polygon_overlay.overlay import less_all, overlay, union_all
 from engine.polygon_overlay.pair_arrays import (
     PolygonArrays,
@@ -30,13 +30,13 @@ from engine.polygon_overlay.pair_arrays import (
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, concatenate_touching, touching
-from engine.running.budget import Budget, Cancel, polled
+from engine.running.budget import polled
 from engine.scenes.locate_scene import locate_scene
 from engine.solids.accepted import PointsLike
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import closed_rings, summed
-from engine.types import Accuracy, BoolArray, FloatArray, IntArray
+from engine.types import BoolArray, FloatArray, IntArray
 
 HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
     "intersection": (True, False, False),
@@ -101,45 +101,6 @@ class LayerRows:
         """Coordinates and offsets of rings, polygons and rows, rings closed: for shapely.from_ragged_array."""
         positions, offsets = closed_rings(self.vertices, self.ring_offsets)
         return positions, (offsets, self.piece_offsets, self.row_offsets)
-
-
-class Limits:
-    """Remaining time of one public call for the calls of which it consists, and the sum of their accuracy reports;
-    grid: the spacing to which areas are snapped, None for no grid."""
-
-    def __init__(
-        self, deadline: float | None, cancel: Cancel | None, workers: int | None = None, grid: float | None = None
-    ) -> None:
-        if grid is not None:
-            grid_of(grid)  # checks it
-        self.grid = grid
-        seconds = Budget(deadline, cancel).deadline  # checks both
-        self._end = None if seconds is None else time.monotonic() + seconds
-        self._cancel, self.workers = cancel, workers
-        self._ulps, self._counts = 0.5, [0, 0, 0]
-
-    def options(self) -> dict[str, Any]:
-        """Return the keyword arguments deadline, cancel, workers and report for the next call."""
-        left = None if self._end is None else self._end - time.monotonic()
-        return {"deadline": left, "cancel": self._cancel, "workers": self.workers, "report": True}
-
-    def budget(self) -> Budget:
-        """Return a budget of the remaining time."""
-        return Budget(self.options()["deadline"], self._cancel)
-
-    def record(self, answer: tuple[Any, Accuracy]) -> Any:
-        """Add the accuracy of an answer (result, accuracy) to the sum; return the result."""
-        result, accuracy = answer
-        self._ulps = max(self._ulps, accuracy.coordinates_ulp or 0.0)
-        report = accuracy.n_items, accuracy.n_beyond_filter, accuracy.n_rational
-        self._counts = [count + more for count, more in zip(self._counts, report)]
-        return result
-
-    @property
-    def accuracy(self) -> Accuracy:
-        """Accuracy of all calls together; items are edges."""
-        n_items, n_beyond, n_rational = self._counts
-        return Accuracy("exact", self._ulps, n_items, n_beyond, n_rational, "arrangement")
 
 
 def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touching: bool = False) -> LayerRows:
@@ -364,13 +325,40 @@ def concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
     )  # fmt: skip
 
 
-def dissolve_rows(layer: Layer, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
-    """Return one row for each group, the union of its features; groups: group of each feature, -1 for none."""
+def dissolve_rows(
+    layer: Layer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False
+) -> LayerRows:
+    """Return one row for each group, the union of its features; groups: group of each feature, -1 for none.
+    is_coverage: features of a group must not overlap."""
     order = np.argsort(groups, kind="stable")
     ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
+    if is_coverage:
+        parts = [_joined_coverage(layer, order[start:stop], limits) for start, stop in pairwise(ends)]
+        return _rows_of(parts, np.arange(n_groups))
     members = (list(PolygonSelection(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
     unions = [limits.record(union_all(some, grid=limits.grid, **limits.options())) for some in members]
     return _rows_of(unions, np.arange(n_groups))
+
+
+def _joined_coverage(layer: Layer, members: IntArray, limits: Limits) -> Overlay:
+    """Return the union of features that do not overlap. Raises: InvalidInputError that names two that do."""
+    members = members[layer.arrays.sizes()[members] > 0]
+    some = layer.arrays.take(members)
+    with limits.budget() as budget:
+        made = union_of_coverage(some, budget, is_claimed=True) if len(members) and limits.grid is None else None
+        if made is not None:
+            return made[0]
+        low, high = some.boxes(np.arange(len(members)))
+        for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+            budget.check()
+            if len(clash := np.flatnonzero(_pairs_overlap(some, pairs, limits))):
+                i, j = pairs[clash[0]].tolist()
+                x, y = overlay(some.polygon(i), some.polygon(j), "intersection").vertices[0].tolist()
+                what = f"features {members[i]} and {members[j]} overlap at ({x!r}, {y!r})"
+                raise InvalidInputError(f"coverage: {what}; correct them, or leave coverage out", ("coverage",))
+        budget.check()
+    polygons = list(PolygonSelection(some, np.arange(len(members))))
+    return cast(Overlay, limits.record(union_all(polygons, grid=limits.grid, **limits.options())))
 
 
 def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:

@@ -11,7 +11,8 @@ from engine.arrangement.simple_rings import BLOCK, fill_tree
 from engine.bounding.box_grid import pairs_of_boxes
 from engine.compiling.jit import allocating, allocating_kernel, entry_of
 from engine.errors import NotRepresentableError
-from engine.layers.rows import Layer, Limits
+from engine.layers.limits import Limits
+from engine.layers.rows import Layer
 from engine.polygon_overlay.pair_arrays import PolygonArrays, concatenate_polygons
 from engine.predicates.rational import exponent_of, shifted
 from engine.solids.ragged import next_in_rings, summed
@@ -145,11 +146,13 @@ def in_range(left: Shapes, right: Shapes) -> tuple[Shapes, Shapes]:
     if not ((sizes >= _LARGEST) | ((sizes <= _SMALLEST) & (sizes > 0.0))).any():
         return left, right
     exponent = -exponent_of(both)
-    moved = [shifted(each, exponent) for shape in (left, right) for each in (shape.vertices, shape.ends, shape.boxes)]
+    moved: list[Any] = [
+        shifted(each, exponent) for shape in (left, right) for each in (shape.vertices, shape.ends, shape.boxes)
+    ]
     if any(each is None for each in moved):
         raise NotRepresentableError("coordinates of the layers span more than 2^960; leave the outliers out", ())
     a, b, c, d, e, f = moved
-    return left._replace(vertices=a, ends=b, boxes=c), right._replace(vertices=d, ends=e, boxes=f)
+    return left._replace(vertices=a, ends=b, boxes=c.copy()), right._replace(vertices=d, ends=e, boxes=f.copy())
 
 
 def boxes_of(shapes: Shapes) -> tuple[FloatArray, FloatArray, IntArray]:

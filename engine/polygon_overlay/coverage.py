@@ -33,21 +33,21 @@ _SAMPLE: Final = 31
 """Bits that are 0 in the hashes of sampled edges: one of 32."""
 
 
-def union_of_coverage(polygons: PolygonArrays, budget: Budget) -> tuple[Overlay, int] | None:
-    """Return the union and the number of pairs of edges decided exactly; None if few edges are shared, the edges of one
-    polygon do not only meet in vertices between consecutive ones, or polygons overlap."""
+def union_of_coverage(polygons: PolygonArrays, budget: Budget, is_claimed: bool = False) -> tuple[Overlay, int] | None:
+    """Return the union and the number of pairs of edges decided exactly; None if few edges are shared (is_claimed: none
+    is too few), the edges of one polygon do not only meet in vertices between consecutive ones, or polygons overlap."""
     vertices, n = polygons.vertices, len(polygons.vertices)
-    if n < _LEAST or len(polygons.polygon_offsets) < 3:
+    if not n or (not is_claimed and (n < _LEAST or len(polygons.polygon_offsets) < 3)):
         return None
     places, starts = vertices.view(np.int64), np.arange(n, dtype=np.int32)
     ends = next_in_rings(polygons.ring_offsets).astype(np.int32)
     table, state = np.empty(2 << (n - 1).bit_length(), np.int32), np.zeros(n, np.int8)
     cancel = entry_of(cancel_edges)
     n_seen, n_cancelled = cancel(places, starts, ends, _SAMPLE, table, state, budget.flag)
-    if 2 * n_cancelled < n_seen:
+    if 2 * n_cancelled < n_seen and not is_claimed:
         return None
     following, sides = np.empty(n, np.int64), np.zeros(n, np.int8)
-    n_known = entry_of(find_rings)(vertices, *polygons[1:], _MOST, following, sides, budget.flag)
+    n_known = entry_of(find_rings)(vertices, *polygons[1:], n if is_claimed else _MOST, following, sides, budget.flag)
     budget.check()
     if n_known < np.count_nonzero(np.diff(polygons.polygon_offsets)):
         return None

@@ -51,8 +51,9 @@ def from_features(layer: Any, accuracy: engine.Accuracy, call: Call) -> LayersRe
 
 def _geometry(layer: Any, row: int, call: Call) -> bytes:
     """Return the geometry of a feature, of any number of parts and rings."""
-    if layer.areas is None:
-        return bytes(layer.geometry(row))
+    given = layer.geometry(row)
+    if given is not None or layer.areas is None:
+        return bytes(given or b"null")
     positions, (rings, pieces, ends) = layer.areas
     first, last = ends[row : row + 2].tolist()
 

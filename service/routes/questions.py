@@ -24,7 +24,9 @@ from service.schemas.clipping import (
     ClipPolygonsResponse,
     ClipSegmentsRequest,
     ClipSegmentsResponse,
+    LayersClipRequest,
     LayersContainsRequest,
+    LayersJoinRequest,
     LayersOverlayRequest,
     LayersResponse,
     LayersUnionRequest,
@@ -220,14 +222,32 @@ _AS: Final[dict[str, Any]] = {"response_class": GeoJson, "response_model": Layer
 @router.post("/v1/layers/overlay", operation_id="overlay_layers", tags=["layers"], **_AS)
 def overlay_layers(question: LayersOverlayRequest, call: CallOf) -> LayersResponse:
     """Overlay two layers, every feature with every one that it meets; attributes of both are kept."""
-    result = call.compute(engine.layers.overlay_features, question.left, question.right, question.operation)
+    sides = question.left, question.right
+    result = call.compute(engine.layers.overlay_features, *sides, question.operation, grid=question.grid)
     return areas.from_features(*result, call)
 
 
 @router.post("/v1/layers/union", operation_id="unite_layer", tags=["layers"], **_AS)
 def unite_layer(question: LayersUnionRequest, call: CallOf) -> LayersResponse:
     """Unite the features of a layer, all or those that agree in some properties."""
-    return areas.from_features(*call.compute(engine.layers.dissolve_features, question.layer, question.by), call)
+    options: dict[str, Any] = {"grid": question.grid, "coverage": bool(question.coverage)}
+    result = call.compute(engine.layers.dissolve_features, question.layer, question.by, **options)
+    return areas.from_features(*result, call)
+
+
+@router.post("/v1/layers/clip", operation_id="clip_layer", tags=["layers"], **_AS)
+def clip_layer(question: LayersClipRequest, call: CallOf) -> LayersResponse:
+    """Cut the features of a layer to the union of some polygons."""
+    result = call.compute(engine.layers.clip_features, question.layer, question.mask, grid=question.grid)
+    return areas.from_features(*result, call)
+
+
+@router.post("/v1/layers/join", operation_id="join_layers", tags=["layers"], **_AS)
+def join_layers(question: LayersJoinRequest, call: CallOf) -> LayersResponse:
+    """Join features to those that they have a relation to: a row for each such pair."""
+    options: dict[str, Any] = {"distance": question.distance, "outside": bool(question.outside)}
+    result = call.compute(engine.layers.join_features, question.left, question.right, question.predicate, **options)
+    return areas.from_features(*result, call)
 
 
 @router.post("/v1/layers/contains", operation_id="locate_in_layer", tags=["layers"], **_AS)

@@ -265,6 +265,8 @@ _PARCELS = _collection(
 )
 _FLOODS = _collection(_square(1, 2, properties={"year": 1962}))
 _POINT = {"type": "Feature", "properties": {"well": 7}, "geometry": {"type": "Point", "coordinates": [2, 2]}}
+_ANY = "A FeatureCollection of points, lines and polygons, in the plane; null geometries are welcome."
+_GRID = "Snap polygons to multiples of this power of two or ten."
 _AREAS = "A FeatureCollection of Polygon and MultiPolygon, in the plane; null geometries are welcome."
 
 
@@ -273,12 +275,13 @@ class LayersOverlayRequest(Schema):
 
     model_config = with_example({"left": _PARCELS, "right": _FLOODS, "operation": "intersection"})
 
-    left: FeatureCollection = Field(description=_AREAS)
+    left: FeatureCollection = Field(description=_ANY)
     right: FeatureCollection = Field(description=_AREAS)
     operation: Literal["intersection", "union", "identity", "difference", "symmetric_difference"] = Field(
         description="intersection: a row for each pair with common area; difference: what is left of each feature of "
         "the left; identity: both; symmetric_difference: what is left of either; union: all of these."
     )
+    grid: Number = optional(_GRID)
 
 
 class LayersUnionRequest(Schema):
@@ -286,10 +289,37 @@ class LayersUnionRequest(Schema):
 
     model_config = with_example({"layer": _PARCELS, "by": ["owner"]})
 
-    layer: FeatureCollection = Field(description=_AREAS)
+    layer: FeatureCollection = Field(description="A FeatureCollection of polygons, of lines, or of points.")
     by: Annotated[list[str], AtMost("max_operands")] = optional(
         "Names of properties: features are united that have the same values of these; all, if left out."
     )
+    grid: Number = optional(_GRID)
+    coverage: bool = optional("The polygons do not overlap: verified, an overlap is refused with its place.")
+
+
+class LayersClipRequest(Schema):
+    """What of these features lies in a region?"""
+
+    model_config = with_example({"layer": _collection(_POINT), "mask": _PARCELS})
+
+    layer: FeatureCollection = Field(description=_ANY)
+    mask: FeatureCollection = Field(description="The region, the union of polygons: a FeatureCollection of these.")
+    grid: Number = optional(_GRID)
+
+
+class LayersJoinRequest(Schema):
+    """Which features of two layers are related?"""
+
+    model_config = with_example({"left": _collection(_POINT), "right": _PARCELS, "predicate": "within"})
+
+    left: FeatureCollection = Field(description=_ANY)
+    right: FeatureCollection = Field(description=_ANY)
+    predicate: Literal[
+        "intersects", "within", "contains", "touches", "overlaps", "crosses", "covers", "covered_by", "equals",
+        "dwithin",
+    ] = Field(description="The relation of a left feature to a right one, as in OGC Simple Features.")  # fmt: skip
+    distance: Number = optional("With dwithin: the largest distance, which counts.")
+    outside: bool = optional("Also a feature for each of the left that has no such relation.")
 
 
 class LayersContainsRequest(Schema):

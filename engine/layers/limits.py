@@ -1,0 +1,49 @@
+"""What all parts of one call about layers share: time, threads, the grid, and the sum of accuracy reports."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from engine.polygon_overlay.grid import grid_of
+from engine.running.budget import Budget, Cancel
+from engine.types import Accuracy
+
+
+class Limits:
+    """Remaining time of one public call for the calls of which it consists, and the sum of their accuracy reports;
+    grid: the spacing to which areas are snapped, None for no grid."""
+
+    def __init__(
+        self, deadline: float | None, cancel: Cancel | None, workers: int | None = None, grid: float | None = None
+    ) -> None:
+        if grid is not None:
+            grid_of(grid)  # checks it
+        self.grid = grid
+        seconds = Budget(deadline, cancel).deadline  # checks both
+        self._end = None if seconds is None else time.monotonic() + seconds
+        self._cancel, self.workers = cancel, workers
+        self._ulps, self._counts = 0.5, [0, 0, 0]
+
+    def options(self) -> dict[str, Any]:
+        """Return the keyword arguments deadline, cancel, workers and report for the next call."""
+        left = None if self._end is None else self._end - time.monotonic()
+        return {"deadline": left, "cancel": self._cancel, "workers": self.workers, "report": True}
+
+    def budget(self) -> Budget:
+        """Return a budget of the remaining time."""
+        return Budget(self.options()["deadline"], self._cancel)
+
+    def record(self, answer: tuple[Any, Accuracy]) -> Any:
+        """Add the accuracy of an answer (result, accuracy) to the sum; return the result."""
+        result, accuracy = answer
+        self._ulps = max(self._ulps, accuracy.coordinates_ulp or 0.0)
+        report = accuracy.n_items, accuracy.n_beyond_filter, accuracy.n_rational
+        self._counts = [count + more for count, more in zip(self._counts, report)]
+        return result
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """Accuracy of all calls together; items are edges."""
+        n_items, n_beyond, n_rational = self._counts
+        return Accuracy("exact", self._ulps, n_items, n_beyond, n_rational, "arrangement")
