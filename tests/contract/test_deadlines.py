@@ -150,6 +150,13 @@ WORK: dict[str, Callable[[], Any]] = {
         "points": features([[1 + k / 5_000, 1 + k / 5_000] for k in range(5_000)], "Point"),
         "polygons": features([[[[1e-300, 1e-300], [3, 0], [3, 3]]]] * 1_000),
     },
+    "clip_layer": lambda: {
+        "layer": features([[bar] for bar in stripes(1_200)]), "mask": features([[bar] for bar in across(1_200)])
+    },
+    "join_layers": lambda: {
+        "left": features([[bar] for bar in stripes(1_500)]), "right": features([[bar] for bar in across(1_500)]),
+        "predicate": "overlaps",
+    },
     "overlay_batch": far_apart_batch,
     "put_solid": lambda: prism(comb(1_200)),
     "inspect_solid": lambda: prism(circle(20_000)),

@@ -52,6 +52,8 @@ OPERATIONS = {
     ("post", "/v1/layers/overlay"): "overlay_layers",
     ("post", "/v1/layers/union"): "unite_layer",
     ("post", "/v1/layers/contains"): "locate_in_layer",
+    ("post", "/v1/layers/clip"): "clip_layer",
+    ("post", "/v1/layers/join"): "join_layers",
     ("post", "/v1/clip/segments/scene"): "clip_segments_scene",
     ("post", "/v1/scenes"): "put_scene",
     ("get", "/v1/scenes/{scene_id}"): "get_scene",
@@ -78,7 +80,9 @@ OPERATIONS = {
 
 ANSWERS = {
     "/metrics": "text/plain",
-    **dict.fromkeys(("/v1/layers/overlay", "/v1/layers/union", "/v1/layers/contains"), "application/geo+json"),
+    **dict.fromkeys(
+        [f"/v1/layers/{name}" for name in ("overlay", "union", "contains", "clip", "join")], "application/geo+json"
+    ),
     "/v1/scenes/{scene_id}/binary/contains": "application/octet-stream",
     "/v1/scenes/{scene_id}/binary/clip/segments": "application/octet-stream",
     "/v1/scenes/{scene_id}/binary/distances": "application/octet-stream",

