@@ -279,14 +279,16 @@ def _warm_overlay_rest() -> None:
 
 def _warm_layers() -> None:
     points, square = [[0.5, 0.5], [9.0, 9.0]], [[[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]]
-    kinds = ("MultiPoint", points), ("LineString", points), ("Polygon", square)
+    kinds = ("MultiPoint", points), ("LineString", points), ("Polygon", square), ("Point", [9, 0]), ("Point", [0, 9])
     geometries = [{"type": kind, "coordinates": coordinates} for kind, coordinates in kinds]
-    features = [{"type": "Feature", "geometry": each} for each in geometries]
-    side = collection_of({"type": "FeatureCollection", "features": features}, ("layer",), Limits(None, None), EVERY)
-    layer = mixed_of(side, Limits(None, None))
-    related_pairs(layer, layer, "within", 0.0, Limits(None, None))
-    nearest_features(layer, layer, np.inf, True, Limits(None, None))
-    related_pairs(layer, layer, "dwithin", 0.25, Limits(None, None))
+    features, limits = [{"type": "Feature", "geometry": each} for each in geometries], Limits(None, None)
+    layer, others = (
+        mixed_of(collection_of({"type": "FeatureCollection", "features": some}, ("layer",), limits, EVERY), limits)
+        for some in (features, features[3:])
+    )
+    related_pairs(layer, layer, "within", 0.0, limits)
+    related_pairs(layer, layer, "dwithin", 0.25, limits)
+    nearest_features(layer, others, np.inf, False, limits)  # two are as near as each other
 
 
 def _warm_distances() -> None:

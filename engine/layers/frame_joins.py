@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from engine.distance.clearance import checked_distance
 from engine.errors import InvalidInputError, InvalidOperationError
 from engine.layers.frame_reading import check_frames, geopandas_and_shapely, mixed_of
-from engine.layers.joins import check_predicate, checked_reach, nearest_features, related_pairs
+from engine.layers.joins import check_predicate, nearest_features, related_pairs
 from engine.layers.limits import Limits
 from engine.layers.rows import NONE
 from engine.running.budget import Cancel
@@ -163,7 +164,7 @@ def sjoin_nearest(
     """
     _check("sjoin_nearest", left, right, how, lsuffix, rsuffix, others)
     check_options(workers, None, exclusive=exclusive)
-    most = np.inf if max_distance is None else checked_reach(max_distance, "max_distance")
+    most = np.inf if max_distance is None else checked_distance(max_distance, "max_distance")
     if distance_col is not None and not isinstance(distance_col, str):
         raise InvalidInputError(f"distance_col must be a name, got {shown(distance_col)}", ("distance_col",))
     limits = Limits(deadline, cancel, workers)

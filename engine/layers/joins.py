@@ -16,6 +16,7 @@ from engine.collision.codes import UNSETTLED
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.outline_batch import OutlineArrays, relate_outline_pairs
 from engine.compiling.jit import entry_of
+from engine.distance.clearance import checked_distance
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
 from engine.layers.limits import Limits
 from engine.layers.nearest import are_within, meets, nearest_pairs
@@ -41,7 +42,7 @@ _OF_POINTS: Final = {"intersects": (True, True), "covered_by": (True, True), "wi
 """Whether a predicate holds for a point inside a polygon, and for one on its boundary; of others for neither."""
 
 
-def check_predicate(predicate: object, distance: object) -> float:
+def check_predicate(predicate: object, distance: float | None) -> float:
     """Raise for an unknown predicate, or a distance that does not fit to it; return the distance, 0.0 for none."""
     names = (*PREDICATES, "dwithin")
     if not isinstance(predicate, str) or predicate not in names:
@@ -50,15 +51,7 @@ def check_predicate(predicate: object, distance: object) -> float:
         )
     if (predicate == "dwithin") != (distance is not None):
         raise InvalidInputError("distance belongs to predicate dwithin, which needs it", ("distance",))
-    return 0.0 if distance is None else checked_reach(distance, "distance")
-
-
-def checked_reach(distance: Any, name: str) -> float:
-    """Return a distance as a float. Raises: InvalidInputError unless it is a finite number from 0."""
-    is_number = isinstance(distance, (int, float, np.number)) and not isinstance(distance, bool)
-    if not is_number or not 0.0 <= float(distance) < np.inf:
-        raise InvalidInputError(f"{name} must be a number from 0, got {shown(distance)}", (name,))
-    return float(distance)
+    return 0.0 if distance is None else checked_distance(distance, "distance")
 
 
 def related_pairs(left: MixedLayer, right: MixedLayer, predicate: str, distance: float, limits: Limits) -> IntArray:

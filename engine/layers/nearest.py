@@ -3,6 +3,8 @@
 The distance of two features that do not meet is that of a vertex of one and an edge of the other. In doubles it is off
 by less than 32 u (|p - a| + |b - a|) for a vertex p and an edge ab: differences carry u each, the cross product 4 u of
 both products, and a foot that is taken for an end, or the reverse, moves it by the error of its place, 6 u |p - a|.
+
+Source: C. Ericson, Real-Time Collision Detection, 2005, 5.1.
 """
 
 from __future__ import annotations

@@ -273,7 +273,7 @@ _AREAS = "A FeatureCollection of Polygon and MultiPolygon, in the plane; null ge
 class LayersOverlayRequest(Schema):
     """What do these two layers have in common, or not: every feature with every one that it meets?"""
 
-    model_config = with_example({"left": _PARCELS, "right": _FLOODS, "operation": "intersection"})
+    model_config = with_example({"left": _PARCELS, "right": _FLOODS, "operation": "intersection", "grid": 0.001})
 
     left: FeatureCollection = Field(description=_ANY)
     right: FeatureCollection = Field(description=_AREAS)
@@ -287,7 +287,7 @@ class LayersOverlayRequest(Schema):
 class LayersUnionRequest(Schema):
     """What do the features of a layer cover together?"""
 
-    model_config = with_example({"layer": _PARCELS, "by": ["owner"]})
+    model_config = with_example({"layer": _PARCELS, "by": ["owner"], "grid": 0.001, "coverage": True})
 
     layer: FeatureCollection = Field(description="A FeatureCollection of polygons, of lines, or of points.")
     by: Annotated[list[str], AtMost("max_operands")] = optional(
@@ -300,7 +300,7 @@ class LayersUnionRequest(Schema):
 class LayersClipRequest(Schema):
     """What of these features lies in a region?"""
 
-    model_config = with_example({"layer": _collection(_POINT), "mask": _PARCELS})
+    model_config = with_example({"layer": _collection(_POINT), "mask": _PARCELS, "grid": 0.001})
 
     layer: FeatureCollection = Field(description=_ANY)
     mask: FeatureCollection = Field(description="The region, the union of polygons: a FeatureCollection of these.")
@@ -310,7 +310,9 @@ class LayersClipRequest(Schema):
 class LayersJoinRequest(Schema):
     """Which features of two layers are related?"""
 
-    model_config = with_example({"left": _collection(_POINT), "right": _PARCELS, "predicate": "within"})
+    model_config = with_example(
+        {"left": _collection(_POINT), "right": _PARCELS, "predicate": "dwithin", "distance": 1.5, "outside": True}
+    )
 
     left: FeatureCollection = Field(description=_ANY)
     right: FeatureCollection = Field(description=_ANY)
