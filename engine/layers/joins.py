@@ -161,7 +161,7 @@ def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
         return layer
     places = np.arange(len(sizes))
     places[wrong] = len(sizes) + np.arange(len(wrong))
-    united = [unite(PolygonSelection(arrays, wrong[k : k + 1]), limits) for k in range(len(wrong))]
+    united = [unite([arrays.polygon(k)], limits) for k in wrong.tolist()]
     return layer._replace(areas=replace(layer.areas, arrays=concatenate_polygons([arrays, *united]).take(places)))
 
 

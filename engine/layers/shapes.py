@@ -14,7 +14,7 @@ from engine.errors import NotRepresentableError
 from engine.layers.limits import Limits
 from engine.layers.rows import Layer
 from engine.polygon_overlay.pair_arrays import PolygonArrays, concatenate_polygons
-from engine.predicates.rational import exponent_of, shifted
+from engine.predicates.rational import exponent_above, shifted
 from engine.solids.ragged import next_in_rings, summed
 from engine.types import FlagArray, FloatArray, Int8Array, IntArray, read_only
 
@@ -54,7 +54,7 @@ class MixedLayer(NamedTuple):
         return np.where(self.areas.arrays.sizes() > 0, AREA, self.paths.dims).astype(np.int8)
 
 
-Shapes = namedtuple("Shapes", "dims vertices following firsts ends end_firsts boxes box_firsts")
+Shapes = namedtuple("Shapes", "dims vertices following firsts ends end_firsts boxes box_firsts sizes")
 """Features as edges.
 
 | field | shape | meaning |
@@ -65,6 +65,7 @@ Shapes = namedtuple("Shapes", "dims vertices following firsts ends end_firsts bo
 | firsts | (n + 1,) | first vertex of each feature |
 | ends, end_firsts | (k, 2), (n + 1,) | boundary points of each line (ends of an odd number of its paths), sorted |
 | boxes, box_firsts | | trees over the edges of features (simple_rings.py) |
+| sizes | (2,) | least and largest magnitude of coordinates that are not 0; infinity and 0 if there are none |
 """
 Shape = namedtuple("Shape", "dim points following ends boxes")
 """One feature of `Shapes`."""
@@ -104,7 +105,8 @@ def shapes_of(layer: MixedLayer, limits: Limits) -> Shapes:
     box_firsts = summed(2 * leaves)
     limits.budget().take(8 * (4 * int(box_firsts[-1]) + 3 * len(vertices)))
     boxes = np.empty((box_firsts[-1], 4))
-    made = Shapes(dims, read_only(vertices), read_only(following), firsts, ends, end_firsts, boxes, box_firsts)
+    trees = boxes, box_firsts, np.array([np.inf, 0.0])
+    made = Shapes(dims, read_only(vertices), read_only(following), firsts, ends, end_firsts, *trees)
     with limits.budget() as budget:
         entry_of(_build_trees)(made, budget.flag)
         budget.check()
@@ -130,7 +132,13 @@ def _ends(
 
 @allocating_kernel
 def _build_trees(shapes: Shapes, flag: FlagArray) -> None:
-    """Fill the boxes of all features."""
+    """Fill the boxes and sizes of all features."""
+    least, most = np.inf, 0.0
+    for vertex in range(len(shapes.vertices)):
+        for k in range(2):
+            size = abs(shapes.vertices[vertex, k])
+            least, most = min(least, size if size > 0.0 else np.inf), max(most, size)
+    shapes.sizes[0], shapes.sizes[1] = least, most
     for k in range(len(shapes.firsts) - 1):
         if flag[0] != 0:
             return
@@ -141,15 +149,14 @@ def _build_trees(shapes: Shapes, flag: FlagArray) -> None:
 def in_range(left: Shapes, right: Shapes) -> tuple[Shapes, Shapes]:
     """Return two layers scaled by one power of two, so that exact signs are in range. Raises: NotRepresentableError if
     there is no such power."""
-    both = np.concatenate([left.vertices.ravel(), right.vertices.ravel()])
-    sizes = np.abs(both)
-    if not ((sizes >= _LARGEST) | ((sizes <= _SMALLEST) & (sizes > 0.0))).any():
+    least, most = min(left.sizes[0], right.sizes[0]), max(left.sizes[1], right.sizes[1])
+    if least > _SMALLEST and most < _LARGEST:
         return left, right
-    exponent = -exponent_of(both)
+    exponent = -exponent_above(float(most))
     moved: list[Any] = [
         shifted(each, exponent) for shape in (left, right) for each in (shape.vertices, shape.ends, shape.boxes)
     ]
-    if any(each is None for each in moved):
+    if any(each is None for each in moved) or np.ldexp(least, exponent) <= _SMALLEST:
         raise NotRepresentableError("coordinates of the layers span more than 2^960; leave the outliers out", ())
     a, b, c, d, e, f = moved
     return left._replace(vertices=a, ends=b, boxes=c.copy()), right._replace(vertices=d, ends=e, boxes=f.copy())
