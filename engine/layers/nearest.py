@@ -141,14 +141,14 @@ def root_of(square: Fraction) -> float:
 
 def _square(left: Shapes, right: Shapes, pair: IntArray, reach: float, limits: Limits) -> Fraction:
     """Return the exact square of the distance of a pair that is at most `reach`, and does not meet."""
-    i, j = pair.tolist()
-    rows = np.empty((64, 6))
-    while True:  # bound: the second turn has room
-        n = entry_of(_list_near)(left, right, i, j, reach, rows)
-        if n <= len(rows):
-            break
-        rows = np.empty((n, 6))
-    limits.budget().check()
+    (i, j), rows = pair.tolist(), np.empty((64, 6))
+    with limits.budget() as budget:
+        while True:  # bound: the second turn has room
+            n = entry_of(_list_near)(left, right, i, j, reach, rows, budget.flag)
+            budget.check()
+            if n <= len(rows):
+                break
+            rows = np.empty((n, 6))
     return min(map(_exact_square, set(map(tuple, rows[:n].tolist()))))
 
 
@@ -211,8 +211,8 @@ def _measure(
             return
         own, their = shape_of(left, pairs[item, 0]), shape_of(right, pairs[item, 1])
         state[:_ROW], state[_ROW:] = 0.0, np.inf
-        _scan(own, their, reaches[item], none, 0, state)
-        _scan(their, own, reaches[item], none, 0, state)
+        _scan(own, their, reaches[item], none, 0, state, flag)
+        _scan(their, own, reaches[item], none, 0, state, flag)
         low[item], high[item] = min(state[_LOW], state[_RIVAL]), state[_HIGH]
         is_alone[item] = state[_RIVAL] > state[_HIGH]
         for k in range(_ROW):
@@ -220,20 +220,22 @@ def _measure(
 
 
 @allocating_kernel
-def _list_near(left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: FloatArray) -> int:
+def _list_near(left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: FloatArray, flag: FlagArray) -> int:
     """Fill rows (n, 6) with vertices and edges (x, y, x, y, x, y) that may be within `reach`; return their number."""
     own, their, state = shape_of(left, i), shape_of(right, j), np.full(_N_STATE, np.inf)
-    return _scan(their, own, reach, rows, _scan(own, their, reach, rows, 0, state), state)
+    return _scan(their, own, reach, rows, _scan(own, their, reach, rows, 0, state, flag), state, flag)
 
 
 @called
-def _scan(own: Shape, their: Shape, reach: float, rows: FloatArray, n: int, state: FloatArray) -> int:
+def _scan(own: Shape, their: Shape, reach: float, rows: FloatArray, n: int, state: FloatArray, flag: FlagArray) -> int:
     """Update the state by the distances within `reach` of vertices of one feature from edges of another.
 
     rows: where there are any, the same is put there from row n on instead, and the number of all returned. A vertex and
     the end of an edge are a row with that end twice, the lower of the two points first."""
     leaves, m, is_list = len(their.boxes) // 2, len(their.following), len(rows) > 0
     for vertex in range(len(own.following)):
+        if flag[0] != 0:
+            return 0
         p = as_point2(own.points, vertex)
         near = _grown(min(reach, state[_HIGH]), p)
         leaf = next_leaf(their.boxes, 1, p.x - near, p.y - near, p.x + near, p.y + near)

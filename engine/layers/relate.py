@@ -91,13 +91,13 @@ def _relate_pairs(
         if flag[0] != 0:
             return
         own, their = shape_of(left, pairs[item, 0]), shape_of(right, pairs[item, 1])
-        bits[item] = _relate(own, their, is_any, room)
+        bits[item] = _relate(own, their, is_any, room, flag)
 
 
 @called
-def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray) -> int:
+def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: FlagArray) -> int:
     """Return the bits of two features; is_any, room: as `_half`."""
-    bits = _half(own, their, is_any, room)
+    bits = _half(own, their, is_any, room, flag)
     if is_any:
         if bits == 0 and their.dim == AREA and _has_path_inside(own, their):
             bits = II
@@ -107,16 +107,18 @@ def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray) -> int:
     bits |= _of_ends(own, their)
     if own.dim != their.dim:
         return bits | EI | EB
-    back = _half(their, own, is_any, room) | _of_ends(their, own)
+    back = _half(their, own, is_any, room, flag) | _of_ends(their, own)
     return bits | (EI if back & IE else 0) | (EB if back & BE else 0)
 
 
 @called
-def _half(own: Shape, their: Shape, is_any: bool, room: FloatArray) -> int:
+def _half(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: FlagArray) -> int:
     """Return the bits of the edges of one feature to another: all but BE, EI, EB, and those of its ends that meet
-    nothing. is_any: end at the first contact. room: marks on one edge, rows x, y, step."""
+    nothing. is_any: end at the first contact. room: marks on one edge, rows x, y, step. Ends early if flag is set."""
     bits, state, leaves, m = 0, _UNKNOWN, len(their.boxes) // 2, len(their.following)
     for edge in range(len(own.following)):
+        if flag[0] != 0:
+            return bits
         a, b, n_marks = as_point2(own.points, edge), as_point2(own.points, own.following[edge]), 0
         left, bottom, right, top = min(a.x, b.x), min(a.y, b.y), max(a.x, b.x), max(a.y, b.y)
         leaf = next_leaf(their.boxes, 1, left, bottom, right, top)

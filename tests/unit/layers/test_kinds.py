@@ -213,6 +213,14 @@ def test_what_a_join_does_not_take_is_named() -> None:
             layers.sjoin_nearest(some, some, **options)  # type: ignore[arg-type]
 
 
+def test_a_deadline_ends_one_pair_of_long_lines() -> None:
+    x = np.arange(40_000)
+    zigzags = np.c_[x % 2 * 1000.0, x * 0.01], np.c_[x * 0.015, x % 2 * 400.0 + 0.003]
+    sides = [geopandas.GeoDataFrame(geometry=[shapely.LineString(at)]) for at in zigzags]
+    with pytest.raises(engine.DeadlineExceededError):
+        layers.sjoin(*sides, predicate="overlaps", deadline=0.3)
+
+
 def test_features_of_geojson() -> None:
     layer, mask = frame(6, 8, "a"), frame(3, 8, "b", (2,))
     texts: Any = [each[each.geometry.notna()].__geo_interface__ for each in (layer, mask)]
