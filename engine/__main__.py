@@ -14,23 +14,15 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
-import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
 
 from engine.collision.collide_poses import collide_poses
-from engine.compiling.kernel_cache import cache_folder, check_owner, seal, seed
 from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
 from engine.distance.distances import Distances, distances
@@ -50,7 +42,6 @@ from engine.layers.features import dissolve_features, locate_features, overlay_f
 from engine.layers.relate import PREDICATES
 from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
-from engine.running.parallel import Progress
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.hits import HitKind, hits
 from engine.solid_cutting.cut import cut
@@ -59,9 +50,8 @@ from engine.solid_cutting.section import section
 from engine.solids.bounds import bounds
 from engine.types import Location, Relation
 from engine.version import __version__
-from engine.warmup import GROUPS, OPERATIONS, warm
-
-Options = argparse.Namespace
+from engine.warm_command import Options, progress_bar, warm_kernels
+from engine.warmup import OPERATIONS, warm
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -99,7 +89,7 @@ def _note(options: Options) -> Callable[[str], None] | None:
 def _contains(options: Options) -> None:
     solid = read_solid(options.solid, _note(options))
     points = read_rows(options.points, (solid.dimension,))
-    with _bar(len(points), "points", options) as progress:
+    with progress_bar(len(points), "points", options) as progress:
         answer = locate(points, solid, progress=progress, deadline=options.deadline)
     _write_labels(options, "location", [Location(code).name.lower() for code in (0, 1, -1)], answer)
 
@@ -120,14 +110,14 @@ def _posed_pair(options: Options) -> tuple[Any, ...]:
 
 def _collide(options: Options) -> None:
     pair = _posed_pair(options)
-    with _bar(len(pair[2]), "poses", options) as progress:
+    with progress_bar(len(pair[2]), "poses", options) as progress:
         answer: Any = collide_poses(*pair, progress=progress, deadline=options.deadline)
     _write_labels(options, "relation", [each.label for each in Relation], answer)
 
 
 def _clearance(options: Options) -> None:
     pair = _posed_pair(options)
-    with _bar(len(pair[2]), "poses", options) as progress:
+    with progress_bar(len(pair[2]), "poses", options) as progress:
         answer: Any = clearance_poses(*pair, at_least=options.at_least, progress=progress, deadline=options.deadline)
     write_table(options.output, {"distance" if options.at_least is None else "clear": answer})
 
@@ -136,7 +126,7 @@ def _distances(options: Options) -> None:
     solid = read_solid(options.solid, _note(options))
     points = read_rows(options.points, (solid.dimension,))
     asked: Any = {"to": "boundary" if options.boundary else "solid", "signed": options.signed, "within": options.within}
-    with _bar(len(points), "points", options) as progress:
+    with progress_bar(len(points), "points", options) as progress:
         answer: Any = distances(
             points, solid, **asked, nearest=options.nearest, progress=progress, deadline=options.deadline
         )
@@ -153,7 +143,7 @@ def _clip(options: Options) -> None:
         _clip_polygons(region, options)
         return
     segments = read_rows(options.items, (2, region.dimension))
-    with _bar(len(segments), "segments", options) as progress:
+    with progress_bar(len(segments), "segments", options) as progress:
         pieces = clip_segments(segments, region, progress=progress, deadline=options.deadline)
     names = ("source", "start", "end", "t", "faces")
     write_table(options.output, {name: getattr(pieces, name) for name in names})
@@ -162,7 +152,7 @@ def _clip(options: Options) -> None:
 def _hits(options: Options) -> None:
     surface = read_solid(options.surface, _note(options))
     lines = read_rows(options.items, (2, 3))
-    with _bar(len(lines), "lines", options) as progress:
+    with progress_bar(len(lines), "lines", options) as progress:
         answer: Any = hits(
             lines, surface, rays=options.rays, keep=options.keep, progress=progress, deadline=options.deadline
         )
@@ -177,7 +167,7 @@ def _hits(options: Options) -> None:
 
 def _clip_polygons(region: Any, options: Options) -> None:
     polygons = read_solids(options.items, _note(options))
-    with _bar(len(polygons), "polygons", options) as progress:
+    with progress_bar(len(polygons), "polygons", options) as progress:
         clipped = clip_polygons(polygons, region, progress=progress, deadline=options.deadline)
     if clipped.status.any():
         item = int(np.argmax(clipped.status != 0))
@@ -244,7 +234,7 @@ def _volume(options: Options) -> None:
 
 def _section(options: Options) -> None:
     solid = read_solid(options.solid, _note(options))
-    with _bar(len(options.heights), "planes", options) as progress:
+    with progress_bar(len(options.heights), "planes", options) as progress:
         made: Any = section(solid, options.heights, normal=options.normal, progress=progress, deadline=options.deadline)
     rings = np.repeat(np.arange(len(made.ring_offsets) - 1), np.diff(made.ring_offsets))
     pieces = np.repeat(np.arange(len(made.piece_offsets) - 1), np.diff(made.piece_offsets))[rings]
@@ -264,84 +254,6 @@ def _audit(words: Sequence[str]) -> int:
     """Run `benchmarks.audit`, which a wheel has too, and return its exit code."""
     audit = import_module(f"{warm.__module__.removesuffix('engine.warmup')}benchmarks.audit")
     return int((audit.main if "--asked" in words else audit.watched)(words))
-
-
-def _warm(options: Options) -> None:
-    if options.cpu or options.into:
-        _warm_elsewhere(options)
-        return
-    with _bar(100, "%", options) as progress:
-        shown = progress or (_Lines() if not options.quiet else lambda _: None)
-        warm(shown, processes=options.processes, operations=options.operations or None)
-    if not options.quiet:
-        what = f"every kernel of {', '.join(options.operations)}" if options.operations else "every kernel"
-        print(f"{what} is in {cache_folder()}{f' or {seed()}' if seed() else ''}", file=sys.stderr)
-
-
-def _warm_elsewhere(options: Options) -> None:
-    """Run `warm` in new processes, since the compiler reads its CPU and cache folder only once."""
-    processes = "1" if options.into else str(options.processes)
-    command = [sys.executable, "-P", "-m", "exact_geometry", "warm", "--processes", processes]
-    surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "PYTHONHASHSEED": "0"}
-    if options.cpu:
-        surroundings |= {"NUMBA_CPU_NAME": options.cpu, "NUMBA_CPU_FEATURES": ""}
-    with TemporaryDirectory() as temporary:
-        archive = Path(options.into) if options.into and options.into.endswith(".tar.xz") else None
-        folder = Path(options.into) if options.into and archive is None else Path(temporary)
-        if options.into:
-            (archive.parent if archive else folder).mkdir(mode=0o755, parents=True, exist_ok=True)
-            check_owner(folder)
-            surroundings |= {"ENGINE_CACHE_DIR": str(folder.resolve()), "ENGINE_CACHE_SEED": ""}
-            _compile_groups(folder, surroundings, options)
-        if subprocess.run([*command, *["--quiet"] * options.quiet], env=surroundings, check=False).returncode:
-            raise ValueError("not every kernel was compiled")
-        if options.into and not any(folder.rglob("*.nbc")):
-            raise ValueError("no kernel was written: is the compiler disabled?")
-        if options.into:
-            seal(folder, archive)
-
-
-def _compile_groups(folder: Path, surroundings: Mapping[str, str], options: Options) -> None:
-    """Compile all kernels into a folder by one process a group of steps, each with a cache of its own: what is compiled
-    does not depend on who is faster."""
-    if not options.quiet:
-        print(f"compiling all kernels: a few minutes on {min(options.processes, len(GROUPS))} core(s)", file=sys.stderr)
-    code = f"import logging, exact_geometry as e; logging.disable(); from {warm.__module__} import call_group"
-    with TemporaryDirectory() as temporary, ThreadPoolExecutor(options.processes) as pool:
-        parts = [Path(temporary) / str(group) for group in range(len(GROUPS))]
-
-        def compile_group(part: Path) -> int:
-            command = [sys.executable, "-P", "-c", f"{code}; call_group({part.name})"]
-            return subprocess.run(command, env={**surroundings, "ENGINE_CACHE_DIR": str(part)}, check=False).returncode
-
-        if any(pool.map(compile_group, parts)):
-            raise ValueError("not every kernel was compiled")
-        for part in reversed(parts):
-            shutil.copytree(part, folder, dirs_exist_ok=True)
-
-
-class _Lines:
-    """Progress as printed lines, where there is no bar."""
-
-    def __init__(self) -> None:
-        self._done = 0
-
-    def __call__(self, share: int) -> None:
-        self._done += share
-        print(f"kernels: {self._done} %", file=sys.stderr)
-
-
-@contextmanager
-def _bar(n_items: int, unit: str, options: Options) -> Iterator[Progress | None]:
-    """Show a progress bar if the standard error is a terminal and tqdm is installed; yields the function that advances
-    it."""
-    if options.quiet or not sys.stderr.isatty() or find_spec("tqdm") is None:
-        yield None
-        return
-    from tqdm import tqdm
-
-    with tqdm(total=n_items, unit=f" {unit}", unit_scale=True, leave=False) as bar:
-        yield bar.update
 
 
 FORMATS: Final = "mesh file (.stl, .obj, .ply, .off, .glb), .npz, .json, .geojson, or the JSON of a solid"
@@ -428,7 +340,7 @@ def _parser() -> argparse.ArgumentParser:
     ready.add_argument("--cpu", metavar="NAME", help="the oldest CPUs to run on: x86-64-v3; this one by default")
     ready.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="one a core by default")
     ready.add_argument("-q", "--quiet", action="store_true", help="no progress bar")
-    ready.set_defaults(run=_warm)
+    ready.set_defaults(run=warm_kernels)
     return parser
 
 

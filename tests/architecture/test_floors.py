@@ -36,6 +36,7 @@ FLOORS = {
     "engine.warmup": 11,
     "engine.inspection": 12,
     "engine": 13,
+    "engine.warm_command": 13,
     "engine.__main__": 14,
 }
 SPEAKS_LLVM = {"engine.predicates.error_free"}

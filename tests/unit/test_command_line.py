@@ -271,7 +271,7 @@ def test_kernels_for_others_are_compiled_whatever_is_installed(
         return SimpleNamespace(returncode=0)
 
     monkeypatch.setenv("ENGINE_CACHE_SEED", str(tmp_path / "seed"))
-    monkeypatch.setattr("engine.__main__.subprocess.run", run)
+    monkeypatch.setattr("engine.warm_command.subprocess.run", run)
     assert main(["warm", "--into", str(tmp_path / "made"), "--cpu", "generic", "--processes", "1"]) == 2 * (not writes)
     assert {env["ENGINE_CACHE_SEED"] for env in around} == {""}
     assert {env["PYTHONHASHSEED"] for env in around} == {"0"}
