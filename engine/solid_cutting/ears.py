@@ -14,11 +14,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.compiling.jit import kernel
+from engine.compiling.jit import inline, kernel
 from engine.types import BoolArray, FlagArray, IntArray
 
 Numbers = Any
 """Coordinates: float64 (n,), or a list of fractions."""
+
+
+@inline
+def _is_between(ux: Any, uy: Any, wx: Any, wy: Any, dx: Any, dy: Any) -> bool:
+    """Return whether the direction d lies strictly between u and w, counter-clockwise from u."""
+    is_left, is_right = ux * dy - uy * dx > 0, dx * wy - dy * wx > 0
+    return (is_left and is_right) if ux * wy - uy * wx > 0 else (is_left or is_right)
 
 
 @kernel
@@ -66,6 +73,14 @@ def bridge_of(x: Numbers, y: Numbers, before: IntArray, after: IntArray, start: 
                 is_seen = (hx - px) * (y[a] - hy) - (hy - py) * (x[a] - hx) > 0 or (
                     (x[c] - px) * (hy - y[c]) - (y[c] - py) * (hx - x[c]) > 0
                 )
+            if is_at_hole:  # case: other holes touch there, and were joined
+                while a != p and x[a] == px and y[a] == py:  # bound: corners of the ring
+                    a = before[a]
+                while c != p and x[c] == px and y[c] == py:  # bound: corners of the ring
+                    c = after[c]
+                first, last = after[hole], before[hole]
+                is_seen = _is_between(x[c] - px, y[c] - py, x[a] - px, y[a] - py, x[first] - px, y[first] - py)
+                is_seen |= _is_between(x[c] - px, y[c] - py, x[a] - px, y[a] - py, x[last] - px, y[last] - py)
             climb, length = abs(hy - py), hx - px
             gain = rise * length - climb * run
             if is_seen and (not has_tangent or gain > 0 or (gain == 0 and px > x[best])):

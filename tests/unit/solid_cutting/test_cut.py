@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -176,3 +177,24 @@ def test_overlaps_of_turned_bodies_do_not_depend_on_how_they_are_given() -> None
         for other in (engine.Aabb([0, 0, 0], [3, 3, 3]), engine.Convex(engine.Aabb([0, 0, 0], [3, 3, 3]).rows))
     ]
     assert straight[0] == straight[1] == float(Fraction(1, 30))
+
+
+def test_holes_that_touch_each_other_at_their_leftmost_corners() -> None:
+    """A prism has its cross-section as a cavity: three share an upright edge, in every order, and turned about it."""
+    flat = [[(6, 1), (7, 2)], [(7, 3), (7, 4)], [(7, 5), (6, 7)]]
+    faces = np.array([(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)])
+    for order in permutations(range(3)):
+        for way in (1, -1):
+            parts = [(block([0, 0, 0], [9, 9, 9]) - [4, 4, 0], CUBE)]
+            for k in order:
+                ring = [(4, 4), *flat[k]]
+                parts.append((np.array([(way * (x - 4), y - 4, z) for z in (1, 8) for x, y in ring], float), faces))
+            vertices, rows = joined(parts)
+            vertices[8:, 0] += (way < 0) * 1.0
+            body, level = engine.Polyhedron(vertices, rows), engine.HalfSpace([0, 0, 1], -5)
+            part: Any = engine.cut(body, level)
+            assert_closed(part.faces)
+            holes = [abs((a - 4) * (d - 4) - (b - 4) * (c - 4)) / 2 for (a, b), (c, d) in flat]
+            areas: Any = engine.section(body, level)
+            assert areas.areas.tolist() == [81 - sum(holes)]
+            assert part.volume == 81 * 4 - 3 * sum(holes)
