@@ -126,7 +126,7 @@ class PointQuery:
         self.measure, self.n_exact = measure_of(solid, pose, where), 0
         self._order = self.measure.order(points)
         self.points = points if self._order is None else read_only(points[self._order])
-        self.limit, self.is_signed = limit, is_signed
+        self.limit, self.is_signed, self.is_named = limit, is_signed, is_named
         rows = n if is_named else 0
         feet, codes = np.empty((rows, points.shape[1])), np.full((rows, 2), -1, np.int64)
         self.answers = Answers(np.full(n, np.nan), feet, codes)
@@ -159,7 +159,7 @@ class PointQuery:
         """Return the answers, once all are filled."""
         if self.limit is not None:
             return self._as_given(self.answers.distance == 0.0)
-        if not self.answers.is_named:
+        if not self.is_named:
             return self._as_given(self.answers.distance)
         rows = np.flatnonzero(~self.is_within)
         n = len(self.points)

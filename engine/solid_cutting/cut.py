@@ -22,6 +22,7 @@ from engine.solids.checks import shown
 from engine.solids.columns import ByValue
 from engine.solids.mesh import Polyhedron
 from engine.solids.primitives import HalfSpace
+from engine.solids.registry import refused, row_of
 from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
@@ -221,6 +222,8 @@ def planes_in(region: Solid, budget: Budget) -> list[Plane]:
     """Return the planes of a region. Raises: UnsupportedSolidError."""
     if isinstance(region, HalfSpace):
         return [plane_of(region.row.tolist())]
+    if row_of(region).planes is None:
+        raise refused(region, "a region of cut is not", lambda row: row.planes, " that is convex", ("region",))
     rows = plan_of(region, budget.check).rows
     return region.prepared("cut_planes", lambda: [plane_of(row) for row in rows], budget.check)
 

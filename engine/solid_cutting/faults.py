@@ -142,8 +142,8 @@ def nesting(
 
 def sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
     """Return the sign of the volume that triangles run around, exactly."""
-    corners = points[faces] - points[faces[0, 0]]
     with np.errstate(all="ignore"):
+        corners = points[faces] - points[faces[0, 0]]
         parts = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
         bound = 1e-14 * len(faces) * np.abs(corners).max() ** 3 + 1e-290
         total = float(parts.sum())

@@ -4,36 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from engine.collision.collide import posed, read_pair
-from engine.errors import UnsupportedPairError
+from engine.errors import NotRepresentableError, RingTooShortError, UnsupportedPairError, WrongDimensionError
 from engine.polygon_clipping.planes import plan_of
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.pair_arrays import PolygonSelection, arrays_of
-from engine.predicates.rational import cross, determinant, dot, nearest_float, scaled_integers
+from engine.predicates.rational import cross, determinant, dot, exponent_of, nearest_float, scaled_integers
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.cut import cut_by_planes
 from engine.solid_cutting.cut_measures import volume_of_cut
 from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
 from engine.solid_cutting.measures import measure
-from engine.solid_cutting.plane_cut import plane_of
+from engine.solid_cutting.plane_cut import Points, plane_of
+from engine.solid_cutting.section import outward
 from engine.solid_cutting.simple_measures import product, sides_of
 from engine.solids.accepted import PoseLike, SolidLike
-from engine.solids.base import Solid
+from engine.solids.base import Solid, named
 from engine.solids.checks import as_floats
 from engine.solids.convexity import convexity
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
 from engine.solids.pose import Pose
 from engine.solids.primitives import Aabb, Convex, Triangle
-from engine.types import Accuracy, FloatArray
+from engine.types import Accuracy, FloatArray, read_only
 
 Rows = list[list[Fraction]]
+_COMFORTABLE: Final = 128
+"""Exponents of coordinates up to which areas are far from the least and the largest double."""
 
 
 class _Common(NamedTuple):
@@ -163,7 +166,7 @@ def _of_pairs(first: Any, second: Any, poses: tuple[Any, Any], options: tuple[An
     workers, deadline, cancel, progress, report = options
     check_options(workers, progress, report=report)
     are_many = all(isinstance(each, (list, np.ndarray)) and not _is_rings(each) for each in (first, second))
-    with Budget(deadline, cancel) as budget:
+    with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
         if are_many and all(isinstance(each, np.ndarray) for each in (first, second)) and poses == (None, None):
             values, n, n_exact = _of_arrays(first, second, is_ratio, workers, budget), len(first), 0
@@ -172,7 +175,7 @@ def _of_pairs(first: Any, second: Any, poses: tuple[Any, Any], options: tuple[An
             values, n, n_exact = np.empty(len(pairs)), len(pairs), 0
             for number, (one, other) in enumerate(pairs):
                 budget.check()
-                common = _common(one, other, poses, budget)
+                common = _common(one, other, poses, is_ratio, budget)
                 n_exact += common.is_exact
                 values[number] = _ratio(common) if is_ratio else nearest_float(common.both)
     if progress is not None:
@@ -197,36 +200,53 @@ def _of_arrays(first: Any, second: Any, is_ratio: bool, workers: int | None, bud
     sides = []
     for name, each in (("first", first), ("second", second)):
         corners = as_floats(each, 3, (name,))
-        n, k = corners.shape[:2]
-        arrays = arrays_of(corners.reshape(-1, 2), np.arange(0, n * k + 1, k), np.arange(n + 1))
-        sides.append(PolygonSelection(arrays, np.arange(n)))
+        if corners.shape[2] != 2:
+            raise WrongDimensionError(f"{name} must hold positions of 2 numbers each, got {corners.shape[2]}", (name,))
+        if corners.shape[1] < 3:
+            raise RingTooShortError(f"{name} has polygons of {corners.shape[1]} corners; give 3 or more", (name,))
+        sides.append(corners)
     _same(*sides)
+    if is_ratio:
+        sides = _scaled(*sides)
 
-    def areas(one: PolygonSelection, other: PolygonSelection) -> FloatArray:
-        made: Any = overlay_batch(one, other, deadline=budget.left(), cancel=budget.cancel, workers=workers)
+    def areas(one: FloatArray, other: FloatArray) -> FloatArray:
+        pairs = _selection(one), _selection(other)
+        made: Any = overlay_batch(*pairs, deadline=budget.left(), cancel=budget.cancel, workers=workers)
         return np.asarray(made.areas)
 
-    both = areas(sides[0], sides[1])
-    if not is_ratio:
-        return both
-    own = [areas(side, _around(side)) for side in sides]
-    union = own[0] + own[1] - both
-    return np.divide(both, union, out=np.zeros(len(both)), where=union > 0.0)
+    both = areas(*sides)
+    if is_ratio:
+        union = sum(areas(side, _around(side)) for side in sides) - both
+        return np.divide(both, union, out=np.zeros(len(both)), where=union > 0.0)
+    if len(beyond := np.flatnonzero(np.isinf(both))):
+        pair = int(beyond[0])
+        raise NotRepresentableError(
+            f"the area of pair {pair} is beyond the largest float64; scale the input down", ("first", pair)
+        )
+    return both
 
 
-def _around(side: PolygonSelection) -> PolygonSelection:
+def _selection(corners: FloatArray) -> PolygonSelection:
+    """Return an array (n, k, 2) as polygons."""
+    n, k = corners.shape[:2]
+    arrays = arrays_of(corners.reshape(-1, 2), np.arange(0, n * k + 1, k), np.arange(n + 1))
+    return PolygonSelection(arrays, np.arange(n))
+
+
+def _scaled(*sides: FloatArray) -> list[FloatArray]:
+    """Return corners (n, k, 2), each pair multiplied by powers of two by axis, where areas might be too large or too
+    small for doubles."""
+    exponents = np.frexp(np.maximum(*(np.abs(each).max(axis=1) for each in sides)))[1]
+    exponents[np.abs(exponents) <= _COMFORTABLE] = 0
+    return [np.ldexp(each, -exponents[:, None]) for each in sides] if exponents.any() else list(sides)
+
+
+def _around(corners: FloatArray) -> FloatArray:
     """Return a box strictly around each polygon: with that it has its own area in common, crossing no edge."""
-    n = len(side)
-    low, high = side.arrays().boxes(np.arange(n))
-    with np.errstate(all="ignore"):
-        width = (high - low).max(axis=1, keepdims=True, initial=0.0) + np.abs(low) + 1e-300
-        low, high = low - width, high + width
-    if not (np.isfinite(low).all() and np.isfinite(high).all()):
-        return side
-    corners = np.stack([low, np.c_[high[:, 0], low[:, 1]], high, np.c_[low[:, 0], high[:, 1]]], axis=1)
-    return PolygonSelection(
-        arrays_of(corners.reshape(-1, 2), np.arange(0, 4 * n + 1, 4), np.arange(n + 1)), np.arange(n)
-    )
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    width = (high - low).max(axis=1, keepdims=True) + np.abs(low) + 1e-300
+    low, high = low - width, high + width
+    return np.stack([low, np.c_[high[:, 0], low[:, 1]], high, np.c_[low[:, 0], high[:, 1]]], axis=1)
 
 
 def _ratio(common: _Common) -> float:
@@ -235,12 +255,18 @@ def _ratio(common: _Common) -> float:
     return min(1.0, nearest_float(both / union)) if union > 0 else 0.0
 
 
-def _common(first: Any, second: Any, poses: tuple[Any, Any], budget: Budget) -> _Common:
+def _common(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, budget: Budget) -> _Common:
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
         first, second, _ = read_pair(first, second, budget.left(), budget.cancel)
+    if first.dimension != second.dimension:
+        raise WrongDimensionError(
+            f"first is {named(first.type)} in {first.dimension}D, second {named(second.type)} in {second.dimension}D; "
+            "both must have one dimension",
+            ("second",),
+        )
     moves = posed(poses[0], first, "first_pose"), posed(poses[1], second, "second_pose")
     if first.dimension == 2 and any(isinstance(each, (Polygon, Triangle)) for each in (first, second)):
-        return _of_polygons(first, second, moves, budget)
+        return _of_polygons(first, second, moves, is_ratio, budget)
     if isinstance(first, Aabb) and isinstance(second, Aabb) and moves == (None, None):
         ends = zip(first.min.tolist(), second.min.tolist(), first.max.tolist(), second.max.tolist())
         sides = [max(Fraction(0), Fraction(min(c, d)) - Fraction(max(a, b))) for a, b, c, d in ends]
@@ -250,9 +276,9 @@ def _common(first: Any, second: Any, poses: tuple[Any, Any], budget: Budget) -> 
         one, other = (_own_volume(each, move, budget) for each, move in zip((first, second), moves))
         return _Common(_volume_within(rows[0] + rows[1], budget), one, other, True)
     if rows[0] is None and isinstance(first, Polyhedron) and rows[1] is not None:
-        return _of_mesh(first, moves[0], rows[1], budget)
+        return _of_mesh(first, moves[0], rows[1], is_ratio, budget)
     if rows[1] is None and isinstance(second, Polyhedron) and rows[0] is not None:
-        turned = _of_mesh(second, moves[1], rows[0], budget)
+        turned = _of_mesh(second, moves[1], rows[0], is_ratio, budget)
         return turned._replace(first=turned.second, second=turned.first)
     more = (
         "cut one of them into convex parts"
@@ -309,7 +335,7 @@ def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
     return factor * solid.prepared("exact_volume", lambda: _volume_within(own, budget), budget.check)
 
 
-def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, budget: Budget) -> _Common:
+def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, budget: Budget) -> _Common:
     """Return what a polyhedron has in common with a convex region, whose planes are brought into its coordinates."""
     factor = Fraction(1)
     own = rows
@@ -319,16 +345,24 @@ def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, budget: Budget) -
         columns = [tuple(line[k] for line in turn) for k in range(3)]
         own = [[*(dot(row[:3], column) for column in columns), dot(row[:3], move) + row[3]] for row in rows]
     left = cut_by_planes(solid, [plane_of(scaled_integers(row)) for row in own], budget)
-    both = volume_of_cut(left.points, left.triangles, budget, factor) if len(left.triangles) else 0.0
-    volume, _ = measure(solid, "volume", budget, ("first",))
-    return _Common(both, Fraction(volume) * factor, _volume_within(rows, budget), False)
+    exponent = 3 * exponent_of(solid.vertices) if is_ratio else 0
+    scale = Fraction(2) ** -exponent  # of ratios: volumes might be too large or small
+    both = volume_of_cut(left.points, left.triangles, budget, factor * scale) if len(left.triangles) else 0.0
+    volume = Fraction(0)
+    if is_ratio:
+        outer = outward(solid, budget)
+        volume = Fraction(volume_of_cut(Points(solid.vertices), outer, budget, factor * scale)) / scale
+    return _Common(Fraction(both) / scale, volume, _volume_within(rows, budget) if is_ratio else 0.0, False)
 
 
-def _of_polygons(first: Solid, second: Solid, moves: tuple[Any, Any], budget: Budget) -> _Common:
-    """Return what polygons have in common."""
+def _of_polygons(first: Solid, second: Solid, moves: tuple[Any, Any], is_ratio: bool, budget: Budget) -> _Common:
+    """Return what polygons have in common. is_ratio: maybe each axis multiplied by a power of two."""
     if moves != (None, None):
         raise UnsupportedPairError("polygons take no pose here; move their vertices", ("first_pose",))
     sides = [_as_polygon(each) for each in (first, second)]
+    if is_ratio and all(len(each.vertices) for each in sides):
+        places = _scaled(*(each.vertices[None] for each in sides))
+        sides = [Polygon.of_arrays(read_only(at[0]), each.ring_offsets) for at, each in zip(places, sides)]
     both = overlay(sides[0], sides[1], deadline=budget.left(), cancel=budget.cancel).area
     one, other = (measure(each, "area", budget)[0] for each in sides)
     return _Common(both, one, other, False)

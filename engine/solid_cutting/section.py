@@ -244,6 +244,8 @@ def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], Flo
                 raise InvalidArrayError(
                     f"planes[{number}] must be a half-space of space, got {shown(each)}", ("planes", number)
                 )
+        if normal is not None:
+            raise InvalidInputError("normal goes with heights; leave it out", ("normal",))
         return [plane_of(each.row.tolist()) for each in listed], None
     try:
         depth = np.ndim(planes)

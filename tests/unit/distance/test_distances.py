@@ -283,3 +283,10 @@ def test_what_has_no_inside_no_point_or_no_distance_is_refused() -> None:
     for value in (np.nan, np.inf):
         with pytest.raises(InvalidInputError):
             engine.distances(np.array([[0.0, value, 0.0]]), box)  # a small batch
+
+
+def test_no_points_have_no_nearest_points() -> None:
+    for solid in (engine.Aabb([0, 0, 0], [1, 1, 1]), engine.Sphere([0, 0, 0], 1), engine.HalfSpace([0, 0, 1], 0)):
+        none = engine.distances(np.zeros((0, 3)), solid, nearest=True)
+        assert isinstance(none, engine.Distances)
+        assert (len(none), none.point.shape, none.index.shape) == (0, (0, 3), (0, 2))

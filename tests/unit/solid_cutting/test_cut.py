@@ -198,3 +198,55 @@ def test_holes_that_touch_each_other_at_their_leftmost_corners() -> None:
             areas: Any = engine.section(body, level)
             assert areas.areas.tolist() == [81 - sum(holes)]
             assert part.volume == 81 * 4 - 3 * sum(holes)
+
+
+def test_overlaps_of_different_dimensions_and_shapes_are_refused() -> None:
+    triangle = engine.Polygon([[[0, 0], [1, 0], [1, 1]]])
+    cube = engine.Polyhedron(block([0] * 3, [1] * 3), CUBE)
+    flat, box = engine.Aabb([0, 0], [1, 1]), engine.Aabb([0, 0, 0], [1, 1, 1])
+    region = engine.Convex([[1, 0, 0], [0, 1, 0], [-1, -1, 1]])
+    for first, second in ((triangle, box), (box, triangle), (cube, flat), (cube, region), (region, box), (box, flat)):
+        for ask in (engine.overlap_volume, engine.iou):
+            with pytest.raises(engine.WrongDimensionError, match="one dimension"):
+                ask(first, second)
+    with pytest.raises(engine.WrongDimensionError, match="first must hold positions of 2"):
+        engine.iou(np.zeros((2, 4, 3)), np.zeros((2, 4, 3)))
+    for n_corners in range(3):
+        with pytest.raises(engine.InvalidInputError, match="3 or more"):
+            engine.iou(np.zeros((2, 4, 2)), np.zeros((2, n_corners, 2)))
+    line = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]])
+    assert engine.iou(line, line).tolist() == [0.0, 1.0]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("exponent", [-1000, -560, -400, 0, 400, 560, 1000])
+def test_ratios_do_not_depend_on_the_scale(exponent: int) -> None:
+    """The areas and volumes themselves are below the least double, or beyond the largest."""
+    scale = 2.0**exponent
+    squares = np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]]) * scale
+    assert engine.iou(squares, squares + scale).tolist() == [1 / 7]  # type: ignore[union-attr]
+    one, other = engine.Polygon([squares[0]]), engine.Aabb([scale, scale], [3 * scale, 3 * scale])
+    assert engine.iou(one, other) == 1 / 7
+    vertices, faces = star(3)
+    body, box = (engine.Polyhedron(vertices, faces), engine.Aabb([-1] * 3, [1] * 3))
+    scaled = engine.Polyhedron(vertices * scale, faces), engine.Aabb([-scale] * 3, [scale] * 3)
+    assert abs(exponent) > 900 or engine.iou(*scaled) == engine.iou(body, box)
+    if exponent > 512:
+        with pytest.raises(engine.NotRepresentableError, match="pair 0"):
+            engine.overlap_volume(squares, squares)
+
+
+def test_bodies_at_the_ends_of_the_doubles() -> None:
+    for high in (1e308, 1.7e308):
+        body = engine.Polyhedron(block([-high] * 3, [high] * 3), CUBE)
+        assert engine.centroid(body).tolist() == [0.0] * 3
+        assert engine.overlap_volume(body, engine.Aabb([0, 0, 0], [1, 2, 3])) == 6.0
+        with pytest.raises(engine.NotRepresentableError):
+            engine.volume(body)
+
+
+def test_regions_and_normals_that_do_not_fit_are_refused_by_name() -> None:
+    cube = engine.Polyhedron(block([0] * 3, [1] * 3), CUBE)
+    with pytest.raises(engine.UnsupportedSolidError, match="a region of cut is not a sphere; give a half_space"):
+        engine.cut(cube, engine.Sphere([0, 0, 0], 1))
+    with pytest.raises(engine.InvalidInputError, match="normal goes with heights"):
+        engine.section(cube, [engine.HalfSpace([0, 0, 1], -0.5)], normal=[1, 0, 0])
