@@ -23,6 +23,7 @@ from typing import Final
 import numpy as np
 
 from engine.compiling.jit import entry_of
+from engine.errors import NotRepresentableError
 from engine.predicates.rational import cross, minus, nearest_float, squared_length
 from engine.running.budget import Budget
 from engine.solid_cutting.caps import Area, Seen
@@ -51,9 +52,12 @@ def _narrowed(ends_of: Callable[[int], tuple[float, float]]) -> float | None:
     """Return what both ends of a value round to, with as many bits as it takes; None beyond `_MOST_BITS`."""
     bits = 128
     while bits <= _MOST_BITS:
-        low, high = ends_of(bits)
-        if low == high:
-            return low
+        try:
+            low, high = ends_of(bits)
+            if low == high:
+                return low
+        except NotRepresentableError:  # an end may be beyond the doubles where the value is not
+            pass
         bits *= 4
     return None
 

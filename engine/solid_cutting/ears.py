@@ -14,18 +14,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from engine.compiling.jit import inline, kernel
+from engine.compiling.jit import kernel
 from engine.types import BoolArray, FlagArray, IntArray
 
 Numbers = Any
 """Coordinates: float64 (n,), or a list of fractions."""
-
-
-@inline
-def _is_between(ux: Any, uy: Any, wx: Any, wy: Any, dx: Any, dy: Any) -> bool:
-    """Return whether the direction d lies strictly between u and w, counter-clockwise from u."""
-    is_left, is_right = ux * dy - uy * dx > 0, dx * wy - dy * wx > 0
-    return (is_left and is_right) if ux * wy - uy * wx > 0 else (is_left or is_right)
 
 
 @kernel
@@ -78,9 +71,12 @@ def bridge_of(x: Numbers, y: Numbers, before: IntArray, after: IntArray, start: 
                     a = before[a]
                 while c != p and x[c] == px and y[c] == py:  # bound: corners of the ring
                     c = after[c]
-                first, last = after[hole], before[hole]
-                is_seen = _is_between(x[c] - px, y[c] - py, x[a] - px, y[a] - py, x[first] - px, y[first] - py)
-                is_seen |= _is_between(x[c] - px, y[c] - py, x[a] - px, y[a] - py, x[last] - px, y[last] - py)
+                ux, uy, wx, wy = x[c] - px, y[c] - py, x[a] - px, y[a] - py
+                is_seen, is_convex = False, ux * wy - uy * wx > 0
+                for q in (after[hole], before[hole]):  # is one strictly between, counter-clockwise from u to w?
+                    is_left = ux * (y[q] - py) - uy * (x[q] - px) > 0
+                    is_right = (x[q] - px) * wy - (y[q] - py) * wx > 0
+                    is_seen = is_seen or (is_left and is_right) or (not is_convex and (is_left or is_right))
             climb, length = abs(hy - py), hx - px
             gain = rise * length - climb * run
             if is_seen and (not has_tangent or gain > 0 or (gain == 0 and px > x[best])):

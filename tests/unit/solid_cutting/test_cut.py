@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import engine
+from engine.solid_cutting.ears import bridge_of
 from tests.reference.cutting import cut_volume, nearest, points_of
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
 
@@ -198,6 +199,20 @@ def test_holes_that_touch_each_other_at_their_leftmost_corners() -> None:
             areas: Any = engine.section(body, level)
             assert areas.areas.tolist() == [81 - sum(holes)]
             assert part.volume == 81 * 4 - 3 * sum(holes)
+
+
+@pytest.mark.parametrize("number", [float, Fraction])
+def test_a_bridge_ends_at_the_corner_that_has_the_hole_inside(number: Any) -> None:
+    """A square, a hole in it that is joined by corners 4 and 7 of one place, and a hole that touches it there."""
+    places = [(0, 0), (9, 0), (9, 9), (0, 9), (4, 4), (6, 7), (7, 5), (4, 4), (0, 0), (4, 4), (7, 2), (6, 1)]
+    ring = [0, 4, 5, 6, 7, 8, 1, 2, 3]
+    before, after = np.arange(12), np.arange(12)
+    for cycle in (ring, [9, 10, 11]):
+        for one, other in zip(cycle, [*cycle[1:], cycle[0]]):
+            after[one], before[other] = other, one
+    x, y = ([number(place[axis]) for place in places] for axis in range(2))
+    bridge: Any = getattr(bridge_of, "py_func", bridge_of)
+    assert bridge(x, y, before, after, 0, 9) == 7
 
 
 def test_overlaps_of_different_dimensions_and_shapes_are_refused() -> None:
