@@ -77,3 +77,7 @@ async def test_overlaps(client: httpx.AsyncClient) -> None:
         client, "overlap", first=CUBE, second={"type": "sphere", "center": [0] * 3, "radius": 1}
     )
     assert (status, problem["code"]) == (422, "unsupported_pair")
+    flat = {"type": "polygon", "rings": [[[0, 0], [1, 0], [0, 1]]]}
+    for first, second in ((flat, BOX), (BOX, flat), (CUBE, {"type": "aabb", "min": [0, 0], "max": [1, 1]})):
+        status, problem = await ask(client, "overlap", first=first, second=second)
+        assert (status, problem["code"], problem["errors"][0]["pointer"]) == (422, "wrong_dimension", "/second")
