@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from math import isfinite
 from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from engine.compiling.jit import entry_of
-from engine.errors import WrongDimensionError
-from engine.predicates.error_free import U2, dd_add, dd_div, is_correctly_rounded
+from engine.errors import NotRepresentableError, WrongDimensionError
 from engine.predicates.rational import SMALLEST_NORMAL, exponent_of, nearest_float, shifted
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options
@@ -275,49 +276,56 @@ def _exact(solid: Mesh, looks: Shells | None, budget: Budget) -> ExactMesh:
 
 def _six_volumes(
     points: FloatArray, triangles: IntArray, looks: Shells, z0: float, budget: Budget
-) -> tuple[float, float, float]:
-    """Return (h, l, bound): six times the volume as a double-double, for z measured from z0."""
+) -> tuple[Fraction, Fraction] | None:
+    """Return six times the volume, for z measured from z0, and a bound on its error; None where a sum overflows."""
     sums = np.zeros((1, 3))
     entry_of(sum_volume)(read_only(points), triangles, looks.sides, z0, sums, budget.flag)
-    h, low, size = sums[0].tolist()
-    h, low = dd_add(h, low, 0.0, 0.0)
-    side = -1.0 if looks.common < 0 else 1.0
-    return side * h, side * low, bound_of(size, len(triangles))
+    return _summed(sums[0], len(triangles), -1 if looks.common < 0 else 1)
+
+
+def _summed(sums: FloatArray, n: int, side: int, more: float = 0.0) -> tuple[Fraction, Fraction] | None:
+    """Return the exact value of a sum (high and low part, size of n terms) times side, and a bound on its error."""
+    h, low, size = sums.tolist()
+    bound = bound_of(size, n) + more
+    if not isfinite(h + low + bound):
+        return None
+    return side * (Fraction(h) + Fraction(low)), Fraction(bound)
+
+
+def _rounded(value: Fraction, error: Fraction) -> float | None:
+    """Return the double nearest to every number within error of a value, None if there is no such."""
+    try:
+        low, high = nearest_float(value - error), nearest_float(value + error)
+    except NotRepresentableError:
+        return None
+    return low if low == high else None
 
 
 def _volume_of(solid: Polyhedron, points: FloatArray, looks: Shells, budget: Budget) -> float | None:
     triangles = read_only(solid.triangles)
-    h, low, bound = _six_volumes(points, triangles, looks, float(points[triangles[0, 0], 2]), budget)
-    return _quotient(h, low, bound, 6.0, 0.0)
-
-
-def _quotient(h: float, low: float, bound: float, divisor: float, relative: float) -> float | None:
-    """Return (h + low) / divisor where it is the nearest double for certain. relative: error bound of the divisor."""
-    qh, ql = dd_div(h, low, divisor, 0.0)
-    error = bound / abs(divisor) + (20.0 * U2 + relative) * abs(qh)
-    return qh if is_correctly_rounded(qh, ql, error) else None
+    six = _six_volumes(points, triangles, looks, float(points[triangles[0, 0], 2]), budget)
+    return None if six is None else _rounded(six[0] / 6, six[1] / 6)
 
 
 def _centroid_of(solid: Polyhedron, points: FloatArray, looks: Shells, budget: Budget) -> FloatArray | None:
     triangles = read_only(solid.triangles)
     origin = read_only(points[triangles[0, 0]].copy())
-    vh, vl, v_bound = _six_volumes(points, triangles, looks, float(origin[2]), budget)
-    if not v_bound < 2.0**-20 * vh:
+    six = _six_volumes(points, triangles, looks, float(origin[2]), budget)
+    if six is None or not six[1] < six[0]:
         return None
-    sums = np.zeros((3, 3))
+    (v, v_bound), sums, made = six, np.zeros((3, 3)), []
     entry_of(sum_moments)(read_only(points), triangles, looks.sides, origin, sums, budget.flag)
-    side = -1.0 if looks.common < 0 else 1.0
-    made = []
     for k in range(3):
-        h, low, size = sums[k].tolist()
-        h, low = dd_add(side * h, side * low, 0.0, 0.0)
-        factor = 8.0 if k == 2 else 4.0
-        qh, ql = dd_div(h, low, factor * vh, factor * vl)
-        error = 1.001 * (bound_of(size, len(triangles)) / (factor * vh) + abs(qh) * (2.0 * v_bound / vh + 20.0 * U2))
-        h, low = dd_add(qh, ql, float(origin[k]), 0.0)
-        if not is_correctly_rounded(h, low, error + 8.0 * U2 * abs(h)):
+        moment = _summed(sums[k], len(triangles), -1 if looks.common < 0 else 1)
+        if moment is None:
             return None
-        made.append(h + 0.0)
+        factor = 8 if k == 2 else 4
+        share = moment[0] / (factor * v)
+        error = (moment[1] + abs(share) * factor * v_bound) / (factor * (v - v_bound))
+        value = _rounded(share + Fraction(float(origin[k])), error)
+        if value is None:
+            return None
+        made.append(value)
     return np.array(made)
 
 
@@ -329,10 +337,9 @@ def _area_of_mesh(solid: Mesh, budget: Budget) -> tuple[float, bool]:
         with np.errstate(all="ignore"):
             entry_of(sum_area)(read_only(points), read_only(solid.triangles), sums, budget.flag)
             budget.check()
-            h, low, size = sums[0].tolist()
-            h, low = dd_add(h, low, 0.0, 0.0)
             n = len(solid.triangles)
-            half = _quotient(h, low, bound_of(size, n) + n * LOST_TO_ROOTS, 2.0, 0.0)
+            twice = _summed(sums[0], n, 1, n * LOST_TO_ROOTS)
+            half = None if twice is None else _rounded(twice[0] / 2, twice[1] / 2)
             result = None if half is None else float(np.ldexp(half, 2 * exponent))
         if result is not None and _is_scaled(result, exponent):
             return result, False

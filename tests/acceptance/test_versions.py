@@ -17,8 +17,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.schemas.bodies import SCENE_ID
-from tests.unit.service.asking import SPHERE, examples
+from tests.unit.service.asking import SHEET, SPHERE, examples, of_scene
 from tests.unit.service.test_live import Service
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,9 +64,9 @@ def ask_everything(url: str) -> None:
     """Send each example of the document to its endpoint, and one question to each that takes numbers or files."""
     with httpx.Client(base_url=url, timeout=60) as client:
         document: dict[str, Any] = client.get("/openapi.json").raise_for_status().json()
-        asked = set()
+        asked, sheet = set(), client.post("/v1/scenes", json=SHEET).raise_for_status().json()["id"]
         for path, example in examples(document):
-            client.post(path.replace("{scene_id}", SCENE_ID), json=example).raise_for_status()
+            client.post(of_scene(path, sheet), json=example).raise_for_status()
             asked.add(path)
         stored = client.post("/v1/solids", json=SPHERE).raise_for_status().headers["location"]
         box = {"type": "aabb", "min": [0, 0, 0], "max": [1, 1, 1]}

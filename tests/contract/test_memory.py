@@ -18,9 +18,8 @@ import zstandard
 
 from benchmarks.load import watched
 from benchmarks.measure import memory_of
-from service.schemas.bodies import SCENE_ID
 from tests.contract.test_deadlines import MANY_SIDES, ZIGZAG, across, comb, features, stripes
-from tests.unit.service.asking import SPHERE, examples
+from tests.unit.service.asking import SHEET, SPHERE, examples, of_scene
 from tests.unit.service.test_live import Service, running
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="memory of processes is read from /proc")
@@ -107,8 +106,9 @@ def never_read(service: Service) -> None:
 def hold_within(service: Service, n_clients: int, turns: int) -> float:
     """Send all bodies, some at once; return how long /healthz took at most."""
     messages = [*bodies()] * turns
+    sheet = httpx.post(f"{service.url}/v1/scenes", json=SHEET).json()["id"]
     for path, example in examples(httpx.get(f"{service.url}/openapi.json").json()):
-        url = service.url + path.replace("{scene_id}", SCENE_ID)
+        url = service.url + of_scene(path, sheet)
         statuses = [httpx.post(url, json=example, timeout=300).status_code for _ in range(3)]
         assert statuses[-1] in (200, 201), (path, statuses)  # the first may compile past its deadline
     stored = httpx.post(f"{service.url}/v1/scenes", json=SCENE).json()["id"]

@@ -22,9 +22,8 @@ import engine
 from service import body
 from service.app import create_app
 from service.openapi import ANSWERS as EXAMPLES
-from service.schemas.bodies import SCENE_ID
 from service.settings import Settings
-from tests.unit.service.asking import client_of, examples
+from tests.unit.service.asking import SHEET, client_of, examples, of_scene
 
 STORED = Path(__file__).with_name("openapi.json")
 OPERATIONS = {
@@ -93,7 +92,6 @@ ANSWERS = {
     "/v1/solids/{solid_id}/clip/segments": "application/octet-stream",
 }
 
-SHEET = {"type": "surface", "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "faces": [[0, 1, 2], [0, 2, 3]]}
 FILES = dict.fromkeys(("/v1/solids", "/v1/solids/inspect"), (*body.FILES, body.MULTIPART))
 """Files that are taken beside JSON, by path."""
 
@@ -232,10 +230,9 @@ def answers() -> dict[str, list[Any]]:
     async def ask() -> dict[str, list[Any]]:
         found: dict[str, list[Any]] = {}
         async with client_of(app) as client:
-            sheet = await client.post("/v1/scenes", json={"bodies": [{"solid": SHEET}]})
+            sheet = (await client.post("/v1/scenes", json=SHEET)).json()["id"]
             for path, example in examples(app.openapi()):
-                scene = sheet.json()["id"] if path.endswith("/hits") else SCENE_ID
-                answer = await client.post(path.replace("{scene_id}", scene), json=example)
+                answer = await client.post(of_scene(path, sheet), json=example)
                 content = paths[path]["post"]["responses"][str(answer.status_code)]["content"]
                 media_type = answer.headers["content-type"].partition(";")[0]
                 assert media_type in content, answer.text

@@ -9,6 +9,8 @@ from typing import Any
 import httpx
 from fastapi import FastAPI
 
+from service.schemas.bodies import SCENE_ID
+
 SPHERE = {"type": "sphere", "center": [0.0, 0.0, 0.0], "radius": 1.0}
 
 
@@ -41,6 +43,25 @@ def check_problem(answer: httpx.Response, status: int, code: str) -> dict[str, A
     assert len(problem["errors"]) <= 20
     assert all(set(item) == {"pointer", "detail"} for item in problem["errors"])
     return problem
+
+
+SHEET: dict[str, Any] = {
+    "bodies": [
+        {
+            "solid": {
+                "type": "surface",
+                "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+                "faces": [[0, 1, 2], [0, 2, 3]],
+            }
+        }
+    ]
+}
+"""A scene of space with a surface: what the example of hits is asked about."""
+
+
+def of_scene(path: str, sheet: str) -> str:
+    """Return the path of an example with the id of the scene that it is asked about; sheet: that of `SHEET`."""
+    return path.replace("{scene_id}", sheet if path.endswith("/hits") else SCENE_ID)
 
 
 def examples(document: dict[str, Any]) -> list[tuple[str, Any]]:

@@ -7,8 +7,7 @@ import re
 import httpx
 import pytest
 
-from service.schemas.bodies import SCENE_ID
-from tests.unit.service.asking import SPHERE, examples
+from tests.unit.service.asking import SHEET, SPHERE, examples, of_scene
 
 pytestmark = pytest.mark.anyio
 
@@ -30,8 +29,9 @@ async def test_page_asks_nobody_else(client: httpx.AsyncClient, path: str) -> No
 async def test_every_request_has_an_example_and_each_is_answered(client: httpx.AsyncClient) -> None:
     document = (await client.get("/openapi.json")).json()
     assert len(examples(document)) > 8
+    sheet = (await client.post("/v1/scenes", json=SHEET)).json()["id"]
     for path, example in examples(document):
-        answer = await client.post(path.replace("{scene_id}", SCENE_ID), json=example)
+        answer = await client.post(of_scene(path, sheet), json=example)
         assert answer.status_code in (200, 201), (path, answer.text)
 
 
