@@ -61,9 +61,8 @@ def related_pairs(left: MixedLayer, right: MixedLayer, predicate: str, distance:
     itself first, and parts of a MultiPolygon that overlap with each other, which rounds where they cross."""
     if (pairs := _of_points(left, right, predicate, limits)) is not None:
         return pairs
-    shapes, others = in_range(shapes_of(_cleaned(left, limits), limits), shapes_of(_cleaned(right, limits), limits))
+    shapes, others = _shapes(left, right, predicate == "dwithin", limits)
     if predicate == "dwithin":
-        _check_unscaled(shapes, left)
         return _chosen(pairs_between(shapes, others, distance, limits), are_within, shapes, others, distance, limits)
     pairs = pairs_between(shapes, others, 0.0, limits)
     if predicate == "intersects":
@@ -99,13 +98,14 @@ def _boxes_allow(predicate: str, left: Shapes, right: Shapes, pairs: IntArray) -
     return result
 
 
-def _check_unscaled(shapes: Shapes, layer: MixedLayer) -> None:
-    if len(shapes.vertices) and not np.isin(np.abs(shapes.vertices).max(), np.abs(_vertices(layer))):
+def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limits) -> tuple[Shapes, Shapes]:
+    """Return two layers as edges in the range of exact signs. Raises: NotRepresentableError if there is no scale, or
+    they need one where distances are measured."""
+    made = shapes_of(_cleaned(left, limits), limits), shapes_of(_cleaned(right, limits), limits)
+    scaled = in_range(*made)
+    if is_measured and scaled[0] is not made[0]:
         raise NotRepresentableError("distances need coordinates within 2^-480 .. 2^480; scale the layers", ())
-
-
-def _vertices(layer: MixedLayer) -> FloatArray:
-    return np.concatenate([layer.areas.arrays.vertices, layer.paths.vertices])
+    return scaled
 
 
 def nearest_features(
@@ -113,8 +113,7 @@ def nearest_features(
 ) -> tuple[IntArray, FloatArray]:
     """Return (n, 2) pairs of each left feature and all right ones nearest to it, sorted, and their distances.
     is_exclusive: those that are equal to it do not count."""
-    shapes, others = in_range(shapes_of(_cleaned(left, limits), limits), shapes_of(_cleaned(right, limits), limits))
-    _check_unscaled(shapes, left)
+    shapes, others = _shapes(left, right, True, limits)
     equal = related_pairs(left, right, "equals", 0.0, limits) if is_exclusive else np.zeros((0, 2), np.int64)
     return nearest_pairs(shapes, others, most, equal[:, 0] * len(others.dims) + equal[:, 1], limits)
 

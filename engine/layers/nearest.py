@@ -74,7 +74,7 @@ def nearest_pairs(
         pairs = _of(pairs_between(left, right, np.maximum(reaches, 0.0), limits), reaches)
         pairs = pairs[~np.isin(pairs[:, 0] * len(right.dims) + pairs[:, 1], left_out)]
         best, made = np.full(len(left.dims), inf), meets(left, right, pairs, limits)
-        bounds = _bounds(left, right, pairs, np.where(made, -1.0, reaches[pairs[:, 0]]), limits)
+        bounds = _bounds(left, right, pairs, np.where(made, -inf, reaches[pairs[:, 0]]), limits)
         bounds.low[made] = bounds.high[made] = 0.0
         np.minimum.at(best, pairs[:, 0], bounds.high)
         is_last = reach >= min(most, 2.0 * extent)

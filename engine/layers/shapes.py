@@ -14,7 +14,7 @@ from engine.errors import NotRepresentableError
 from engine.layers.limits import Limits
 from engine.layers.rows import Layer
 from engine.polygon_overlay.pair_arrays import PolygonArrays, concatenate_polygons
-from engine.predicates.rational import exponent_above, shifted
+from engine.predicates.rational import shifted
 from engine.solids.ragged import next_in_rings, summed
 from engine.types import FlagArray, FloatArray, Int8Array, IntArray, read_only
 
@@ -22,7 +22,8 @@ POINT: Final = 0
 LINE: Final = 1
 AREA: Final = 2
 """Dimensions of features; -1 for one without geometry."""
-_SMALLEST, _LARGEST = 2.0**-480, 2.0**480
+_EXPONENT: Final = 480
+_SMALLEST, _LARGEST = 2.0**-_EXPONENT, 2.0**_EXPONENT
 """Range of nonzero coordinates in which signs of orientation are decided by expansions (simple_rings.py)."""
 _PAIR_BYTES: Final = 16
 
@@ -104,7 +105,7 @@ def shapes_of(layer: MixedLayer, limits: Limits) -> Shapes:
     leaves = 1 << np.ceil(np.log2(np.maximum(1, -(-sizes // BLOCK)))).astype(np.int64)
     box_firsts = summed(2 * leaves)
     limits.budget().take(8 * (4 * int(box_firsts[-1]) + 3 * len(vertices)))
-    boxes = np.empty((box_firsts[-1], 4))
+    boxes = np.zeros((box_firsts[-1], 4))  # the first row of each tree is nobody's, but is scaled
     trees = boxes, box_firsts, np.array([np.inf, 0.0])
     made = Shapes(dims, read_only(vertices), read_only(following), firsts, ends, end_firsts, *trees)
     with limits.budget() as budget:
@@ -152,7 +153,7 @@ def in_range(left: Shapes, right: Shapes) -> tuple[Shapes, Shapes]:
     least, most = min(left.sizes[0], right.sizes[0]), max(left.sizes[1], right.sizes[1])
     if least > _SMALLEST and most < _LARGEST:
         return left, right
-    exponent = -exponent_above(float(most))
+    exponent = _EXPONENT - int(np.frexp(most)[1])
     moved: list[Any] = [
         shifted(each, exponent) for shape in (left, right) for each in (shape.vertices, shape.ends, shape.boxes)
     ]

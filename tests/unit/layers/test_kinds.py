@@ -243,3 +243,30 @@ def test_features_of_geojson() -> None:
     collection = {"type": "FeatureCollection", "features": [{"type": "Feature", "id": 7, "geometry": wrong}]}
     with pytest.raises(engine.EngineError, match=r"layer.features\[0\] \(id 7\)"):
         layers.clip_features(collection, texts[1])
+
+
+def test_features_that_meet_are_zero_apart_at_every_scale() -> None:
+    for size in (1.0, 2.0**50, 2.0**300):
+        line = geopandas.GeoDataFrame(geometry=[shapely.LineString([(0, 0), (4 * size, 4 * size)])])
+        point = geopandas.GeoDataFrame(geometry=[shapely.Point(size, size)])
+        assert layers.sjoin_nearest(point, line, distance_col="d").d.tolist() == [0.0]
+
+
+@pytest.mark.parametrize("size", [2.0**1000, 2.0**-500, 2.0**-1070])
+def test_layers_at_any_scale_are_related(size: float) -> None:
+    for shape in (shapely.Point(size, size), shapely.LineString([(0, 0), (4 * size, 3 * size)])):
+        for _ in range(3):  # the memory that trees are made in is another each time
+            np.full(8, np.nan)  # which may be this
+            layer = geopandas.GeoDataFrame(geometry=[shape])
+            assert len(layers.sjoin(layer, layer, predicate="contains")) == 1
+    pair = [geopandas.GeoDataFrame(geometry=[shapely.Point(*at)]) for at in ((1.0, 2.0**-500), (2.0**400, 0.0))]
+    assert len(layers.sjoin(*pair)) == 0
+
+
+def test_distances_beyond_the_range_are_refused_of_a_layer_at_the_origin_too() -> None:
+    origin, far = (geopandas.GeoDataFrame(geometry=[shapely.Point(x, 0.0)]) for x in (0.0, 2.0**1000))
+    for left, right in ((origin, far), (far, origin)):
+        with pytest.raises(engine.NotRepresentableError, match="scale the layers"):
+            layers.sjoin_nearest(left, right)
+        with pytest.raises(engine.NotRepresentableError, match="scale the layers"):
+            layers.sjoin(left, right, predicate="dwithin", distance=1.0)
