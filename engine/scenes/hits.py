@@ -204,9 +204,10 @@ def _are_near(lines: Lines, box: FloatArray, near: BoolArray, budget: Budget) ->
         with np.errstate(all="ignore"):
             slack, way = 2.0**-40 * np.maximum(abs(p), abs(box).max(axis=0)) + 2.0**-1000, q if lines.is_ray else q - p
             low, high = box[0] - slack - p, box[1] + slack - p
+            way = np.where(np.isfinite(way), way, np.nan)
             ends = np.stack([low / way, high / way])
             enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
-            is_apart = (enter - leave > 2.0**-40 * (abs(enter) + abs(leave))) | (leave < 0.0)
+            is_apart = (enter - leave > 2.0**-40 * (abs(enter) + abs(leave)) + 2.0**-1000) | (leave < 0.0)
             is_apart |= ((way == 0.0) & ((low > 0.0) | (high < 0.0))).any(axis=1)
             near[first : first + _ROWS] = ~(is_apart | (enter > (np.inf if lines.is_ray else 1.0)))
 

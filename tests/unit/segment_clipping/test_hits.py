@@ -181,3 +181,11 @@ def test_threads_and_chunks_change_nothing() -> None:
     once = engine.hits(lines, surface, workers=1)
     assert engine.hits(lines, surface, workers=2) == once
     assert len(once) == 400 * len(engine.hits(lines[:9], surface))
+
+
+def test_a_segment_longer_than_the_largest_double_hits_bodies_of_scenes() -> None:
+    surface = engine.Surface([[0, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2]])
+    segment = [[[-1.7e308, -1, 0.25], [1.7e308, 1.5, 0.25]]]
+    assert engine.hits(segment, surface).t.tolist() == [0.5]
+    assert engine.Scene([surface]).hits(segment).t.tolist() == [0.5]
+    assert engine.Scene([surface]).hits(segment, keep="any").tolist() == [True]
