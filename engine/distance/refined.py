@@ -331,8 +331,6 @@ def certify(
         own, least = faces[pairs[k, 0]], faces[pairs[best, 0]]
         if own < least or (own == least and their_faces[pairs[k, 1]] < their_faces[pairs[best, 1]]):
             best = k
-    for column in range(4):
-        pairs[0, column] = pairs[best, column]
     none = Wide(0.0, 0.0)
     t = corners_of(s.a, pairs[0, 0], Wide3(none, none, none))
     u = corners_of(s.b, pairs[0, 1], shift_of(s, start, other))
@@ -342,11 +340,15 @@ def certify(
     if not (inside > CERTAIN and way.x.h * way.x.h + way.y.h * way.y.h + way.z.h * way.z.h > 2.0**-300):
         return False
     for k in range(n):
-        t = corners_of(s.a, pairs[k, 0], Wide3(none, none, none))
+        if k > 0 and pairs[k, 0] != pairs[k - 1, 0]:
+            t = corners_of(s.a, pairs[k, 0], Wide3(none, none, none))
+        if k > 0 and pairs[k, 1] != pairs[k - 1, 1]:
+            u = corners_of(s.b, pairs[k, 1], shift_of(s, start, other))
         if not are_strictly_beyond(s.a, pairs[k, 0], here, t, way, p, slack):
             return False
-        u = corners_of(s.b, pairs[k, 1], shift_of(s, start, other))
         if not are_strictly_beyond(s.b, pairs[k, 1], there, u, back, q, slack):
             return False
+    for column in range(4):
+        pairs[0, column] = pairs[best, column]
     is_proven = write_offset_point(s.a, here, p, way, radii[0], start, start, error, points[0])
     return write_offset_point(s.b, there, q, back, radii[1], start, other, error, points[1]) and is_proven
