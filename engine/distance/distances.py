@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, ClassVar, Final, Literal, TypeAlias, cast
 
 import numpy as np
@@ -119,7 +118,7 @@ class PointQuery:
     is_signed, to_boundary: as of `distances`. limit: a distance to compare with; is_named: nearest points too."""
 
     def __init__(
-        self, points: FloatArray, solid: Any, pose: Pose | None, limit: float | None, is_named: bool,
+        self, points: FloatArray, solid: Any, pose: Pose | None, limit: float | None, is_named: bool, budget: Budget,
         to_boundary: bool = False, is_signed: bool = False, where: tuple[str | int, ...] = ("solid",),
     ) -> None:  # fmt: skip
         n = len(points)
@@ -131,10 +130,9 @@ class PointQuery:
         feet, codes = np.empty((rows, points.shape[1])), np.full((rows, 2), -1, np.int64)
         self.answers = Answers(np.full(n, np.nan), feet, codes)
         self._stops_inside = has_inside(solid) and not (to_boundary or is_signed)
-        self._locator: Callable[[Budget], Locator] | None = None
+        self._locator: Locator | None = None
         if has_inside(solid) and (is_signed or not to_boundary):
-            chosen = posed_locator(solid, pose).chosen
-            self._locator = partial(chosen, n)
+            self._locator = posed_locator(solid, pose).chosen(n, budget)
         self.locations = np.full(n if self._locator else 0, -1, np.int8)
         self.is_within = np.zeros(rows, np.bool_)
 
@@ -143,7 +141,7 @@ class PointQuery:
         distance = self.answers.distance
         if self._locator is not None:
             places = self.locations[start:stop]
-            self.n_exact += self._locator(budget).fill(self.points[start:stop], places, budget).rational
+            self.n_exact += self._locator.fill(self.points[start:stop], places, budget).rational
             if not self.answers.is_named:
                 distance[start:stop][places == 0] = 0.0
             if self._stops_inside:
@@ -283,7 +281,7 @@ def distances(
             raise InvalidOperationError(f"a {body.type} has no inside: leave signed out", ("signed",))
     with Budget(reader.left(), cancel) as budget:
         budget.check()
-        query = PointQuery(array, body, moved, limit, nearest, to == "boundary", signed)
+        query = PointQuery(array, body, moved, limit, nearest, budget, to == "boundary", signed)
         run_chunks(
             lambda start, stop: query.fill(start, stop, budget),
             len(array), budget=budget, workers=workers, progress=progress,

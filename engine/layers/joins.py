@@ -187,9 +187,9 @@ def _of_areas(left: Layer, right: Layer, pairs: IntArray, has_detail: bool, limi
     if len(rest):
         names, places = np.unique(shifted[rest], return_inverse=True)
         only, solids = places.reshape(-1, 2), list(PolygonSelection(both, names))
-        found = limits.record(collide_scene(solids, only=only, detail=True, **limits.options()))
+        related = limits.record(collide_scene(solids, only=only, detail=True, **limits.options()))
         codes, keys = np.full(len(rest), int(Rcc8.DC)), only[:, 0] * n + only[:, 1]
         order = np.argsort(keys)
-        codes[order[np.searchsorted(keys[order], found.first * n + found.second)]] = found.detail
+        codes[order[np.searchsorted(keys[order], related.first * n + related.second)]] = related.detail
         bits[rest] = _OF_RCC8[codes]
     return bits

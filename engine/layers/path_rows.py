@@ -140,11 +140,11 @@ def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, lim
     first, second = related_pairs(points, MixedLayer(areas, no_paths(len(areas))), "intersects", 0.0, limits).T
     if is_outside:
         first = np.setdiff1d(np.arange(len(vertices)), first)
-        found = np.column_stack([first, np.zeros(len(first), np.int64)])
+        units = np.column_stack([first, np.zeros(len(first), np.int64)])
     else:
-        found = np.unique(np.column_stack([first, keys[second]]), axis=0)
-    pairs = np.column_stack([features[found[:, 0]], found[:, 1]])
-    return pairs, _Parts(vertices[found[:, 0]], np.arange(len(found) + 1))
+        units = np.unique(np.column_stack([first, keys[second]]), axis=0)
+    pairs = np.column_stack([features[units[:, 0]], units[:, 1]])
+    return pairs, _Parts(vertices[units[:, 0]], np.arange(len(units) + 1))
 
 
 def _of_lines(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:

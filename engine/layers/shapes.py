@@ -186,8 +186,8 @@ def pairs_between(left: Shapes, right: Shapes, reach: Any, limits: Limits) -> In
             budget.take(_PAIR_BYTES * len(blocks[-1]))
         budget.check()
     both = np.concatenate(blocks)
-    found = np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
-    return found[np.lexsort((found[:, 1], found[:, 0]))] if len(blocks) > 2 else found
+    pairs = np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))] if len(blocks) > 2 else pairs
 
 
 def no_paths(n: int) -> Paths:

@@ -67,7 +67,7 @@ def measure_all(
     def task(start: int, stop: int) -> None:
         for some, number in _turns(points, boxes, best, start, stop, max(1, _PAIRS // len(solids)), budget):
             query = PointQuery(
-                read_only(points[some]), solids[number], poses[number], None, True, where=("solids", number)
+                read_only(points[some]), solids[number], poses[number], None, True, budget, where=("solids", number)
             )
             query.fill(0, len(some), budget)
             answer: Distances = query.result()
