@@ -132,6 +132,7 @@ def test_a_wheel_has_one_package_and_the_same_bytes_twice(
     assert not [name for name in zipfile.ZipFile(full).namelist() if name.endswith("lock")]
 
 
+@pytest.mark.full
 def test_the_source_archive_has_its_tests_and_builds_the_same_wheel(plain: Path, tmp_path: Path) -> None:
     words = [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)]
     subprocess.run(words, cwd=ROOT, check=True, capture_output=True, timeout=300)

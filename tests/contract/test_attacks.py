@@ -34,6 +34,7 @@ def service() -> Iterator[Service]:
         yield service
 
 
+@pytest.mark.some(8)
 @pytest.mark.parametrize("attack", ATTACKS, ids=lambda attack: attack.name)
 def test_an_attack_is_refused_in_time_and_within_memory(service: Service, attack: Attack) -> None:
     attack.send(service.port)  # the body is made, and what the question needs is loaded

@@ -252,7 +252,7 @@ def test_every_operation_has_its_work() -> None:
     assert set(WORK) == set(OPERATIONS)
 
 
-@pytest.mark.some(10)
+@pytest.mark.some(5)
 @pytest.mark.parametrize("end", ["deadline", "disconnect"])
 @pytest.mark.parametrize("name", WORK)
 def test_work_ends(services: dict[str, Service], name: str, end: str) -> None:

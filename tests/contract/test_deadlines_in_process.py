@@ -288,6 +288,7 @@ def test_every_operation_has_its_work() -> None:
     assert set(WORK) == operations()
 
 
+@pytest.mark.some(30)
 @pytest.mark.parametrize("is_cancelled", [False, True])
 @pytest.mark.parametrize("name", WORK)
 def test_work_ends(name: str, is_cancelled: bool) -> None:

@@ -158,6 +158,7 @@ def test_the_client_in_typescript_prints_the_same(desk: Desk) -> None:
     assert json.loads(answer) == [[True, False], [0]]
 
 
+@pytest.mark.full
 def test_a_type_checker_takes_them(tmp_path: Path) -> None:
     files = []
     for number, job in enumerate(jobs()):

@@ -35,8 +35,8 @@ def ask(folder: Path, *options: str, seconds: float) -> int:
     return int(found[1].replace(",", ""))
 
 
-def test_a_hundred_cases(tmp_path: Path) -> None:
-    assert ask(tmp_path, "--phases", "examples,fuzzing,stateful", "--max-examples", "2", seconds=200) >= 100
+def test_some_cases_of_every_path(tmp_path: Path) -> None:
+    assert ask(tmp_path, "--phases", "examples,fuzzing", "--max-examples", "1", seconds=200) >= 40
 
 
 @pytest.mark.full

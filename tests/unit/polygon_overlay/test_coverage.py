@@ -113,6 +113,7 @@ FAMILIES: dict[Callable[[Random], list[list[Any]]], bool | None] = {
 """Whether the union is made without the arrangement of all; None: as it happens."""
 
 
+@pytest.mark.some(60)
 @pytest.mark.parametrize("draw", FAMILIES)
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("unit", [1.0, 0.1, 2.0**100, 2.0**-90])

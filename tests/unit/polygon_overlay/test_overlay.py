@@ -121,7 +121,7 @@ def random_rings(seed: Any, size: int) -> list[Ring]:
     return [[tuple(v) for v in random.integers(0, size, (n, 2)).astype(float).tolist()] for n in (8, 5)]
 
 
-@pytest.mark.some(8)
+@pytest.mark.some(4)
 @pytest.mark.parametrize("size", [3, 5, 9, 1 << 24])
 @pytest.mark.parametrize("seed", range(6))
 def test_random_rings_on_a_lattice(seed: int, size: int) -> None:

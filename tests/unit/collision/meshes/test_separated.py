@@ -37,6 +37,7 @@ def cut_corner(rng: np.random.Generator) -> Polyhedron:
             return Polyhedron(corners.astype(float), TETRAHEDRON)
 
 
+@pytest.mark.some(10)
 @pytest.mark.parametrize("pose", [None, TURN])
 @pytest.mark.parametrize("seed", range(12))
 def test_the_witness_is_the_strongest_of_all_contacts(seed: int, pose: Pose | None) -> None:
@@ -60,6 +61,7 @@ def test_the_witness_is_the_strongest_of_all_contacts(seed: int, pose: Pose | No
     assert kinds
 
 
+@pytest.mark.some(20)
 @pytest.mark.parametrize("pose", [None, TURN])
 @pytest.mark.parametrize("at", list(itertools.product((-1, -0.5, 0, 1, 2), (-1, 0, 0.5, 2), (-1, 2))))
 def test_boxes_that_touch(at: tuple[float, float, float], pose: Pose | None) -> None:

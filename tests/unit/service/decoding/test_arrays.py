@@ -120,7 +120,7 @@ def test_rings_of_several_lengths_are_arrays(text: str) -> None:
 
 def test_it_never_takes_what_is_no_json() -> None:
     source, taken = random.Random(4), 0
-    for _ in range(6000):
+    for _ in range(2000):
         text = bytearray(some_body(source))
         for _ in range(source.choice([1, 1, 2])):
             at = source.randrange(len(text))
@@ -133,7 +133,7 @@ def test_it_never_takes_what_is_no_json() -> None:
                 assert plain(found) == plain(wire.decode(text))
             except ServiceError:
                 pytest.fail(f"took {bytes(text)!r}")
-    assert taken > 100
+    assert taken > 30
 
 
 def test_numbers_are_those_of_float() -> None:
