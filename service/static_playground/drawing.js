@@ -1,6 +1,6 @@
 // From solids, rings and lines to the items of a view. Colours are names of the style sheet's variables.
 
-const times = (rotation, p) => rotation.map((row) => row.reduce((sum, r, k) => sum + r * p[k], 0));
+import { toView, turned as times } from "./frame.js";
 
 // The solid under a pose, as far as it is drawn.
 export function posed(solid, { rotation, translation }) {
@@ -21,13 +21,24 @@ export function solid2d(solid, color) {
   return [{ kind: "half_plane", normal: solid.normal, offset: solid.offset, color, fill: 0.2 }];
 }
 
-export function solid3d(solid, color, alpha) {
-  const { vertices, faces } = solid.mesh, triangles = [], edges = [];
-  for (const face of faces) {
-    for (let i = 2; i < face.length; i++) triangles.push(vertices[face[0]], vertices[face[i - 1]], vertices[face[i]]);
-    if (faces.length <= 20) face.forEach((i, k) => edges.push([vertices[i], vertices[face[(k + 1) % face.length]]]));
-  }
-  return [{ kind: "triangles", points: triangles, color, alpha }, { kind: "lines", lines: edges, color, width: 1.5 }];
+// A body in space, under a pose; its triangles are put into one array once, the pose is applied when it is drawn.
+export function solid3d(solid, color, alpha, pose) {
+  const { vertices, faces } = solid.mesh, edges = [], place = pose ? (p) => times(pose.rotation, p).map((v, k) => v + pose.translation[k]) : (p) => p;
+  if (faces.length <= 20) for (const face of faces) face.forEach((i, k) => edges.push([vertices[i], vertices[face[(k + 1) % face.length]]].map(place)));
+  return [{ kind: "triangles", mesh: solid.mesh, pose, color, alpha }, { kind: "lines", lines: edges, color, width: 1.5 }];
+}
+
+const arrays = new WeakMap(); // of triangles in a frame, by mesh
+
+function triangles(mesh, frame) {
+  const kept = arrays.get(mesh);
+  if (kept?.frame === frame) return kept.positions;
+  const { vertices, faces } = mesh, positions = new Float32Array(9 * faces.reduce((sum, face) => sum + Math.max(0, face.length - 2), 0));
+  const seen = vertices.map((p) => toView(frame, p));
+  let place = 0;
+  for (const face of faces) for (let i = 2; i < face.length; i++) for (const corner of [face[0], face[i - 1], face[i]]) for (const v of seen[corner]) positions[place++] = v;
+  arrays.set(mesh, { frame, positions });
+  return positions;
 }
 
 // A closed ring in space, filled as a fan and outlined, before everything else.
@@ -47,12 +58,13 @@ export function outlines(rings, color, width, fill) {
   return rings.map((ring) => sides(ring, color, width));
 }
 
-// What the views want: numbers in one array about the centre, colours resolved.
-export function prepared3d(items, centre, colors) {
-  return items.map(({ kind, points, lines, color, alpha = 1, width, onTop }) => {
-    const positions = new Float32Array((points ?? lines.flat()).flatMap((p) => p.map((v, k) => v - centre[k])));
-    return { kind, positions, color: [...colors[color].map((v) => v / 255), alpha], width, onTop };
-  });
+// What the views want: numbers in one array, in the frame; colours and poses resolved.
+export function prepared3d(items, frame, colors) {
+  return items.map(({ kind, points, lines, mesh, pose, color, alpha = 1, width, onTop, pane }) => ({
+    kind, width, onTop, pane, color: [...colors[color].map((v) => v / 255), alpha],
+    positions: mesh ? triangles(mesh, frame) : new Float32Array((points ?? lines.flat()).flatMap((p) => toView(frame, p))),
+    pose: pose && { rotation: pose.rotation, translation: toView(frame, times(pose.rotation, frame.middle).map((v, k) => v + pose.translation[k])) },
+  }));
 }
 
 export function prepared2d(items, colors) {

@@ -1,55 +1,43 @@
-// A request in the address, as the report of speed against error links it: its solids and items in place of the examples,
-// every number as given. The picture is scaled to its size; what is asked is not.
+// Solids that are brought: by a file, a text, or a request in the address, as the report of speed against error links it. They
+// are asked about as they are given; only the picture is scaled to its size.
+
+import { positions } from "./own.js";
 
 const QUESTION = {
   "/v1/contains": "contains", "/v1/distances": "distances", "/v1/clip/segments": "segments", "/v1/clip/polygons": "polygons", "/v1/overlay": "overlay",
   "/v1/collide": "collide", "/v1/clearance": "collide",
 };
-export const KEYS = ["given first", "given second"];
 
 const corners = ([a, b]) => [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [i & 1, (i >> 1) & 1, i >> 2].map((bit, k) => (bit ? b : a)[k]));
 const QUADS = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
+// Positions between which a solid lies, as far as it says.
+export function extent(json) {
+  const ends = json.radius === undefined ? [] : [-1, 1].map((sign) => json.center.map((v) => v + sign * json.radius));
+  return [...positions(json.rings ?? json.vertices ?? (json.min ? [json.min, json.max] : [])).filter((p) => p.length), ...ends];
+}
+
 // A solid of the HTTP interface as the playground keeps its examples; one that it cannot draw is asked about all the same.
-function example(json, dimension) {
-  const flags = { name: `${json.type.replace("_", " ")} of the link`, polygon: json.type === "polygon", convex: true };
+export function example(json, name) {
+  const found = extent(json), dimension = found[0]?.length ?? (json.normal?.length || json.planes?.[0].length - 1);
+  if (![2, 3].includes(dimension)) throw new Error(`${name} holds a solid that cannot be shown: type ${JSON.stringify(json.type)}`);
+  const flags = { name, isOwn: true, polygon: json.type === "polygon", mesh: json.type === "polyhedron", convex: json.type !== "polygon" || dimension === 2 };
   const drawn = { polyhedron: () => ({ vertices: json.vertices, faces: json.faces }), aabb: () => ({ vertices: corners([json.min, json.max]), faces: QUADS }),
     triangle: () => ({ vertices: json.vertices, faces: [[0, 1, 2]] }) };
   drawn.surface = drawn.polyhedron;
-  if (dimension === 3) return { ...flags, make: () => ({ json, mesh: (drawn[json.type] ?? (() => ({ vertices: [], faces: [] })))() }) };
-  if (json.type === "aabb") return { ...flags, make: () => ({ json, drawn: [[json.min, [json.max[0], json.min[1]], json.max, [json.min[0], json.max[1]]]] }) };
   const known = ["polygon", "sphere", "half_space"].includes(json.type);
-  return { ...flags, make: () => ({ json, ...(known ? {} : { drawn: json.type === "triangle" ? [json.vertices] : [] }) }) };
+  const parts = dimension === 3 ? { mesh: (drawn[json.type] ?? (() => ({ vertices: [], faces: [] })))() }
+    : json.type === "aabb" ? { drawn: [[json.min, [json.max[0], json.min[1]], json.max, [json.min[0], json.max[1]]]] }
+      : known ? {} : { drawn: json.type === "triangle" ? [json.vertices] : [] };
+  return { dimension, flags, solid: { json, ...parts, isOwn: true, extent: found } };
 }
 
-const positions = (value) => (Array.isArray(value) ? (typeof value[0] === "number" ? [value] : value.flatMap(positions)) : []);
-
-// What the link asks: the question, the dimension, the solids by key, the items, and where the picture is.
+// What the link asks: the question, the dimension, the solids and the items.
 export function readRequest(text) {
   const [path, body] = JSON.parse(text), question = QUESTION[path];
   const solids = [body.solid ?? body.region ?? body.first ?? body.subject, body.second ?? body.clip].filter(Boolean);
-  const items = body.points ?? body.segments ?? body.polygons, all = positions(items);
-  for (const solid of solids) {
-    all.push(...positions(solid.rings ?? solid.vertices ?? (solid.min ? [solid.min, solid.max] : [])));
-    if (solid.radius !== undefined) for (const sign of [-1, 1]) all.push(solid.center.map((v) => v + sign * solid.radius));
-  }
-  const dimension = all[0]?.length;
+  const items = Object.fromEntries(["points", "segments", "polygons"].filter((name) => body[name]).map((name) => [name, body[name]]));
+  const dimension = [...solids.flatMap(extent), ...positions(Object.values(items)[0] ?? [])][0]?.length;
   if (!question || ![2, 3].includes(dimension) || body.poses) throw new Error("the link holds a request that cannot be shown");
-  const ends = [Math.min, Math.max].map((f) => all[0].map((_, k) => all.reduce((m, p) => f(m, p[k]), all[0][k])));
-  const size = Math.max(...ends[0].map((low, k) => ends[1][k] - low)) || 1;
-  return {
-    text, question, dimension, operation: body.operation, items, n: items?.length ?? 1,
-    examples: Object.fromEntries(solids.map((solid, i) => [KEYS[i], example(solid, dimension)])),
-    frame: { middle: ends[0].map((low, k) => low + (ends[1][k] - low) / 2), scale: 3 / size },
-  };
-}
-
-// Items of a view as they look in the frame.
-export function framed(drawn, { middle, scale }) {
-  const place = (p) => p.map((v, k) => (v - middle[k]) * scale);
-  return drawn.map((item) => ({
-    ...item, ...(item.points && { points: item.points.map(place) }), ...(item.lines && { lines: item.lines.map((line) => line.map(place)) }),
-    ...(item.rings && { rings: item.rings.map((ring) => ring.map(place)) }), ...(item.center && { center: place(item.center), radius: item.radius * scale }),
-    ...(item.normal && { offset: scale * (item.offset + item.normal.reduce((sum, n, k) => sum + n * middle[k], 0)) }),
-  }));
+  return { question, dimension, solids, items, operation: body.operation };
 }

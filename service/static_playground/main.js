@@ -2,49 +2,81 @@
 // the newest state waits.
 
 import { prepared2d, prepared3d, styleColors } from "./drawing.js";
-import { KEYS, framed, readRequest } from "./given.js";
-import { readMesh } from "./mesh_files.js";
-import { QUESTIONS } from "./questions.js";
+import { UNIT, frameOf, framed, fromView, placed, toView, turned } from "./frame.js";
+import { example, readRequest } from "./given.js";
+import { Lens, boundaryNear, lattice } from "./lens.js";
+import { History, fragment, readFragment, restore, snapshot } from "./links.js";
+import { isMesh, readMesh } from "./mesh_files.js";
+import { positions, readText, toWkt } from "./own.js";
+import { QUESTIONS, secondPose } from "./questions.js";
+import { curl, showFigures, showRequest, shownRequest } from "./showing.js";
 import { solid_types } from "./solids.js";
 import { View2D } from "./view2d.js";
 import { View3D } from "./view3d.js";
 
 const $ = (id) => document.getElementById(id);
-const state = { question: "proof", dimension: 2, offset: [0, 0, 0], operation: "intersection", n: 1 };
+const state = { question: "proof", dimension: 3, offset: [0, 0, 0], operation: "intersection", n: 1, own: null, attitude: null, lens: null };
 const loaded = { 2: {}, 3: {} }; // solids made or opened, by key
 const LARGE = 20000; // characters of a solid's JSON from which it is stored once and named by its id
+const past = new History();
+let brought = []; // what was opened, pasted or came with the link: {key, json} of solids, {items}
 
-const view2d = new View2D($("view2d"), move, moveCorner);
-let view3d = null;
-try { view3d = new View3D($("view3d"), move); } catch (error) { complain(error.message); }
+const views = { plane: new View2D($("view2d"), { onMove: move, onCorner: moveCorner, onCornerEnd: saveState, onAdd: addCorner, onDelete: deleteCorner, onView: saveState }), space: null };
+try { views.space = new View3D($("view3d"), { onMove: move, onTurn: turnBy, onTurnEnd: saveState }); } catch (error) { complain(error.message); }
+const lens = new Lens($("lens"), (depth, times) => {
+  $("depth").value = depth;
+  $("zoomed").textContent = `${times < 1e4 ? Math.round(times).toLocaleString("en") : times.toExponential(1).replace(/e\+(\d+)/, (_, power) => ` · 10${[...power].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("")}`)} times as large`;
+});
 
 function move(step) {
-  if (state.given) return;  // what a link gives stays as it is
   state.offset = state.offset.map((v, k) => v + (step[k] ?? 0));
   refresh();
 }
 
-// Corners that can be dragged, in the order of the view: those of the first solid, then those of the second under its pose.
-function corners(now) {
-  const shift = now.layout?.shifts[0] ?? [0, 0], offset = now.layout ? now.offset : [0, 0];
-  const place = { rotation: now.rotation, translation: now.offset.slice(0, 2) };
-  const found = [[now.first, (p) => p.map((v, k) => v + offset[k] + shift[k]), (p) => p.map((v, k) => v - offset[k] - shift[k])]];
-  if (now.second) found.push([now.second, (p) => turned(now.rotation, p).map((v, k) => v + place.translation[k]),
-    (p) => turned(now.rotation[0].map((_, k) => now.rotation.map((row) => row[k])), p.map((v, k) => v - place.translation[k]))]);
-  return found.filter(([solid]) => solid.json.type === "polygon" && solid.rings.flat().length <= 100)
-    .flatMap(([solid, to, from]) => solid.rings.flatMap((ring) => ring.map((p, i) => ({ at: to(p), set(q) { ring[i] = from(q); solid.isEdited = true; solid.asked = solid.json; } }))));
+function turnBy(axis, angle) {  // about an axis of space, after all turns before
+  const [w, x, y, z] = attitude(), [c, s] = [Math.cos(angle / 2), Math.sin(angle / 2)], u = [0, 0, 0];
+  u[axis] = s;
+  const q = [c * w - u[0] * x - u[1] * y - u[2] * z, c * x + u[0] * w + u[1] * z - u[2] * y, c * y - u[0] * z + u[1] * w + u[2] * x, c * z + u[0] * y - u[1] * x + u[2] * w];
+  state.attitude = q.map((v) => v / Math.hypot(...q));
+  refresh();
 }
 
-const turned = (rotation, p) => rotation.map((row) => row.reduce((sum, r, k) => sum + r * p[k], 0));
+function attitude() {
+  const half = (Number($("turn").value) * Math.PI) / 360;
+  return state.attitude ?? [Math.cos(half), 0, Math.sin(half), 0];
+}
 
-function moveCorner(corner, position) {
-  corners(state)[corner]?.set(position);
+// --- corners that can be dragged, of polygons of at most 100 vertices, where the picture has them ---------------------------
+
+// By body and ring: the positions in the picture, and how a place there becomes one of the solid.
+function editable(now) {
+  const bodies = QUESTIONS[now.question].placed?.(now) ?? [[now.first, null], ...(now.second ? [[now.second, secondPose(now)]] : [])];
+  return bodies.filter(([solid]) => solid.json.type === "polygon" && solid.rings.flat().length <= 100).flatMap(([solid, pose]) => {
+    const to = (p) => toView(now.frame, pose ? turned(pose.rotation, p).map((v, k) => v + pose.translation[k]) : p);
+    const from = (place) => { const p = fromView(now.frame, place); return pose ? turned(pose.rotation[0].map((_, k) => pose.rotation.map((row) => row[k])), p.map((v, k) => v - pose.translation[k])) : p; };
+    return solid.rings.map((ring, index) => ({ solid, ring, index, at: ring.map(to), from }));
+  });
+}
+
+const corners = (now) => editable(now).flatMap((each) => each.at.map((at, i) => ({ ...each, i, at })));
+
+function changeRing(corner, change) {
+  if (!corner) return;
+  change(corner);
+  corner.solid.isEdited = true;
+  corner.solid.asked = corner.solid.json;
   refresh();
+}
+
+function moveCorner(number, place) { changeRing(corners(state)[number], ({ ring, i, from }) => { ring[i] = from(place); }); }
+function addCorner(number, place) { changeRing(corners(state)[number], ({ ring, i, from }) => { ring.splice(i + 1, 0, from(place)); }); }
+function deleteCorner(number) {
+  changeRing(corners(state)[number], ({ solid, ring, index, i }) => { if (ring.length > 3) ring.splice(i, 1); else if (solid.rings.length > 1) solid.rings.splice(index, 1); });
 }
 
 // --- solids -----------------------------------------------------------------------------------------------------------
 
-function solidOf(key, dimension) {
+function solidOf(key, dimension = state.dimension) {
   loaded[dimension][key] ??= completed({ ...solid_types[dimension][key], ...solid_types[dimension][key].make() });
   return loaded[dimension][key];
 }
@@ -65,19 +97,35 @@ async function store(solid) {
   solid.asked = { type: "stored", id: answer.id };
 }
 
-async function open(file) {
-  const { vertices, faces } = await readMesh(file), low = [0, 1, 2].map((k) => vertices.reduce((m, v) => Math.min(m, v[k]), Infinity));
-  const size = Math.max(...[0, 1, 2].map((k) => vertices.reduce((m, v) => Math.max(m, v[k]), -Infinity) - low[k])) || 1;
-  // shown in the playground's size: a power of two and whole steps, so that a mesh keeps its flush faces where they fit
-  const scale = 2 ** Math.round(1 - Math.log2(size)), middle = low.map((v) => v + size / 2);
-  const placed = vertices.map((v) => v.map((x, k) => (x - middle[k]) * scale));
-  const key = `file ${file.name}`, json = { type: "polyhedron", vertices: placed, faces };
-  loaded[3][key] = completed({ name: `${file.name} (${faces.length.toLocaleString("en")} faces)`, json, mesh: { vertices: placed, faces } });
-  solid_types[3][key] = { name: loaded[3][key].name, convex: true, make: () => loaded[3][key] };
-  if (state.question === "overlay" || state.question === "proof") document.querySelector("[name=question][value=contains]").click();
-  document.querySelector("[name=dimension][value='3']").click();
-  fillSelects(key);
+// Take a solid among the examples, as it is given.
+function keep(key, json, name) {
+  const { dimension, flags, solid } = example(json, name);
+  loaded[dimension][key] = completed({ ...flags, ...solid });
+  solid_types[dimension][key] = { ...flags, make: () => loaded[dimension][key] };
+  brought = [...brought.filter((each) => each.key !== key), { key, json, name }];
+  return dimension;
+}
+
+// Show what a file or a text holds: a solid, points or segments.
+function bring(found, key, name) {
+  let dimension = positions(Object.values(found)[0])[0]?.length;
+  if (found.solid) dimension = keep(key, found.solid, name);
+  else { state.own = found; brought = [...brought.filter((each) => !each.items), { items: found }]; }
+  const asks = found.segments ? ["segments", "scene"] : found.points ? ["contains", "distances", "proof"] : [], now = QUESTIONS[state.question];
+  const takesIt = found.solid ? state.question !== "proof" && now.firsts(solid_types[dimension][key]) : asks.includes(state.question);
+  if (!takesIt || (now.dimensions && !now.dimensions.includes(dimension))) document.querySelector(`[name=question][value=${asks[0] ?? "contains"}]`).checked = true;
+  document.querySelector(`[name=dimension][value="${dimension}"]`).checked = true;
+  chooseQuestion();
+  if (found.solid) fillSelects(key);
+  views.plane.look([0, 0], 1);
   refresh();
+}
+
+async function open(file) {
+  const name = file.name, key = `file ${name}`;
+  if (!isMesh(name)) return bring(readText(await file.text(), name), key, name);
+  const mesh = await readMesh(file);
+  bring({ solid: { type: "polyhedron", ...mesh } }, key, `${name} (${mesh.faces.length.toLocaleString("en")} faces)`);
 }
 
 // --- controls ---------------------------------------------------------------------------------------------------------
@@ -88,7 +136,8 @@ function fillSelects(wanted) {
     $(`${id}-label`).hidden = !allowed;
     if (!allowed) continue;
     const keys = Object.keys(solid_types[state.dimension]).filter((key) => allowed(solid_types[state.dimension][key]));
-    const kept = id === "first" && keys.includes(wanted) ? wanted : question.preferred && id === "first" ? question.preferred : keys.includes($(id).value) ? $(id).value : keys[id === "second" ? 1 : 0];
+    const preferred = id === "first" ? question.preferred?.[state.dimension] : undefined, before = $(id).value;
+    const kept = id === "first" && keys.includes(wanted) ? wanted : keys.includes(before) && !(preferred && before in solid_types[state.dimension] && !solid_types[state.dimension][before].isOwn) ? before : preferred ?? keys[id === "second" ? 1 : 0];
     $(id).replaceChildren(...keys.map((key) => new Option(solid_types[state.dimension][key].name, key, false, key === kept)));
   }
 }
@@ -101,32 +150,50 @@ function chooseQuestion() {
     if (only && !input.disabled) input.checked = true;
   }
   state.dimension = Number(document.querySelector("[name=dimension]:checked").value);
-  $("hint").textContent = `${question.hint} ${state.dimension === 3 ? "Drag turns, Shift-drag or two fingers move, the wheel zooms." : "Drag moves."}`;
+  const hint = typeof question.hint === "function" ? question.hint(state.dimension) : question.hint;
+  $("hint").textContent = `${hint} ${state.dimension === 3 ? "Drag turns, Shift-drag or two fingers move, the wheel zooms." : "Drag moves, Shift-drag or two fingers pan, the wheel zooms; double-click a side to add a vertex, a vertex to delete it."}`;
   $("operation-label").hidden = !question.operations;
   $("count-label").hidden = !question.counts;
   $("method-label").hidden = !question.methods;
   $("turn-label").hidden = !question.seconds;
   $("plain-label").hidden = !question.plain;
-  if (question.counts) [$("count").min, $("count").max, $("count").value] = question.counts;
+  if (question.counts) [$("count").min, $("count").max, $("count").value] = typeof question.counts === "function" ? question.counts(state.dimension) : question.counts;
   $("view3d").hidden = state.dimension !== 3;
   $("view2d").hidden = state.dimension !== 2;
-  state.offset = state.question === "collide" || state.question === "overlay" ? [0.9, 0.4, 0] : [0, 0, 0];
+  Object.assign(state, { offset: state.question === "collide" || state.question === "overlay" ? [0.9, 0.4, 0] : [0, 0, 0], attitude: null, lens: null });
+  if (views.space) views.space.spins = false;
   fillSelects();
 }
 
+const ITEMS = { proof: "points", contains: "points", distances: "points", segments: "segments", scene: "segments", polygons: "polygons" };
+
 function readControls() {
   const angle = (Number($("turn").value) * Math.PI) / 180, [c, s] = [Math.cos(angle), Math.sin(angle)];
-  state.rotation = state.dimension === 3 ? [[c, 0, s], [0, 1, 0], [-s, 0, c]] : [[c, -s], [s, c]];
-  $("turn-shown").textContent = `${$("turn").value}°`;
-  state.n = state.given?.n ?? Math.round(10 ** Number($("count").value));
-  $("count-shown").textContent = state.n.toLocaleString("en");
-  state.snap = $("snap").checked;
-  state.plain = $("plain").checked;
-  state.operation = $("operation").value;
-  state.method = $("method").value;
-  state.layout = QUESTIONS[state.question].layout?.($("view2d"));
-  state.first = solidOf($("first").value, state.dimension);
-  state.second = QUESTIONS[state.question].seconds ? solidOf($("second").value, state.dimension) : null;
+  state.rotation = state.dimension === 2 ? [[c, -s], [s, c]] : state.attitude ? matrix(state.attitude) : [[c, 0, s], [0, 1, 0], [-s, 0, c]];
+  $("turn-shown").textContent = state.attitude ? "by hand" : `${$("turn").value}°`;
+  const items = state.own?.[ITEMS[state.question]], fits = items && positions(items[0])[0].length === state.dimension;
+  state.n = fits ? items.length : Math.round(10 ** Number($("count").value));
+  $("count-shown").textContent = `${state.n.toLocaleString("en")}${fits ? ", as brought" : ""}`;
+  state.items = fits ? state.own : null;
+  for (const id of ["snap", "plain"]) state[id] = $(id).checked;
+  for (const id of ["operation", "method"]) state[id] = $(id).value;
+  const [first, second] = [solidOf($("first").value), QUESTIONS[state.question].seconds ? solidOf($("second").value) : null];
+  state.frame = frameFor([first, second].filter((solid) => solid?.isOwn), fits ? items : null);
+  [state.first, state.second] = [first, second].map((solid) => solid && placed(solid, state.frame));
+}
+
+let lastFrame = { key: "", frame: UNIT };
+
+// Where the picture is: around what was brought, or where the examples are.
+function frameFor(solids, items) {
+  const all = solids.length ? solids.flatMap(({ rings, extent }) => rings?.flat() ?? extent) : items ? positions(items) : [], key = `${state.dimension} ${solids.map(({ name }) => name)} ${all.length}`;
+  if (!all.length) return UNIT;
+  if (lastFrame.key !== key) lastFrame = { key, frame: frameOf(all) };
+  return lastFrame.frame;
+}
+
+function matrix([w, x, y, z]) {
+  return [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]];
 }
 
 // --- asking -----------------------------------------------------------------------------------------------------------
@@ -165,7 +232,30 @@ async function once() {
   $("verdict").textContent = question.verdict(now, answer, figures, other);
   showFigures(figures, answer.accuracy, timing, seconds, items);
   showPicture(now, [...question.draw(now, answer, body, other), ...(also?.items ?? [])]);
-  saveLink();
+  showLabels(question.labels?.(answer, other) ?? []);
+  await look(now, body, next?.body, other?.differing ?? []);
+  fillText();
+  saveState();
+}
+
+// The lens: the doubles around one of the points that the plain method gets wrong.
+async function look(now, body, compared, differing) {
+  $("to-lens").hidden = !differing.length || now.lens !== null;
+  const isOpen = now.lens !== null && differing.length > 0;
+  for (const id of ["lens", "lens-bar"]) $(id).hidden = !isOpen;
+  $("view3d").hidden = now.dimension !== 3 || isOpen;
+  $("view2d").hidden = now.dimension !== 2 || isOpen;
+  if (!isOpen) { lens.close(); return; }
+  const p = body.points[differing[now.lens % differing.length]], solid = now.dimension === 2 ? { rings: body.solid.rings } : now.first;
+  const { axes, lines } = boundaryNear(solid, p), { points, step } = lattice(p, axes);
+  const [exact, plain] = await Promise.all([ask("/v1/contains", JSON.stringify({ ...body, points })), ask("/v1/compare", JSON.stringify({ ...compared, points }))]);
+  const on = new Set(exact.answer.boundary), wrong = new Set(plain.answer.differing), size = 2.6 / now.frame.scale;
+  const places = points.map((point, i) => {
+    const isIn = exact.answer.contained[i], told = isIn !== wrong.has(i) ? "inside" : "outside";
+    return [...axes.map((k) => point[k] - p[k]), on.has(i) ? "boundary" : isIn ? "inside" : "outside", told, wrong.has(i)];
+  });
+  lens.open({ p, axes, lines, places, step, size }, cssColors());
+  $("verdict").textContent = `Plain float64 is wrong at ${wrong.size} of the ${points.length} doubles around this point`;
 }
 
 // The question that an answer raises: its figures and what it adds to the picture; a refusal is a figure.
@@ -204,136 +294,178 @@ function complain(message) {
 
 // --- showing ----------------------------------------------------------------------------------------------------------
 
-function showFigures(figures, accuracy, timing, seconds, items) {
-  const rows = Object.entries(figures);
-  const rate = timing.compute ? `, ${Math.round((1000 * items) / timing.compute).toLocaleString("en")} items a second` : "";
-  rows.push(["compute", `${timing.compute ?? "?"} ms${rate}`]);
-  rows.push(["decode, prepare, encode", ["decode", "prepare", "encode"].map((name) => `${timing[name] ?? "?"}`).join(", ") + " ms"]);
-  rows.push(["round trip", `${(1000 * seconds).toFixed(1)} ms`], ["decisions", accuracy.decisions]);
-  if (accuracy.coordinates_ulp !== undefined) rows.push(["coordinates within", `${accuracy.coordinates_ulp} ulp`]);
-  rows.push(["beyond the float filter", accuracy.beyond_filter], ["in rational arithmetic", accuracy.rational], ["method", accuracy.method]);
-  $("figures").tBodies[0].replaceChildren(...rows.map(([name, value]) => {
-    const row = document.createElement("tr");
-    for (const text of [name, typeof value === "number" ? value.toLocaleString("en", { maximumFractionDigits: 17 }) : String(value)]) {
-      row.insertCell().textContent = text;
-    }
-    if (["inside", "boundary", "outside"].includes(name)) {
-      const mark = document.createElement("i");
-      mark.style.background = `var(--${name})`;
-      row.cells[0].prepend(mark);
-    }
-    return row;
-  }));
-}
+let shown = {};
 
-let request = { path: "", text: "" }, shown = {};
-
-function showRequest(path, text) {
-  request = { path, text };
-  const short = text.length > 1200 ? `${text.slice(0, 1150)} … (${text.length.toLocaleString("en")} characters, Copy takes all)` : text;
-  $("request").textContent = `POST ${path}\n${short}`;
-  $("curl").textContent = curl(short);
-}
-
-function curl(text) {
-  const address = new URL(request.path.slice(1), document.baseURI);
-  return `curl -s ${address} -H 'content-type: application/json' -d '${text}'`;
-}
+const cssColors = () => Object.fromEntries(Object.entries(styleColors()).map(([name, rgb]) => [name, `rgb(${rgb.join(" ")})`]));
 
 function showPicture(now, drawn) {
-  const colors = styleColors(), items = now.given ? framed(drawn, now.given.frame) : drawn;
+  const colors = styleColors(), count = QUESTIONS[now.question].panes ?? 1;
   if (now.dimension === 2) {
-    view2d.show(prepared2d(items, colors), now.layout?.radius ?? 2.1, now.given ? [] : corners(now).map(({ at }) => at));
-  } else if (view3d) view3d.show(prepared3d(items, [0, 0, 0], colors), 2.1);
+    const rings = editable(now), edges = rings.flatMap(({ at }) => at.map((p, i) => [p, at[(i + 1) % at.length]]));
+    views.plane.show(prepared2d(framed(drawn, now.frame), colors), { corners: rings.flatMap(({ at }) => at), edges, count, grid: now.snap ? 0.25 : 0 });
+  } else if (views.space) {
+    const canTurn = now.question === "collide";
+    views.space.show(prepared3d(drawn, now.frame, colors), { count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: now.offset, radius: 1.5 } : null });
+    if (now.question === "proof" && !past.past.length) views.space.spin();
+  }
 }
 
-// --- links: the whole state in the address, but for files that were opened ----------------------------------------------
-
-const FIELDS = ["first", "second", "operation", "method", "count", "turn"];
-let timer = 0;
-
-function link() {
-  if (state.given) return `#${new URLSearchParams({ request: state.given.text })}`;
-  const said = new URLSearchParams({ question: state.question, dimension: state.dimension, offset: state.offset.join(",") });
-  for (const id of FIELDS) if (!$(`${id}-label`).hidden) said.set(id, $(id).value);
-  for (const id of ["snap", "plain"]) if ($(id).checked) said.set(id, "1");
-  for (const name of ["first", "second"]) if (state[name]?.isEdited) said.set(`${name}-rings`, JSON.stringify(state[name].rings));
-  if (state.dimension === 3 && view3d) said.set("camera", [view3d.yaw, view3d.pitch, view3d.zoom].map((v) => v.toFixed(3)).join(","));
-  return `#${said}`;
+function showLabels(labels) {
+  $("labels").hidden = !labels.length;
+  $("labels").replaceChildren(...labels.map((text) => { const label = document.createElement("span"); label.textContent = text; return label; }));
 }
 
-function saveLink() {  // browsers take some hundred of these in half a minute
+// --- the solid as a text ------------------------------------------------------------------------------------------------
+
+function fillText() {
+  if (!$("edit").open || document.activeElement === $("text")) return;
+  const { json } = state.first, isPolygon = json.type === "polygon", text = isPolygon && $("as-wkt").checked ? toWkt(json) : JSON.stringify(json);
+  $("as-wkt").disabled = !isPolygon;
+  $("text").value = text.length < 200000 ? text : "";
+  $("text").placeholder = text.length < 200000 ? "" : `${json.type} of ${text.length.toLocaleString("en")} characters: too long to edit here; paste or open another`;
+}
+
+function takeText(text, name) {
+  try { bring(readText(text, name), `own ${name}`, name); } catch (error) { complain(error.message); }
+}
+
+// --- links and undo: the whole state ------------------------------------------------------------------------------------
+
+let timer = 0, isRestored = false;
+
+function saveState() {  // browsers take some hundred addresses in half a minute
   clearTimeout(timer);
-  timer = setTimeout(() => history.replaceState(null, "", link()), 300);
+  timer = setTimeout(async () => {
+    const said = snapshot(state, views);
+    if (!isRestored) past.push(said);
+    isRestored = false;
+    $("undo").disabled = past.past.length < 2;
+    const { text } = await fragment(said, used());
+    address = text;
+    history.replaceState(null, "", text);
+  }, 300);
 }
 
-// A request that the link holds: its solids stand among the examples, its items are asked about until a control is moved.
-function takeRequest(text) {
-  const given = readRequest(text);
-  for (const key of KEYS) delete loaded[given.dimension][key];
-  Object.assign(solid_types[given.dimension], given.examples);
-  for (const [name, value] of [["question", given.question], ["dimension", given.dimension]]) document.querySelector(`[name=${name}][value="${value}"]`).checked = true;
+let address = "";
+
+// Of what was brought, that which the picture shows.
+const used = () => brought.filter(({ key, items }) => (items ? state.own === items : [$("first").value, $("second").value].includes(key)));
+
+function put(said) {
+  const choose = (name) => [...document.querySelectorAll(`[name=${name}]`)].find((input) => input.value === said[name]);
+  for (const name of ["question", "dimension"]) if (choose(name)) choose(name).checked = true;
   chooseQuestion();
-  for (const [i, key] of Object.keys(given.examples).entries()) $(["first", "second"][i]).value = key;
+  const fault = restore(said, state, views, solidOf);
+  if (fault) complain(fault);
+  isRestored = true;
+}
+
+// A request that the link holds: its solids stand among the examples, its items are asked about as they are.
+function takeRequest(text) {
+  const given = readRequest(text), keys = ["given first", "given second"];
+  for (const [i, json] of given.solids.entries()) keep(keys[i], json, `${json.type.replace("_", " ")} of the link`);
+  state.own = Object.keys(given.items).length ? given.items : null;
+  if (state.own) brought = [...brought.filter((each) => !each.items), { items: given.items }];
+  put({ question: given.question, dimension: String(given.dimension) });
+  for (const i of given.solids.keys()) $(["first", "second"][i]).value = keys[i];
   if (given.operation) $("operation").value = given.operation;
   $("turn").value = 0;
   $("snap").checked = false;
   $("plain").checked = Boolean(QUESTIONS[given.question].plain);
-  Object.assign(state, { given, offset: [0, 0, 0] });
+  state.offset = [0, 0, 0];
 }
 
-function readLink() {
-  const said = new URLSearchParams(location.hash.slice(1)), choose = (name) => document.querySelector(`[name=${name}][value="${CSS.escape(said.get(name) ?? "")}"]`);
-  state.given = null;
-  if (said.has("request")) {
-    try { return takeRequest(said.get("request")); } catch (error) { complain(error.message); }
-  }
-  for (const name of ["question", "dimension"]) if (choose(name)) choose(name).checked = true;
-  chooseQuestion();
-  if (said.get("method")) $("method").replaceChildren(new Option(said.get("method")));
-  for (const id of FIELDS) {
-    const has = $(id).options ? [...$(id).options].some((option) => option.value === said.get(id)) : said.has(id);
-    if (has) $(id).value = said.get(id);
-  }
-  for (const id of ["snap", "plain"]) $(id).checked = said.has(id);
-  const numbers = (name) => (said.get(name) ?? "").split(",").map(Number);
-  if (said.has("offset") && numbers("offset").length === 3 && numbers("offset").every(Number.isFinite)) state.offset = numbers("offset");
-  if (said.has("camera") && view3d && numbers("camera").every(Number.isFinite)) [view3d.yaw, view3d.pitch, view3d.zoom] = numbers("camera");
-  for (const name of ["first", "second"]) {
-    if (!said.has(`${name}-rings`) || $(`${name}-label`).hidden) continue;
-    try {
-      const solid = solidOf($(name).value, state.dimension), given = JSON.parse(said.get(`${name}-rings`));
-      solid.rings.splice(0, solid.rings.length, ...given.map((ring) => ring.map((p) => p.slice(0, 2).map(Number))));
-      solid.isEdited = true;
-    } catch { complain("the link holds rings that cannot be read; the example is shown"); }
+async function readLink() {
+  try {
+    const { said, brought: own } = await readFragment(location.hash);
+    if (said.request) return takeRequest(said.request);
+    for (const each of own) {
+      if (each.items) { state.own = each.items; brought = [...brought.filter((other) => !other.items), each]; } else keep(String(each.key), each.json, String(each.name));
+    }
+    put(said);
+  } catch (error) {
+    put({});
+    complain(`the link cannot be read: ${error.message}`);
   }
 }
 
 // --- start ------------------------------------------------------------------------------------------------------------
 
-$("questions").addEventListener("change", () => { state.given = null; chooseQuestion(); refresh(); });
+$("questions").addEventListener("change", () => { chooseQuestion(); refresh(); });
 $("controls").addEventListener("input", ({ target }) => {
-  if (!["plain", "file"].includes(target.id)) state.given = null;
-  if (target.id !== "file") refresh();
+  if (target.id === "file" || target.closest("#edit")) return;
+  if (target.id === "count") state.own = null;
+  if (target.id === "turn") state.attitude = null;
+  if (["first", "method", "count"].includes(target.id)) state.lens = state.lens === null ? null : 0;
+  refresh();
 });
 $("key").value = sessionStorage.getItem("key") ?? "";
 $("key").addEventListener("change", () => { sessionStorage.setItem("key", $("key").value); refresh(); });
-for (const kind of ["pointerup", "keyup", "wheel"]) $("view3d").addEventListener(kind, saveLink, { passive: true });
+for (const kind of ["pointerup", "keyup", "wheel"]) $("view3d").addEventListener(kind, saveState, { passive: true });
 addEventListener("resize", refresh);
-addEventListener("hashchange", () => { readLink(); refresh(); });
-$("centre").addEventListener("click", () => { state.offset = [0, 0, 0]; refresh(); });
+addEventListener("hashchange", async () => { if (location.hash === address) return; await readLink(); refresh(); });
+$("centre").addEventListener("click", () => {
+  const at = state.dimension;
+  for (const key of Object.keys(loaded[at])) if (!loaded[at][key].isOwn) delete loaded[at][key];
+  Object.assign(state, { offset: [0, 0, 0], attitude: null, own: null, lens: null });
+  $("turn").value = 0;
+  views.plane.look([0, 0], 1);
+  views.space?.zoomBy(1 / views.space.zoom);
+  refresh();
+});
+$("to-lens").addEventListener("click", () => { state.lens = 0; refresh(); });
+$("next-wrong").addEventListener("click", () => { state.lens += 1; refresh(); });
+$("from-lens").addEventListener("click", () => { state.lens = null; refresh(); });
+$("depth").addEventListener("input", () => lens.zoom(Number($("depth").value)));
+for (const [id, step] of [["zoom-in", 0.05], ["zoom-out", -0.05]]) $(id).addEventListener("click", () => lens.zoom(lens.depth + step));
+
+function undo(said) {
+  if (!said) return;
+  put(said);
+  refresh();
+}
+$("undo").addEventListener("click", () => undo(past.back()));
+addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || /^(TEXTAREA|INPUT)$/.test(event.target.tagName) && event.target.type !== "range" && event.target.type !== "radio") return;
+  const key = event.key.toLowerCase();
+  if (key !== "z" && key !== "y") return;
+  event.preventDefault();
+  undo(key === "y" || event.shiftKey ? past.forth() : past.back());
+});
+
+const openAll = (files) => { for (const file of files) open(file).catch((error) => complain(error.message)); };
 $("open").addEventListener("click", () => $("file").click());
-$("file").addEventListener("change", ({ target }) => { if (target.files[0]) open(target.files[0]).catch((error) => complain(error.message)); target.value = ""; });
-const copied = [["request", () => request.text], ["curl", () => curl(request.text)], ["answer", () => JSON.stringify(shown)], ["link", () => new URL(link(), location).href]];
-for (const [id, text] of copied.map(([name, text]) => [`copy-${name}`, text])) {
+$("file").addEventListener("change", ({ target }) => { openAll([...target.files]); target.value = ""; });
+$("stage").addEventListener("dragover", (event) => event.preventDefault());
+$("stage").addEventListener("drop", (event) => {
+  event.preventDefault();
+  if (event.dataTransfer.files.length) openAll([...event.dataTransfer.files]);
+  else takeText(event.dataTransfer.getData("text"), "what was dropped");
+});
+addEventListener("paste", (event) => {
+  if (/^(TEXTAREA|INPUT)$/.test(event.target.tagName) && event.target.type !== "range" && event.target.type !== "radio") return;
+  if (event.clipboardData.files.length) openAll([...event.clipboardData.files]);
+  else takeText(event.clipboardData.getData("text"), "what was pasted");
+});
+$("edit").addEventListener("toggle", fillText);
+$("as-wkt").addEventListener("change", fillText);
+$("apply").addEventListener("click", () => takeText($("text").value, "the edited solid"));
+
+async function linkText() {
+  const { text, isWhole } = await fragment(snapshot(state, views), used());
+  return { text: new URL(text, location).href, note: isWhole ? "Copied" : "Copied, without what you brought: too large for a link" };
+}
+const copied = [["request", () => shownRequest().text], ["curl", () => curl(shownRequest().text)], ["answer", () => JSON.stringify(shown)], ["link", linkText]];
+for (const [id, make] of copied.map(([name, make]) => [`copy-${name}`, make])) {
   const label = $(id).textContent;
   $(id).addEventListener("click", async () => {
-    await navigator.clipboard.writeText(text());
-    $(id).textContent = "Copied";
-    setTimeout(() => { $(id).textContent = label; }, 1500);
+    const made = await make(), { text, note } = typeof made === "string" ? { text: made, note: "Copied" } : made;
+    await navigator.clipboard.writeText(text);
+    $(id).textContent = note;
+    setTimeout(() => { $(id).textContent = label; }, note === "Copied" ? 1500 : 5000);
   });
 }
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", refresh);
 for (const form of document.forms) form.addEventListener("submit", (event) => event.preventDefault());
-readLink();
+await readLink();
 refresh();

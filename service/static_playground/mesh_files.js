@@ -1,4 +1,6 @@
-// STL, OBJ, OFF and PLY files as {vertices, faces}; the service checks them, nothing is repaired here.
+// STL, OBJ, OFF, PLY and GLB files as {vertices, faces}; the service checks them, nothing is repaired here.
+
+export const isMesh = (name) => /\.(stl|obj|off|ply|glb)$/i.test(name);
 
 export async function readMesh(file) {
   const bytes = await file.arrayBuffer(), kind = file.name.split(".").pop().toLowerCase();
@@ -7,7 +9,8 @@ export async function readMesh(file) {
   if (kind === "obj") return obj(text());
   if (kind === "off") return off(text());
   if (kind === "ply") return ply(bytes);
-  throw new Error(`${file.name} cannot be drawn: the playground reads .stl, .obj, .off and .ply; ${kind === "glb" ? "POST /v1/solids/import takes .glb" : "convert it to one of these"}`);
+  if (kind === "glb") return glb(bytes, file.name);
+  throw new Error(`${file.name} cannot be drawn: meshes are read from .stl, .obj, .off, .ply and .glb`);
 }
 
 const soup = (vertices) => ({ vertices, faces: Array.from({ length: vertices.length / 3 }, (_, i) => [3 * i, 3 * i + 1, 3 * i + 2]) });
@@ -81,3 +84,39 @@ function ply(bytes) {
   }
   return result;
 }
+
+const COMPONENTS = { 5120: ["Int8", 1], 5121: ["Uint8", 1], 5122: ["Int16", 2], 5123: ["Uint16", 2], 5125: ["Uint32", 4], 5126: ["Float32", 4] };
+
+function glb(bytes, name) {
+  const fault = (what) => { throw new Error(`${name} cannot be drawn: ${what}`); }, view = new DataView(bytes), chunks = {};
+  if (bytes.byteLength < 20 || view.getUint32(0, true) !== 0x46546c67) fault("it does not begin as a GLB file");
+  for (let start = 12; start + 8 <= bytes.byteLength; start += 8 + view.getUint32(start, true)) chunks[view.getUint32(start + 4, true)] ??= start + 8;
+  const begin = chunks[0x4e4f534a], scene = JSON.parse(new TextDecoder().decode(bytes.slice(begin, begin + view.getUint32(begin - 8, true))));
+  if ((scene.extensionsRequired ?? []).length) fault(`it needs ${scene.extensionsRequired.join(", ")}; export it without`);
+  const accessor = (index, width) => {
+    const { bufferView, byteOffset = 0, componentType, count } = scene.accessors[index], { byteOffset: from = 0, byteStride } = scene.bufferViews[bufferView];
+    const [type, size] = COMPONENTS[componentType], start = chunks[0x004e4942] + from + byteOffset;
+    return Array.from({ length: count }, (_, i) => Array.from({ length: width }, (__, k) => view["get" + type](start + i * (byteStride ?? size * width) + k * size, true)));
+  };
+  const result = { vertices: [], faces: [] }, visit = (index, above) => {
+    const node = scene.nodes[index], matrix = product(above, node.matrix ?? matrixOf(node));
+    for (const { attributes, indices, mode = 4 } of node.mesh === undefined ? [] : scene.meshes[node.mesh].primitives) {
+      if (mode !== 4) fault("its surfaces are strips, fans or lines; export triangles");
+      const first = result.vertices.length, corners = accessor(attributes.POSITION, 3);
+      for (const p of corners) result.vertices.push([0, 1, 2].map((k) => matrix[k] * p[0] + matrix[4 + k] * p[1] + matrix[8 + k] * p[2] + matrix[12 + k]));
+      const order = indices === undefined ? corners.map((_, i) => i) : accessor(indices, 1).flat();
+      for (let i = 0; i + 2 < order.length; i += 3) result.faces.push([0, 1, 2].map((k) => first + order[i + k]));
+    }
+    for (const child of node.children ?? []) visit(child, matrix);
+  };
+  for (const root of scene.scenes?.[scene.scene ?? 0]?.nodes ?? scene.nodes.map((_, i) => i)) visit(root, matrixOf({}));
+  return result;
+}
+
+// Columns first, as glTF has them.
+function matrixOf({ translation = [0, 0, 0], rotation: [x, y, z, w] = [0, 0, 0, 1], scale = [1, 1, 1] }) {
+  const columns = [[1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], [2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)], [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]];
+  return [...columns.flatMap((column, k) => [...column.map((v) => v * scale[k]), 0]), ...translation, 1];
+}
+
+const product = (a, b) => Array.from({ length: 16 }, (_, i) => [0, 1, 2, 3].reduce((sum, k) => sum + a[4 * k + (i % 4)] * b[4 * Math.floor(i / 4) + k], 0));

@@ -1,6 +1,8 @@
-// The six questions: which solids they take, the request they send, the figures and the picture of its answer.
+// The questions: which solids they take, the request they send, the figures and the picture of its answer.
 
 import { outlines, posed, ring3d, solid2d, solid3d } from "./drawing.js";
+import { next as nextDouble } from "./exact.js";
+import { fromView, poseAt, toView } from "./frame.js";
 
 const random = (seed) => () => {  // mulberry32: the same items every time, so that a picture can be shown to others
   seed = (seed + 0x6d2b79f5) | 0;
@@ -10,20 +12,21 @@ const random = (seed) => () => {  // mulberry32: the same items every time, so t
 };
 
 const snapped = (state, position) => (state.snap ? position.map((v) => Math.round(v * 4) / 4) : position);
-const moved = (state, position) => snapped(state, position.map((v, k) => v + state.offset[k]));
+const moved = (state, position) => fromView(state.frame, snapped(state, position.map((v, k) => v + state.offset[k])));
+const shifted = (state, position) => moved(state, toView(state.frame, position));
 
 function randomPosition(next, dimension, size) {
   return Array.from({ length: dimension }, () => (2 * next() - 1) * size);
 }
 
 function points(state) {
-  if (state.given) return state.given.items;
+  if (state.items?.points) return state.own.points;
   const next = random(1);
   return Array.from({ length: state.n }, () => moved(state, randomPosition(next, state.dimension, 1.8)));
 }
 
 function segments(state) {
-  if (state.given) return state.given.items;
+  if (state.items?.segments) return state.own.segments;
   const next = random(2);
   return Array.from({ length: state.n }, () => {
     const middle = randomPosition(next, state.dimension, 1), half = randomPosition(next, state.dimension, 1.6);
@@ -32,7 +35,7 @@ function segments(state) {
 }
 
 function stars(state) {
-  if (state.given) return state.given.items;
+  if (state.items?.polygons) return state.own.polygons;
   const next = random(3);
   return Array.from({ length: state.n }, () => {
     const middle = randomPosition(next, state.dimension, 0.9), n = 5 + Math.floor(next() * 6), phase = 6.3 * next();
@@ -48,10 +51,14 @@ function stars(state) {
 function sceneBodies(state) {
   const turns = state.dimension === 3 ? [[[1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]] : [[[1, 0], [0, 1]], [[0, -1], [1, 0]]];
   return [[state.first, [-1, 0, 0], 0], [state.second, [0.75, 0.5, 0], 0], [state.first, [1, -0.75, 0], 1]].map(([solid, place, turn]) => [
-    solid, { rotation: turns[turn], translation: place.slice(0, state.dimension) },
+    solid, poseAt(state.frame, turns[turn], place.slice(0, state.dimension)),
   ]);
 }
 
+// The pose of the second body, where it is moved and turned by hand.
+export const secondPose = (state) => poseAt(state.frame, state.rotation, snapped(state, state.offset.slice(0, state.dimension)));
+
+const IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 const unit = (a) => a.map((v) => v / Math.hypot(...a));
 const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" : "s"}`;
@@ -59,21 +66,18 @@ const counted = (n, thing) => `${n.toLocaleString("en")} ${thing}${n === 1 ? "" 
 const compared = (state, operation, body, painted) => state.plain ? {
   path: "/v1/compare", body: { operation, ...body },
   figures: ({ method, differing, seconds_exact, seconds_plain }) => ({
-    "float64 wrong": differing.length, "float64 method": method, "time: exact / float64": times(seconds_exact / seconds_plain),
+    "float64 wrong": differing.length, "float64 method": method, "exact beside float64": times(seconds_exact / seconds_plain),
   }),
   draw: ({ differing }) => [painted(differing)],
 } : null;
 
-const times = (ratio) => (ratio < 1 ? `exact is ${(1 / ratio).toPrecision(2)}x faster` : `exact takes ${ratio.toPrecision(2)}x`);
+// A ratio of times in words; within a tenth they are the same.
+export function times(ratio) {
+  const factor = Number((ratio < 1 ? 1 / ratio : ratio).toPrecision(2)).toLocaleString("en");
+  return Math.abs(Math.log(ratio)) < 0.1 ? "takes the same time" : ratio < 1 ? `${factor} times as fast` : `takes ${factor} times as long`;
+}
 
 const firstItems = (state) => (state.dimension === 3 ? solid3d(state.first, "first", 0.3) : solid2d(state.first, "first"));
-
-// Two pictures side by side, or one above the other, as the canvas allows: where their middles are, and the view's radius.
-function halves({ clientWidth: w, clientHeight: h }) {
-  const beside = Math.min(w / 6.8, h / 3.9), above = Math.min(w / 3.4, h / 8.4), far = 1.65;
-  const scale = Math.max(beside, above), shifts = beside >= above ? [[-far, -0.15], [far, -0.15]] : [[0, 2.2], [0, -1.5]];
-  return { shifts, radius: Math.min(w, h) / (2.3 * scale) };
-}
 
 // The doubles nearest to points on the edges of rings: as near to the boundary as data that was snapped to it.
 function onEdges(list, n) {
@@ -83,19 +87,35 @@ function onEdges(list, n) {
   }));
 }
 
+// Points beside the faces of a mesh: the double nearest to a point of a face, or its neighbour across the face.
+function besideFaces({ vertices, faces }, n) {
+  const random01 = random(4);
+  return Array.from({ length: n }, (_, i) => {
+    const face = faces[Math.floor(random01() * faces.length)], [a, b, c] = face.slice(0, 3).map((k) => vertices[k]);
+    let [s, t] = [random01(), random01()];
+    if (s + t > 1) [s, t] = [1 - s, 1 - t];
+    const point = a.map((v, k) => v + s * (b[k] - v) + t * (c[k] - v)), normal = across(...[b, c].map((p) => p.map((v, k) => v - a[k])));
+    const axis = normal.reduce((best, v, k) => (Math.abs(v) > Math.abs(normal[best]) ? k : best), 0), step = (i % 3) - 1;
+    if (step) point[axis] = nextDouble(point[axis], step);
+    return point;
+  });
+}
+
 export const QUESTIONS = {
   proof: {
-    hint: "Points snapped to the edges of a polygon, as drawn data is: each is the nearest double, so it lies inside, outside or exactly on the edge, by less than can be drawn. First the exact answer, then the textbook's method in plain float64; what it gets wrong is crossed out. Drag the polygon or its corners.",
-    dimensions: [2],
-    firsts: (solid) => solid.polygon,
-    counts: [0, 2, 0.8],
+    hint: (dimension) => (dimension === 3
+      ? "Points on the faces of a body, or one unit in the last place beside them, as measured and computed data has them. Each is truly inside, outside or on the surface, by less than can be drawn: zoom to a wrong one and see the doubles around it."
+      : "Points snapped to the edges of a polygon, as drawn data is: each is the nearest double, so it lies inside, outside or exactly on the edge, by less than can be drawn. Drag the polygon or its corners; zoom to a wrong point and see the doubles around it."),
+    firsts: (solid) => solid.polygon || solid.mesh,
+    counts: (dimension) => (dimension === 3 ? [1, 3.5, 2.5] : [0, 2, 0.8]),
     methods: true,
-    preferred: "star",
-    layout: halves,
+    panes: 2,
+    preferred: { 2: "star", 3: "octahedron" },
+    placed: (state) => [[state.first, poseAt(state.frame, state.dimension === 2 ? [[1, 0], [0, 1]] : IDENTITY, state.dimension === 2 ? state.offset.slice(0, 2) : [0, 0, 0])]],
     ask(state) {
-      const rings = state.first.rings.map((ring) => ring.map((position) => moved(state, position)));
-      const list = onEdges(rings, state.n);
-      return { path: "/v1/contains", body: { solid: { type: "polygon", rings }, points: list }, items: list.length };
+      const solid = state.dimension === 3 ? state.first.asked : { type: "polygon", rings: state.first.rings.map((ring) => ring.map((position) => shifted(state, position))) };
+      const list = state.items?.points ?? (state.dimension === 3 ? besideFaces(state.first.mesh, state.n) : onEdges(solid.rings, state.n));
+      return { path: "/v1/contains", body: { solid, points: list }, items: list.length };
     },
     beside: (state, body) => ({ path: "/v1/compare", body: { operation: "contains", ...(state.method ? { method: state.method } : {}), ...body } }),
     figures(state, { contained, boundary }, { differing, seconds_exact, seconds_plain, method }) {
@@ -103,25 +123,25 @@ export const QUESTIONS = {
       return {
         inside, boundary: boundary.length, outside: contained.length - inside - boundary.length,
         "plain float64, wrong": `${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} (${method})`,
-        "time: exact / float64": times(seconds_exact / seconds_plain),
+        "exact beside float64": times(seconds_exact / seconds_plain),
       };
     },
     verdict: (state, { contained }, figures, { differing, method }) => `Plain float64 (${method}): ${differing.length.toLocaleString("en")} of ${contained.length.toLocaleString("en")} points wrong`,
+    labels: ({ contained }, { differing, method }) => [`exact: ${contained.length.toLocaleString("en")} right`, `plain float64 (${method}): ${differing.length.toLocaleString("en")} wrong`],
     draw(state, { contained, boundary }, { solid, points: list }, { differing }) {
-      const on = new Set(boundary), wrong = new Set(differing), [left, right] = state.layout.shifts, items = [];
-      const shifted = (shift) => (p) => p.map((v, k) => v + shift[k]);
-      for (const [shift, isPlain] of [[left, false], [right, true]]) {
+      const on = new Set(boundary), wrong = new Set(differing), isFlat = state.dimension === 2;
+      const items = isFlat ? [{ kind: "rings", rings: solid.rings, color: "first", fill: 0.2 }] : solid3d(state.first, "first", 0.35);
+      for (const pane of [0, 1]) {
         const groups = { outside: [], inside: [], boundary: [] };
         list.forEach((point, i) => {
-          const isIn = contained[i] !== (isPlain && wrong.has(i));
-          groups[!isPlain && on.has(i) ? "boundary" : isIn ? "inside" : "outside"].push(shifted(shift)(point));
+          if (pane && !isFlat && wrong.has(i)) return;
+          const isIn = contained[i] !== (pane === 1 && wrong.has(i));
+          groups[!pane && on.has(i) ? "boundary" : isIn ? "inside" : "outside"].push(point);
         });
-        items.push({ kind: "rings", rings: solid.rings.map((ring) => ring.map(shifted(shift))), color: "first", fill: 0.2 });
-        for (const [color, group] of Object.entries(groups)) items.push({ kind: "points", points: group, color, width: 6 });
-        items.push({ kind: "text", text: isPlain ? "plain float64" : "exact", at: [shift[0], shift[1] + 1.68], color: "outside" });
+        for (const [color, group] of Object.entries(groups)) items.push({ kind: "points", points: group, color, width: isFlat ? 6 : 5, pane });
       }
-      items.push({ kind: "crosses", points: differing.map((i) => shifted(right)(list[i])), color: "wrong", size: 12, width: 2.5 });
-      return items;
+      const points = differing.map((i) => list[i]);
+      return [...items, isFlat ? { kind: "crosses", points, color: "wrong", size: 12, width: 2.5, pane: 1 } : { kind: "points", points, color: "wrong", width: 9, pane: 1 }];
     },
   },
 
@@ -176,7 +196,7 @@ export const QUESTIONS = {
     firsts: () => true,
     seconds: () => true,
     ask(state) {
-      const pose = { rotation: state.rotation, translation: moved(state, Array(state.dimension).fill(0)) };
+      const pose = secondPose(state);
       return { path: "/v1/collide", body: { first: state.first.asked, second: state.second.asked, poses: [pose] }, items: 1 };
     },
     figures(state, { collisions: [{ relation, witness }] }) {
@@ -190,8 +210,8 @@ export const QUESTIONS = {
     } : null,
     verdict: (state, answer, { relation, distance }) => (distance === undefined ? relation : `${relation}, ${distance.toPrecision(6)} apart`),
     draw(state, { collisions: [{ witness }] }, { poses: [pose] }) {
-      const second = posed(state.second, pose), draw = state.dimension === 3 ? solid3d : solid2d;
-      const items = [...draw(state.first, "first", 0.45), ...draw(second, "second", 0.45)];
+      const second = posed(state.second, pose), isFlat = state.dimension === 2;
+      const items = isFlat ? [...solid2d(state.first, "first"), ...solid2d(second, "second")] : [...solid3d(state.first, "first", 0.45), ...solid3d(state.second, "second", 0.45, pose)];
       for (const [solid, name] of [[state.first, "first_face"], [second, "second_face"]]) {
         const face = solid.mesh?.faces[witness?.[name]];
         if (face) items.push(...ring3d(face.map((i) => solid.mesh.vertices[i]), "boundary"));
@@ -225,12 +245,13 @@ export const QUESTIONS = {
   },
 
   scene: {
+    placed: sceneBodies,
     hint: "Drag the ray, turn it: what of it lies within which of three bodies, in the exact order of all ends. Green pieces and orange ones take turns along it; the first is the thickest.",
     firsts: () => true,
     seconds: () => true,
     ask(state) {
       const bodies = sceneBodies(state).map(([solid, pose]) => ({ solid: solid.asked, pose }));
-      const ends = [-2, 2].map((x) => moved(state, state.rotation.map((row) => x * row[0])));
+      const ends = state.items?.segments?.[0] ?? [-2, 2].map((x) => moved(state, state.rotation.map((row) => x * row[0])));
       return { path: "/v1/clip/segments/scene", body: { bodies, segments: [ends] }, items: 1 };
     },
     figures(state, { pieces }) {
@@ -239,8 +260,7 @@ export const QUESTIONS = {
     },
     verdict: (state, { pieces }) => (pieces.length ? `first met: body ${pieces[0].body}, ${counted(pieces.length, "piece")}` : "nothing is met"),
     draw(state, { pieces }, { segments: list }) {
-      const draw = state.dimension === 3 ? solid3d : solid2d;
-      const items = sceneBodies(state).flatMap(([solid, pose], i) => draw(posed(solid, pose), i % 2 ? "second" : "first", 0.3));
+      const items = sceneBodies(state).flatMap(([solid, pose], i) => (state.dimension === 2 ? solid2d(posed(solid, pose), i % 2 ? "second" : "first") : solid3d(solid, i % 2 ? "second" : "first", 0.3, pose)));
       items.push({ kind: "lines", lines: list, color: "outside", width: 1.5 });
       pieces.forEach(({ start, end }, i) => {
         const color = i % 2 ? "boundary" : "kept";
@@ -275,8 +295,7 @@ export const QUESTIONS = {
     seconds: (solid) => solid.polygon,
     operations: true,
     ask(state) {
-      const pose = { rotation: state.rotation, translation: state.offset.slice(0, 2) };
-      const rings = posed(state.second, pose).rings.map((ring) => ring.map((position) => snapped(state, position)));
+      const rings = posed(state.second, poseAt(state.frame, state.rotation, state.offset.slice(0, 2))).rings.map((ring) => ring.map((position) => fromView(state.frame, snapped(state, toView(state.frame, position)))));
       return { path: "/v1/overlay", body: { subject: state.first.json, clip: { type: "polygon", rings }, operation: state.operation, area: true }, items: 1 };
     },
     figures: (state, { pieces, area, rounding, collapsed }) => ({

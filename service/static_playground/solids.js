@@ -68,10 +68,10 @@ const round = (n, radius, phase = 0, squeeze = 1) => Array.from({ length: n }, (
 
 export const solid_types = {
   3: {
-    torus: { name: "torus (2,304 faces)", make: torus },
-    knot: { name: "trefoil knot (6,400 faces)", make: knot },
-    octahedron: { name: "octahedron", make: octahedron, convex: true },
-    crossing: { name: "two crossing cubes (even-odd)", make: crossing },
+    torus: { name: "torus (2,304 faces)", mesh: true, make: torus },
+    knot: { name: "trefoil knot (6,400 faces)", mesh: true, make: knot },
+    octahedron: { name: "octahedron", mesh: true, make: octahedron, convex: true },
+    crossing: { name: "two crossing cubes (even-odd)", mesh: true, make: crossing },
     cube: { name: "box", make: cube, convex: true },
     ball: { name: "sphere", make: ball, round: true },
     floor: { name: "half-space", make: floor, convex: true, unbounded: true },

@@ -1,4 +1,7 @@
-// A small WebGL 2 view: translucent flat-shaded triangles, wide lines, round points; turned by drag, moved by Shift-drag.
+// A small WebGL 2 view: translucent flat-shaded triangles, wide lines, round points, in one or two panes; turned by drag, moved
+// by Shift-drag, zoomed by the wheel or two fingers. Rings around the second body turn it.
+
+import { Fingers, calm, panes } from "./view2d.js";
 
 const MESH = [`#version 300 es
 uniform mat4 camera; in vec3 position; out vec3 eye;
@@ -27,35 +30,36 @@ void main() { gl_Position = camera * vec4(position, 1.0); gl_PointSize = width; 
 precision highp float; uniform vec4 color; out vec4 shade;
 void main() { if (length(gl_PointCoord - 0.5) > 0.5) discard; shade = vec4(color.rgb, 1.0) * color.a; }`];
 
+const GRIP = 10; // pixels within which a ring is taken
+const CIRCLE = Array.from({ length: 65 }, (_, i) => [Math.cos((Math.PI * i) / 32), Math.sin((Math.PI * i) / 32)]);
+const AXES = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
+
 export class View3D {
-  constructor(canvas, onMove) {
+  constructor(canvas, { onMove, onTurn, onTurnEnd }) {
     this.canvas = canvas;
     this.gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true });
-    this.yaw = 0.6; this.pitch = 0.35; this.zoom = 1; this.radius = 2;
-    this.items = [];
+    Object.assign(this, { yaw: 0.6, pitch: 0.35, zoom: 1, radius: 2.1, items: [], panes: 1, rings: null, buffers: new Map() });
     if (!this.gl) throw new Error("this browser has no WebGL 2; the 2D pictures work without it");
     [this.mesh, this.lines, this.points] = [MESH, LINES, POINTS].map((source) => program(this.gl, ...source));
-    this.pointers = new Map();
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      this.pointers.set(event.pointerId, event);
+    const fingers = new Fingers(canvas);
+    let held = null;
+    canvas.addEventListener("pointerdown", (event) => { this.spins = false; held = this.ringAt(event); });
+    canvas.addEventListener("pointermove", (event) => {
+      const motion = fingers.moved(event);
+      if (!motion) { canvas.style.cursor = this.ringAt(event) ? "move" : ""; return; }
+      if (held && motion.count === 1) {
+        const along = (motion.dx * held.along[0] + motion.dy * held.along[1]) / (held.along[0] ** 2 + held.along[1] ** 2);
+        return onTurn(held.axis, along);
+      }
+      if (motion.count > 1) { this.move(motion.dx / 2, motion.dy / 2, onMove); this.zoomBy(motion.spread); }
+      else if (event.shiftKey || event.buttons === 2) this.move(motion.dx, motion.dy, onMove);
+      else this.turn(motion.dx * 0.008, motion.dy * 0.008);
     });
-    canvas.addEventListener("pointermove", (event) => this.drag(event, onMove));
-    for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, (event) => this.pointers.delete(event.pointerId));
-    }
-    canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.zoomBy(Math.exp(-event.deltaY / 500)); }, { passive: false });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { if (held) onTurnEnd(); held = null; });
+    canvas.addEventListener("wheel", (event) => { event.preventDefault(); this.spins = false; this.zoomBy(Math.exp(-event.deltaY / 500)); }, { passive: false });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("keydown", (event) => this.key(event, onMove));
     new ResizeObserver(() => this.draw()).observe(canvas);
-  }
-
-  drag(event, onMove) {
-    const before = this.pointers.get(event.pointerId);
-    if (!before) return;
-    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-    this.pointers.set(event.pointerId, event);
-    if (this.pointers.size > 1 || event.shiftKey || event.buttons === 2) this.move(dx, dy, onMove);
-    else this.turn(dx * 0.008, dy * 0.008);
   }
 
   key(event, onMove) {
@@ -65,7 +69,22 @@ export class View3D {
     else if (event.key === "+" || event.key === "=") this.zoomBy(1.1);
     else if (event.key === "-") this.zoomBy(1 / 1.1);
     else return;
+    this.spins = false;
     event.preventDefault();
+  }
+
+  // Turn slowly until somebody takes it in hand; not for those who asked for less motion.
+  spin() {
+    if (this.spins || calm()) return;
+    this.spins = true;
+    let before = performance.now();
+    const tick = (now) => {
+      if (!this.spins) return;
+      if (!this.canvas.hidden) this.turn(-0.00025 * Math.min(100, now - before), 0);
+      before = now;
+      requestAnimationFrame(tick);
+    };
+    requestAnimationFrame(tick);
   }
 
   turn(yaw, pitch) {
@@ -75,8 +94,7 @@ export class View3D {
   }
 
   move(dx, dy, onMove) {
-    const [right, up] = this.axes();
-    const scale = (2 * this.distance() * Math.tan(0.35)) / this.canvas.clientHeight;
+    const [right, up] = this.axes(), scale = (2 * this.distance() * Math.tan(0.35)) / panes(this.canvas, this.panes)[0].height;
     onMove(right.map((r, k) => (r * dx - up[k] * dy) * scale));
   }
 
@@ -88,52 +106,80 @@ export class View3D {
     return [[cy, 0, -sy], [-sy * sp, cp, -cy * sp], [sy * cp, sp, cy * cp]];
   }
 
-  camera() {
+  camera(aspect) {
     const [right, up, back] = this.axes();
     const distance = this.distance(), near = distance / 50, far = distance + 20 * this.radius;
-    const f = 1 / Math.tan(0.35), aspect = this.canvas.width / this.canvas.height;
-    const zoom = Math.min(1, aspect) * f, depth = (near + far) / (near - far);
+    const f = 1 / Math.tan(0.35), zoom = Math.min(1, aspect) * f, depth = (near + far) / (near - far);
     const rows = [right.map((v) => (v * zoom) / aspect), up.map((v) => v * zoom), back.map((v) => v * depth), back.map((v) => -v)];
     const last = [0, 0, -distance * depth + (2 * near * far) / (near - far), distance];
     return new Float32Array([0, 1, 2].flatMap((k) => rows.map((row) => row[k])).concat(last));
   }
 
-  // items: {kind: "triangles" | "lines" | "points", positions: Float32Array, color: [r, g, b, a], width?, onTop?}
-  show(items, radius) {
-    for (const old of this.items) if (!items.includes(old)) this.gl.deleteBuffer(old.buffer);
-    this.items = items; this.radius = radius;
+  // Pixels of the first pane at which a place of the picture is seen.
+  seen(place) {
+    const pane = panes(this.canvas, this.panes)[0], m = this.camera(pane.width / pane.height), [x, y, , w] = [0, 1, 2, 3].map((k) => place.reduce((sum, v, j) => sum + v * m[4 * j + k], m[12 + k]));
+    return [pane.left + ((x / w + 1) * pane.width) / 2, pane.top + ((1 - y / w) * pane.height) / 2];
+  }
+
+  // The ring around the second body that lies below the pointer: its axis, and the pixels of a radian along it there.
+  ringAt(event) {
+    if (!this.rings) return null;
+    const box = this.canvas.getBoundingClientRect(), at = [event.clientX - box.left, event.clientY - box.top];
+    let best = { d: GRIP };
+    for (const [axis, ring] of ringsAround(this.rings).entries()) {
+      const pixels = ring.map((p) => this.seen(p));
+      pixels.slice(1).forEach((p, i) => {
+        const d = Math.hypot(p[0] - at[0], p[1] - at[1]);
+        if (d < best.d) best = { d, axis, along: p.map((v, k) => ((v - pixels[i][k]) * 32) / Math.PI) };
+      });
+    }
+    return best.along ? best : null;
+  }
+
+  // items: {kind: "triangles" | "lines" | "points", positions: Float32Array, color: [r, g, b, a], width?, onTop?, pose?, pane?};
+  // rings: {middle, radius} of the body that can be turned by them
+  show(items, { count = 1, rings = null, radius = 2.1 }) {
+    const used = new Set(items.map(({ positions }) => positions));
+    for (const [positions, buffer] of this.buffers) if (!used.has(positions)) { this.gl.deleteBuffer(buffer); this.buffers.delete(positions); }
+    const circles = rings ? ringsAround(rings).map((ring, k) => ({
+      kind: "lines", positions: new Float32Array(ring.slice(1).flatMap((p, i) => [...ring[i], ...p])), color: [0, 1, 2].map((j) => (j === k ? 0.85 : 0.3)).concat(0.9), width: 2,
+    })) : [];
+    Object.assign(this, { items: [...items, ...circles], panes: count, rings, radius });
     this.draw();
   }
 
   draw() {
-    const { gl, canvas } = this, ratio = window.devicePixelRatio || 1;
+    const { gl, canvas } = this, ratio = window.devicePixelRatio || 1, [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map(Math.round);
     if (!canvas.clientWidth) return;
-    canvas.width = canvas.clientWidth * ratio; canvas.height = canvas.clientHeight * ratio;
-    gl.viewport(0, 0, canvas.width, canvas.height);
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.BLEND); gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    const camera = this.camera();
     const order = (item) => (item.onTop ? 2 : item.kind === "triangles" && item.color[3] < 1 ? 1 : 0);
-    for (const item of [...this.items].sort((a, b) => order(a) - order(b))) {
-      if (!item.positions.length) continue;
-      (item.onTop ? gl.disable : gl.enable).call(gl, gl.DEPTH_TEST);
-      gl.depthMask(order(item) === 0);
-      this.drawItem(item, camera, ratio);
-    }
+    const sorted = [...this.items].sort((a, b) => order(a) - order(b));
+    panes(canvas, this.panes).forEach((pane, i) => {
+      gl.viewport(pane.left * ratio, (canvas.clientHeight - pane.top - pane.height) * ratio, pane.width * ratio, pane.height * ratio);
+      const camera = this.camera(pane.width / pane.height);
+      for (const item of sorted) {
+        if (!item.positions.length || (item.pane ?? i) !== i) continue;
+        (item.onTop ? gl.disable : gl.enable).call(gl, gl.DEPTH_TEST);
+        gl.depthMask(order(item) === 0);
+        this.drawItem(item, item.pose ? times(camera, item.pose) : camera, [pane.width * ratio, pane.height * ratio], ratio);
+      }
+    });
     gl.depthMask(true);
   }
 
-  drawItem(item, camera, ratio) {
+  drawItem(item, camera, size, ratio) {
     const gl = this.gl, unit = this[item.kind === "triangles" ? "mesh" : item.kind];
     gl.useProgram(unit);
     gl.uniformMatrix4fv(gl.getUniformLocation(unit, "camera"), false, camera);
     gl.uniform4fv(gl.getUniformLocation(unit, "color"), item.color);
     gl.uniform1f(gl.getUniformLocation(unit, "width"), (item.width ?? 2) * ratio);
-    gl.uniform2f(gl.getUniformLocation(unit, "size"), this.canvas.width, this.canvas.height);
-    item.buffer ??= fill(gl, item.positions);
+    gl.uniform2f(gl.getUniformLocation(unit, "size"), ...size);
+    if (!this.buffers.has(item.positions)) this.buffers.set(item.positions, fill(gl, item.positions));
     gl.bindVertexArray(null);
-    gl.bindBuffer(gl.ARRAY_BUFFER, item.buffer);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.get(item.positions));
     const isLines = item.kind === "lines";
     const names = isLines ? ["from", "to"] : ["position"];
     names.forEach((name, i) => {
@@ -147,6 +193,16 @@ export class View3D {
     else gl.drawArrays(item.kind === "points" ? gl.POINTS : gl.TRIANGLES, 0, n);
     names.forEach((name) => gl.disableVertexAttribArray(gl.getAttribLocation(unit, name)));
   }
+}
+
+function ringsAround({ middle, radius }) {
+  return AXES.map(([, u, v]) => CIRCLE.map(([c, s]) => { const p = [...middle]; p[u] += radius * c; p[v] += radius * s; return p; }));
+}
+
+// The camera's matrix after a pose.
+function times(camera, { rotation, translation }) {
+  const columns = [0, 1, 2].map((k) => [...rotation.map((row) => row[k]), 0]).concat([[...translation, 1]]);
+  return new Float32Array(columns.flatMap((column) => [0, 1, 2, 3].map((row) => column.reduce((sum, v, k) => sum + v * camera[4 * k + row], 0))));
 }
 
 function program(gl, vertex, fragment) {
