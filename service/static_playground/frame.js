@@ -22,8 +22,8 @@ export function poseAt({ middle, scale }, rotation, move) {
 // An example where the frame is not its own: the same solid in the coordinates of what was brought.
 export function placed(solid, frame) {
   if (frame === UNIT || solid.isOwn) return solid;
-  if (solid.placed?.frame === frame && !solid.isEdited) return solid.placed;
-  const to = (p) => fromView(frame, p), { json } = solid, result = { ...solid, frame, isOwn: true };
+  if (solid.placed?.frame === frame) return solid.placed;
+  const to = (p) => fromView(frame, p), { json } = solid, result = { ...solid, frame, base: solid, isOwn: true };
   if (solid.mesh) result.mesh = { ...solid.mesh, vertices: solid.mesh.vertices.map(to) };
   if (solid.rings) result.rings = solid.rings.map((ring) => ring.map(to));
   const origin = frame.middle.slice(0, json.center?.length ?? json.normal?.length ?? json.planes?.[0].length - 1);

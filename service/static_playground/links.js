@@ -11,7 +11,10 @@ export function snapshot(state, views) {
   const said = { question: state.question, dimension: String(state.dimension), offset: state.offset.join(",") };
   for (const id of FIELDS) if (!$(`${id}-label`).hidden) said[id] = $(id).value;
   for (const id of CHECKS) if ($(id).checked) said[id] = "1";
-  for (const name of ["first", "second"]) if (state[name]?.isEdited) said[`${name}-rings`] = JSON.stringify(state[name].rings);
+  for (const name of ["first", "second"]) {
+    const solid = state[name]?.base ?? state[name];
+    if (solid?.isEdited) said[`${name}-rings`] = JSON.stringify(solid.rings);
+  }
   if (state.attitude) said.attitude = state.attitude.join(",");
   if (state.lens !== null) said.lens = String(state.lens);
   if (state.dimension === 3 && views.space) said.camera = [views.space.yaw, views.space.pitch, views.space.zoom].map((v) => v.toFixed(3)).join(",");
@@ -36,11 +39,13 @@ export function restore(said, state, views, solidOf) {
   Object.assign(views.plane, { middle: view?.slice(0, 2) ?? [0, 0], zoom: view?.[2] ?? 1 });
   let fault = "";
   for (const name of ["first", "second"]) {
-    if (!said[`${name}-rings`] || $(`${name}-label`).hidden) continue;
+    if ($(`${name}-label`).hidden) continue;
+    const solid = solidOf($(name).value), text = said[`${name}-rings`];
+    if (!text && !solid.isEdited) continue;
     try {
-      const solid = solidOf($(name).value), given = JSON.parse(said[`${name}-rings`]);
-      solid.rings.splice(0, solid.rings.length, ...given.map((ring) => ring.map((p) => p.slice(0, 2).map(Number))));
-      solid.isEdited = true;
+      const rings = text ? JSON.parse(text) : solid.first;
+      solid.rings.splice(0, solid.rings.length, ...rings.map((ring) => ring.map((p) => p.slice(0, 2).map(Number))));
+      Object.assign(solid, { isEdited: Boolean(text), placed: null, asked: solid.json });
     } catch { fault = "the link holds rings that cannot be read; the example is shown"; }
   }
   return fault;

@@ -62,9 +62,10 @@ const corners = (now) => editable(now).flatMap((each) => each.at.map((at, i) => 
 
 function changeRing(corner, change) {
   if (!corner) return;
+  const { solid } = corner, base = solid.base ?? solid;
   change(corner);
-  corner.solid.isEdited = true;
-  corner.solid.asked = corner.solid.json;
+  if (solid.base) base.rings.splice(0, base.rings.length, ...solid.rings.map((ring) => ring.map((p) => toView(state.frame, p))));
+  Object.assign(base, { isEdited: true, asked: base.json, placed: null });
   refresh();
 }
 
@@ -87,7 +88,7 @@ function completed(solid) {
   else if (solid.drawn) solid.rings = solid.drawn;
   if (json.type === "sphere") Object.assign(solid, { center: json.center, radius: json.radius });
   if (json.type === "half_space") Object.assign(solid, { normal: json.normal, offset: json.offset });
-  solid.asked = json;
+  Object.assign(solid, { asked: json, first: structuredClone(solid.rings) });
   return solid;
 }
 
@@ -102,14 +103,15 @@ function keep(key, json, name) {
   const { dimension, flags, solid } = example(json, name);
   loaded[dimension][key] = completed({ ...flags, ...solid });
   solid_types[dimension][key] = { ...flags, make: () => loaded[dimension][key] };
-  brought = [...brought.filter((each) => each.key !== key), { key, json, name }];
+  brought = [...brought.filter((each) => each.key !== key || each.dimension !== dimension), { key, json, name, dimension }];
   return dimension;
 }
 
 // Show what a file or a text holds: a solid, points or segments.
-function bring(found, key, name) {
+function bring(found, wanted, name) {
+  const count = brought.filter(({ key }) => key?.startsWith(wanted)).length, key = count ? `${wanted} ${count + 1}` : wanted; // what was stays, for undo
   let dimension = positions(Object.values(found)[0])[0]?.length;
-  if (found.solid) dimension = keep(key, found.solid, name);
+  if (found.solid) dimension = keep(key, found.solid, count ? `${name} ${count + 1}` : name);
   else { state.own = found; brought = [...brought.filter((each) => !each.items), { items: found }]; }
   const asks = found.segments ? ["segments", "scene"] : found.points ? ["contains", "distances", "proof"] : [], now = QUESTIONS[state.question];
   const takesIt = found.solid ? state.question !== "proof" && now.firsts(solid_types[dimension][key]) : asks.includes(state.question);
@@ -162,6 +164,7 @@ function chooseQuestion() {
   $("view2d").hidden = state.dimension !== 2;
   Object.assign(state, { offset: state.question === "collide" || state.question === "overlay" ? [0.9, 0.4, 0] : [0, 0, 0], attitude: null, lens: null });
   if (views.space) views.space.spins = false;
+  $("method").replaceChildren();
   fillSelects();
 }
 
@@ -182,13 +185,15 @@ function readControls() {
   [state.first, state.second] = [first, second].map((solid) => solid && placed(solid, state.frame));
 }
 
-let lastFrame = { key: "", frame: UNIT };
+let lastFrame = { of: [], frame: UNIT };
 
 // Where the picture is: around what was brought, or where the examples are.
 function frameFor(solids, items) {
-  const all = solids.length ? solids.flatMap(({ rings, extent }) => rings?.flat() ?? extent) : items ? positions(items) : [], key = `${state.dimension} ${solids.map(({ name }) => name)} ${all.length}`;
-  if (!all.length) return UNIT;
-  if (lastFrame.key !== key) lastFrame = { key, frame: frameOf(all) };
+  const of = solids.length ? solids.map(({ json }) => json) : [items];
+  if (of.length !== lastFrame.of.length || of.some((each, i) => each !== lastFrame.of[i])) {
+    const all = solids.length ? solids.flatMap(({ rings, extent }) => rings?.flat() ?? extent) : items ? positions(items) : [];
+    lastFrame = { of, frame: all.length ? frameOf(all) : UNIT };
+  }
   return lastFrame.frame;
 }
 
@@ -349,7 +354,7 @@ function saveState() {  // browsers take some hundred addresses in half a minute
 let address = "";
 
 // Of what was brought, that which the picture shows.
-const used = () => brought.filter(({ key, items }) => (items ? state.own === items : [$("first").value, $("second").value].includes(key)));
+const used = () => brought.filter(({ key, items, dimension }) => (items ? state.own === items : dimension === state.dimension && [$("first").value, $("second").value].includes(key)));
 
 function put(said) {
   const choose = (name) => [...document.querySelectorAll(`[name=${name}]`)].find((input) => input.value === said[name]);

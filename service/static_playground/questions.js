@@ -192,7 +192,7 @@ export const QUESTIONS = {
   },
 
   collide: {
-    hint: "Move the second body; the faces of the witness are orange, and the shortest line between bodies that are apart. Try the same solid twice, snapped: touching is told from overlapping exactly.",
+    hint: "Move the second body; the faces of the witness are orange, and the shortest line between bodies that are apart. Try the same solid twice, snapped: touching and overlapping are distinguished exactly.",
     firsts: () => true,
     seconds: () => true,
     ask(state) {
