@@ -35,6 +35,10 @@ DRAWN = 300
 """Faces or vertices of the largest body that is stored."""
 QUESTIONS = 200
 """At most, for each of these sizes."""
+LADDER = (1e-12, 1e-9, 1e-6)
+"""By how much of the model's size hard items are moved, to see from where on a contender is right."""
+RUNG = 500
+"""Items that are judged on each."""
 NAMED: list[str] = []
 """Contenders that no contest knows and the command names."""
 LISTENERS: list[Callable[[str], None]] = []
@@ -119,6 +123,10 @@ class Contest:
     """How many questions the items stand for, where they are not one each; such items are never cut short."""
     request: Callable[[int], tuple[str, dict[str, Any]]] | None = None
     """Path and body that ask the service about the item with a number."""
+    moved: Callable[[float], tuple[Any, Any]] | None = None
+    """Items of a hard contest moved by so much of the model's size in random directions, and their exact answers."""
+    near: float | None = None
+    """How far the hard items are from the boundary: the median, of the model's size."""
 
 
 class Task(NamedTuple):
@@ -180,6 +188,10 @@ class Row:
     call_overhead: float = 0.0
     exact_share: float | None = None
     errors: dict[str, Any] = field(default_factory=dict)
+    near: float | None = None
+    """As of the contest."""
+    ladder: dict[str, dict[str, int]] = field(default_factory=dict)
+    """By how much items were moved: how many were judged, wrong, refused and not taken."""
     worst: dict[str, Any] = field(default_factory=dict)
     """The worst answer that is wrong: number of the item, answer, exact answer, path and body of the request."""
 
@@ -214,12 +226,14 @@ def run_contest(contest: Contest, rounds: int, seconds: float, has_latency: bool
     rows, entries = [], []
     for each in contest.contenders:
         row = Row(contest.operation, contest.name, contest.is_hard, each.name, each.package, each.setting,
-                  contest.about, goals=each.goals)  # fmt: skip
+                  contest.about, goals=each.goals, near=contest.near)  # fmt: skip
         rows.append(row)
         _announce(row)
         if (entry := _entered(contest, each, row, seconds / rounds)) is not None:
             entries.append(entry)
     _judge(contest, entries)
+    if contest.moved is not None and has_latency:
+        _climb(contest, entries)
     gc.collect()
     gc.freeze()  # existing objects are not collected again at every turn
     for round_ in range(rounds):
@@ -335,6 +349,22 @@ def _judge(contest: Contest, entries: list[_Entry]) -> None:
             _announce(entry.row)
             answers = entry.prepared.answer(entry.prepared.ask(entry.prepared.native(contest.items[:n_items])))
         _note(contest, entry, answers[:n_items], contest.exact[:n_items], np.arange(n_items))
+
+
+def _climb(contest: Contest, entries: list[_Entry]) -> None:
+    """Judge all contenders on hard items that were moved away, step by step; outside the clock."""
+    assert contest.moved is not None
+    for step in LADDER:
+        items, exact = contest.moved(step)
+        for entry in entries:
+            _announce(entry.row)
+            asked, taken = entry.prepared, entry.taken / max(entry.row.n_items, 1)
+            n_items = min(len(exact), max(PROBE, int(JUDGING / 3 / max(taken, 1e-9))))
+            answers = asked.answer(asked.ask(asked.native(items[:n_items])))
+            found = contest.judge(answers, exact[:n_items])
+            entry.row.ladder[f"{step:g}"] = {
+                key: found.get(key, 0) for key in ("judged", "wrong", "refused", "outside")
+            }
 
 
 def _note(contest: Contest, entry: _Entry, answers: Any, exact: Any, rows: np.ndarray) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks import filed
 from benchmarks.measure import interval, spread
 from benchmarks.table import named
-from benchmarks.web_page import error_share, faults, key_of, percent, questions, times
+from benchmarks.web_page import OURS, error_share, failing, faults, key_of, percent, questions, shown, times
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
@@ -55,18 +55,23 @@ def _weaknesses(contests: dict[str, list[Row]]) -> str:
     wrong = [row for row in ours if row["errors"]["wrong"] + row["errors"]["refused"] + row["errors"].get("off", 0)]
     judged = sum(row["errors"]["judged"] for row in ours)
     lines = [
-        f"**Wrong answers of ours: {len(wrong)} contests**" if wrong else f"**Wrong answers of ours: 0 of {judged:,}.**"
+        f"**Wrong answers of {OURS}: {len(wrong)} contests**"
+        if wrong
+        else f"**Wrong answers of {OURS}: 0 of {judged:,}.**"
     ]
     lines += [f"- {key_of(row)}: {row['errors']}" for row in wrong]
-    lines.append("\n**Where another is faster** (gross; the fastest of each contest, with its errors):\n")
     fastest = [(key, rows[0], max(rows, key=lambda row: row["rate"])) for key, rows in contests.items()]
     slower = sorted(((best["rate"] / max(own["rate"], 1e-9), key, best) for key, own, best in fastest
                      if best is not own), key=lambda each: -each[0])  # fmt: skip
-    for ratio, key, best in slower[:LISTED]:
-        share = percent(error_share(best))
-        lines.append(f"- {key}: {best['contender']} by {ratio:.2g} times, wrong or refused {share}")
-    if len(slower) > LISTED:
-        lines.append(f"- and {len(slower) - LISTED} more, by at most {slower[LISTED][0]:.2g} times: see the tables")
+    right = [each for each in slower if not failing(each[2])]
+    for title, listed in (("faster and never wrong here", right), ("faster", [e for e in slower if failing(e[2])])):
+        lines.append(f"\n**Where another is {title}** (gross; the fastest of each contest, with its errors):\n")
+        for ratio, key, best in listed[:LISTED]:
+            lines.append(
+                f"- {key}: {best['contender']} by {ratio:.2g} times, wrong or refused {percent(error_share(best))}"
+            )
+        if len(listed) > LISTED:
+            lines.append(f"- and {len(listed) - LISTED} more, by at most {listed[LISTED][0]:.2g} times: see the tables")
     return "\n".join(lines)
 
 
@@ -75,18 +80,30 @@ def _summary(rows: list[Row]) -> str:
     parts = []
     for is_alone, beside in ((False, "fastest peer"), (True, "textbook's fastest formula")):
         lines = [
-            [each["title"], *(_ratio(each["sides"][side]) for side in ("easy", "hard")),
-             "; ".join(map(faults, each["seen"])) or "ours alone"]
+            [each["title"], *(_ratio(each["sides"][side]) for side in ("easy", "hard")), _near(each["near"]),
+             "; ".join(faults(one) + _climb(one["ladder"]) for one in each["seen"])]
             for each in questions(rows) if each["is_alone"] == is_alone
         ]  # fmt: skip
-        head = (f"ours, beside the {beside}", "easy input", "hard input", "wrong on hard input, the fastest first")
+        head = (f"{OURS} beside the {beside}", "easy input", "hard input", "hard inputs are from the boundary",
+                "wrong on hard input (moved by 1e-12, 1e-9, 1e-6), the fastest first")  # fmt: skip
         parts += [table(head, lines)] if lines else []
     return "\n".join(parts).rstrip()
 
 
 def _ratio(side: dict[str, Any]) -> str:
     """Return how many times faster or slower ours is, and than which contender."""
-    return "" if side["ratio"] is None else f"{times(side['ratio'])} {side['name']}"
+    if side["ratio"] is None:
+        return "not asked"
+    return f"{times(side['ratio'])} {side['name']}; {seconds(side['seconds'][0])} an item"
+
+
+def _near(distance: float | None) -> str:
+    """Return how far hard inputs are from the boundary, of the model's size."""
+    return "as near as doubles come" if distance is None else f"{distance:.1g} of the model" if distance else "on it"
+
+
+def _climb(ladder: list[float]) -> str:
+    return f" ({', '.join(map(percent, ladder))})" if any(ladder) else " (0 from 1e-12 on)" if ladder else ""
 
 
 def smallest(result: dict[str, Any]) -> str:
@@ -100,7 +117,7 @@ def smallest(result: dict[str, Any]) -> str:
         wrong = f"{ours['errors']['wrong']} of {ours['errors']['judged']:,}"
         cells = [key, f"{ours['rate']:,.0f}", wrong, peer["contender"], f"{peer['rate']:,.0f}"]
         lines.setdefault(ours["operation"], [*cells, percent(error_share(peer))])
-    head = ("hard inputs", "ours, a second", "wrong", "fastest peer", "a second", "wrong or refused")
+    head = ("hard inputs", f"{OURS}, a second", "wrong", "fastest peer", "a second", "wrong or refused")
     return table(head, list(lines.values()))
 
 
@@ -117,7 +134,7 @@ def _tables(contests: dict[str, list[Row]]) -> str:
 
 
 def _cells(row: Row, base: Row) -> list[str]:
-    name, errors = named(row["contender"], row.get("setting")), row["errors"]
+    name, errors = named(shown(row["contender"]), row.get("setting")), row["errors"]
     if row["absent"]:
         return [name, f"absent: {row['absent']}"] + [""] * (len(HEAD) - 2)
     result = spread(row["seconds"])

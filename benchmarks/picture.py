@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from benchmarks.web_page import SAME, faults
+from benchmarks.web_page import faults, tone
 
 TONE = "#8a9099"
 GOOD, SLOW, BAD = "#2b8a3e", "#d9730d", "#e03131"
+TONES = {"faster": GOOD, "same": TONE, "slower": SLOW}
 LEFT, WIDE, LINE = 170, 240, 24
 """Where the axis begins, how wide it is, how high a line."""
 
@@ -26,12 +27,12 @@ def text_of(queried: list[dict[str, Any]]) -> str:
         for side, one in each["sides"].items():
             if one["ratio"] is not None:
                 x = axis + WIDE / 2 * max(-1.0, min(1.0, math.log10(one["ratio"]) / 2))
-                tone = GOOD if one["ratio"] >= SAME else SLOW
-                fill = f'fill="{tone}"' if side == "hard" else 'fill="none"'
-                parts.append(f'<circle cx="{x:.1f}" cy="{y}" r="5" stroke="{tone}" stroke-width="2" {fill}/>')
+                color = TONES[tone(one["ratio"])]
+                fill = f'fill="{color}"' if side == "hard" else 'fill="none"'
+                parts.append(f'<circle cx="{x:.1f}" cy="{y}" r="5" stroke="{color}" stroke-width="2" {fill}/>')
         for one in each["seen"]:
-            tone = BAD if one["wrong"] else SLOW if one["refused"] + one["outside"] else GOOD
-            words.append(f'<tspan fill="{tone}">{faults(one)}</tspan>')
+            color = BAD if one["wrong"] else SLOW if one["refused"] + one["outside"] else GOOD
+            words.append(f'<tspan fill="{color}">{faults(one)}</tspan>')
         parts.append(_text(beside, y + 4, "&#160; ".join(words)))
     size = f'viewBox="0 0 1000 {40 + LINE * len(queried)}" font-family="sans-serif" font-size="13"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n' + "\n".join(parts) + "\n</svg>\n"

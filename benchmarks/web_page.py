@@ -15,8 +15,11 @@ QUESTIONS: list[tuple[str, str, str, str]] = json.loads((PAGES / "questions.json
 """Title, operation, its easy and its hard contest."""
 FACTS = ("commit", "processor", "cores", "seed", "load_before", "load_after", "seconds", "versions", "quick")
 BAD = ("wrong", "refused", "outside")
-SAME = 1 / 1.1
-"""Ours counts as fast from this ratio on."""
+SAME = 1.1
+"""Two speeds are the same within this ratio."""
+OURS = "exact-geometry"
+STEPS = ("1e-12", "1e-09", "1e-06")
+"""By how much of the model's size hard items are moved, as the results name it."""
 Row = dict[str, Any]
 
 
@@ -47,6 +50,16 @@ def with_interval(row: Row, kind: str = "wrong") -> str:
     return f"{percent(count / max(1, total))} ({percent(low)} to {percent(high)})"
 
 
+def shown(contender: str) -> str:
+    """Return the name of a contender as the pages have it."""
+    return re.sub("^ours", OURS, contender)
+
+
+def tone(ratio: float) -> str:
+    """Say whether that many times faster is faster, the same, or slower."""
+    return "same" if 1 / SAME <= ratio <= SAME else "faster" if ratio > 1 else "slower"
+
+
 def number(ratio: float) -> str:
     """Return a ratio with two digits."""
     return f"{ratio:.2g}" if ratio < 9.95 else f"{ratio:,.0f}"
@@ -54,8 +67,8 @@ def number(ratio: float) -> str:
 
 def times(ratio: float) -> str:
     """Say how many times faster ours is."""
-    shown = number(max(ratio, 1 / ratio))
-    return "as fast as" if shown == "1" else f"{shown}x {'faster' if ratio > 1 else 'slower'} than"
+    how = tone(ratio)
+    return "the same as" if how == "same" else f"{number(max(ratio, 1 / ratio))}x {how} than"
 
 
 def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUESTIONS) -> list[dict[str, Any]]:
@@ -71,7 +84,9 @@ def questions(rows: list[Row], titles: Sequence[tuple[str, str, str, str]] = QUE
         seen = [_seen(row) for row in _peers(parts[1] or parts[0], is_alone)]
         names = {"title": title, "id": title.lower().translate({ord(c): "-" for c in " ,?"}).strip("-")}
         keyed = {side: key if part else None for side, key, part in zip(("easy", "hard"), keys, parts)}
-        result.append(names | keyed | {"sides": sides, "seen": seen, "is_alone": is_alone, "say": _said(*parts)})
+        near = next((row["near"] for row in parts[1] if row.get("near") is not None), None)
+        made = {"sides": sides, "seen": seen, "is_alone": is_alone, "say": _said(*parts), "near": near}
+        result.append(names | keyed | made)
     return result
 
 
@@ -93,18 +108,26 @@ def _side(rows: list[Row], is_book: bool) -> dict[str, Any]:
     ours, others = _ours(rows), _peers(rows, is_book)
     if ours is None or not others:
         return {"ratio": None}
-    return {"ratio": ours["rate"] / others[0]["rate"], "name": short(others[0]), "fails": error_share(others[0])}
+    return {"ratio": ours["rate"] / others[0]["rate"], "name": short(others[0]), "fails": error_share(others[0]),
+            "seconds": [1 / ours["rate"], 1 / others[0]["rate"]]}  # fmt: skip
 
 
 def short(row: Row) -> str:
     """Return the name of a package, or of a formula, without what it is called for."""
     name = row["contender"].removeprefix("textbook: ")
-    return re.split(r",? |, ", name)[0] if row["package"] else name
+    return re.split(r",? |, ", name)[0] if row["package"] else shown(name)
 
 
 def _seen(row: Row) -> dict[str, Any]:
     errors = row["errors"]
-    return {"name": short(row), "judged": max(1, errors["judged"])} | {kind: errors.get(kind, 0) for kind in BAD}
+    made = {"name": short(row), "judged": max(1, errors["judged"])} | {kind: errors.get(kind, 0) for kind in BAD}
+    rungs = [row.get("ladder", {}).get(step) for step in STEPS]
+    return made | {"ladder": [share_of(rung) for rung in rungs if rung]}
+
+
+def share_of(rung: Row) -> float:
+    """Return the share of wrong answers among items that were moved away from the boundary."""
+    return rung["wrong"] / max(1, rung["judged"])
 
 
 def faults(each: dict[str, Any]) -> str:
@@ -122,9 +145,9 @@ def _said(easy: list[Row], hard: list[Row]) -> str:
         if ours is None:
             continue
         if bad := failing(ours):
-            words.append(f"{how}: OURS IS WRONG in {bad} of {ours['errors']['judged']}.")
+            words.append(f"{how}: {OURS.upper()} IS WRONG in {bad} of {ours['errors']['judged']}.")
         words += _beside(how, ours, _peers(rows) or _peers(rows, is_book=True))
-    return " ".join(words) or "Ours alone."
+    return " ".join(words) or f"{OURS} alone."
 
 
 def _beside(how: str, ours: Row, others: list[Row]) -> list[str]:
@@ -148,13 +171,13 @@ def summary(queried: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, s
     """Return three facts as a figure, its tone, what it counts, and in brief: ours wrong, easy input, hard input."""
     ours = [row for row in rows if row["contender"] == "ours"]
     wrong, judged = sum(map(failing, ours)), sum(row["errors"].get("judged", 0) for row in ours)
-    words = "of our answers are wrong, by exact arithmetic"
-    facts = [(f"{wrong:,} of {judged:,}", "bad" if wrong else "good", words, "of ours wrong")]
+    words = f"answers of {OURS} are wrong, by exact arithmetic"
+    facts = [(f"{wrong:,} of {judged:,}", "bad" if wrong else "good", words, "of our answers wrong")]
     for side in ("easy", "hard"):
         contained = [each["sides"][side] for each in queried if not each["is_alone"] and each["sides"][side]["ratio"]]
-        slow = [each for each in contained if each["ratio"] < SAME]
-        words = f"questions on {side} input: exact is as fast as the fastest peer, or faster"
-        brief = f"{side} inputs: as fast as any peer"
+        slow = [each for each in contained if tone(each["ratio"]) == "slower"]
+        words = f"questions on {side} input: faster than the fastest peer, or within 10% of it"
+        brief = f"{side} inputs: not slower than any peer"
         failed = [each["fails"] for each in slow if each["fails"]]
         if failed:
             words += f"; {len(failed)} of the {len(slow)} faster peers fail, in {percent(min(failed))} to "
@@ -167,8 +190,19 @@ def summary(queried: list[dict[str, Any]], rows: list[Row]) -> list[tuple[str, s
     return facts
 
 
+def winners(rows: list[Row]) -> list[str]:
+    """Return where a peer is faster and never wrong, with how much faster, the largest first."""
+    found = []
+    for key in dict.fromkeys(key_of(row) for row in rows):
+        mine = [row for row in rows if key_of(row) == key]
+        ours, right = _ours(mine), [row for row in _peers(mine) if not failing(row)]
+        if ours and right and tone(ours["rate"] / right[0]["rate"]) == "slower":
+            found.append((right[0]["rate"] / ours["rate"], f"{key}: {short(right[0])}"))
+    return [f"{name} {number(ratio)}x" for ratio, name in sorted(found, reverse=True)]
+
+
 def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:
-    """Return the verdicts of an audit, judged by ours: how many are wrong, and the worst."""
+    """Return the verdicts of an audit, judged by the exact engine: how many are wrong, and the worst."""
     others = [row for row in rows if row["contender"] != "ours" and not row["absent"]]
     wrong = sorted((row for row in others if failing(row)), key=error_share)
     words = "contenders differ from the exact engine"
@@ -184,7 +218,7 @@ def _contest(rows: list[tuple[int, Row]]) -> dict[str, Any]:
     for i, row in rows:
         errors = row["errors"]
         kind = "ours" if row["contender"] == "ours" else "peer" if row["package"] else "book"
-        one = {"i": i, "name": row["contender"], "label": short(row), "kind": kind}
+        one = {"i": i, "name": shown(row["contender"]), "label": short(row), "kind": kind}
         one |= {key: errors.get(key, 0) for key in ("judged", *BAD, "off", "coordinates")}
         one |= {key: row.get(key) for key in ("absent", "setting", "rate", "build", "first", "latency", "worst")}
         one["where"] = errors.get("where", ())
@@ -202,7 +236,8 @@ def text_of(result: dict[str, Any], path: str, titles: Sequence[tuple[str, str, 
     data = {
         "facts": {key: result[key] for key in FACTS} | {"results": path},
         "summary": summary(queried, rows) if titles is QUESTIONS else verdicts(rows),
-        "versus": "Ours, beside the fastest peer" if titles is QUESTIONS else "Your data",
+        "versus": f"{OURS} beside the fastest peer" if titles is QUESTIONS else "Your data",
+        "winners": winners(rows) if titles is QUESTIONS else [],
         "museum": titles is QUESTIONS,
         "questions": queried,
         "contests": contests,

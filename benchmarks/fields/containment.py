@@ -12,7 +12,8 @@ import numpy as np
 import engine
 from benchmarks import workloads
 from benchmarks.contenders import NotApplicable, Prepared, make
-from benchmarks.contest import Contender, Contest, Goals, Size, Task, field_of
+from benchmarks.contenders.with_ours import solid_of
+from benchmarks.contest import LADDER, RUNG, Contender, Contest, Goals, Size, Task, field_of
 from benchmarks.errors import OUTSIDE, REFUSED, locations, same
 from benchmarks.workloads import Bodies, Mesh, Rings, document, extent_of, generator
 
@@ -75,7 +76,30 @@ def contest(
     exact = settle(slice(n_exact)) if n_exact and settle else settle
     queried, is_hard = field_of("points", subject, peers, **more), bool(n_exact) and tail != "uniform"
     how = partial(request, subject, points) if n_exact else None
-    return Contest(operation, shown, is_hard, points, exact, same, queried, about, request=how)
+    result = Contest(operation, shown, is_hard, points, exact, same, queried, about, request=how)
+    if not is_hard:
+        return result
+
+    def moved(step: float) -> tuple[np.ndarray, np.ndarray]:
+        other = shifted(points[:RUNG], np.ptp(points, axis=0).max(), step)
+        return other, locations(other, subject)
+
+    return replace(result, moved=moved, near=nearness(points[:n_exact], subject))
+
+
+def shifted(points: np.ndarray, size: float | np.ndarray, step: float) -> np.ndarray:
+    """Return points moved by so much of a size, in directions drawn at random."""
+    directions = generator(f"moved {step}", 0).normal(size=points.shape)
+    directions /= np.sqrt((directions**2).sum(axis=-1, keepdims=True))
+    return np.asarray(points + step * np.reshape(size, (-1, *[1] * (points.ndim - 1))) * directions)
+
+
+def nearness(points: np.ndarray, subject: Any) -> float | None:
+    """Return how far points are from the boundary of a body: the median, of the largest side of their box."""
+    if isinstance(subject, engine.Triangle):  # stands for the prism over it
+        return None
+    away = engine.distances(points, solid_of(subject), to="boundary")
+    return float(np.median(away) / np.ptp(points, axis=0).max())
 
 
 def request(subject: Any, points: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
@@ -109,10 +133,21 @@ def _hard_3d(size: Size, name: str) -> Contest:
     order = mixed.permutation(sum(map(len, points)))[: size.n(24_000)]
     owner, rows, exact = (np.concatenate(each)[order] for each in (owners, points, inside))
     about = "on vertices, edges and faces and ulps beside them, offsets to 1e9, slivers, non-manifold meshes"
+    spans, n_rows = np.array([np.ptp(mesh.vertices, axis=0).max() for mesh in meshes]), len(rows)
+    steps = [shifted(rows[:RUNG], spans[owner[:RUNG]], step) for step in LADDER]
+    rows, owner = np.concatenate([rows, *steps]), np.concatenate([owner, *[owner[:RUNG]] * len(LADDER)])
     peers = [replace(each, make=partial(_on_many, each, meshes, owner, rows))
              for each in field_of("points", None, PAGE_PEERS)]  # fmt: skip
-    return Contest("containment 3D", "boundary", True, np.arange(len(rows)), exact[: size.n(4_000, 1_000)], same, peers,
-                   about, request=lambda item: request(meshes[owner[item]], rows, item))  # fmt: skip
+
+    def moved(step: float) -> tuple[np.ndarray, np.ndarray]:
+        items = n_rows + RUNG * LADDER.index(step) + np.arange(min(RUNG, n_rows))
+        return items, np.concatenate([locations(rows[item, None], meshes[owner[item]]) for item in items])
+
+    near = [engine.distances(rows[:1000][owner[:1000] == i], solid_of(mesh), to="boundary") / spans[i]
+            for i, mesh in enumerate(meshes)]  # fmt: skip
+    return Contest("containment 3D", "boundary", True, np.arange(n_rows), exact[: size.n(4_000, 1_000)], same, peers,
+                   about, request=lambda item: request(meshes[owner[item]], rows, item),
+                   moved=moved, near=float(np.median(np.concatenate(near))))  # fmt: skip
 
 
 def _on_many(each: Contender, meshes: list[Mesh], owner: np.ndarray, points: np.ndarray) -> Prepared:

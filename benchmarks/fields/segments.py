@@ -10,7 +10,8 @@ import numpy as np
 
 import engine
 from benchmarks import errors, workloads
-from benchmarks.contest import Contest, Goals, Size, Task, field_of, two_threads
+from benchmarks.contest import RUNG, Contest, Goals, Size, Task, field_of, two_threads
+from benchmarks.fields.containment import shifted
 from benchmarks.workloads import SIMPLE, document
 
 HARD = {
@@ -83,8 +84,14 @@ def _row(size: Size, name: str) -> Contest:
     elif peers and "ours" not in peers:
         exact = partial(_settle, segments, region)
     result = two_threads("segments", region) if "ours" in peers else field_of("segments", region, peers, 1)
+
+    def moved(step: float) -> tuple[np.ndarray, np.ndarray]:
+        other = shifted(segments[:RUNG], 2.0, step)
+        return other, errors.first_pieces(other, region)
+
     return Contest("clipping segments", name, is_hard, segments, exact, errors.coordinates, result, HARD[kind],
-                   n_sample=100, request=partial(request, region, segments))  # fmt: skip
+                   n_sample=100, request=partial(request, region, segments),
+                   moved=moved if is_page and is_hard else None)  # fmt: skip
 
 
 def request(region: Any, segments: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:

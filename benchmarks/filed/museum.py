@@ -33,9 +33,14 @@ def text_of(rows: list[dict[str, Any]], cases: list[Case], path: str) -> str:
         | {"exact": exact_words(case), "request": request(case), "today": answered[case["id"]]}
         for case in cases if case["id"] in answered
     ]  # fmt: skip
+    shown.sort(key=lambda one: min(_rank(outcome) for _, outcome, *_ in one["today"]))  # rules of boundaries last
     wrong = sum(row["contender"] == "ours" and row["outcome"] != "right" for row in rows)
     versions = dict.fromkeys(f"{row['contender']} {row['version']}" for row in rows if row["version"])
     return written("museum", {"cases": shown, "ours": wrong, "versions": ", ".join(versions), "results": path})
+
+
+def _rank(outcome: str) -> int:
+    return {"wrong": 0, "right": 3, "another rule": 2}.get(outcome, 1)
 
 
 def request(case: Case) -> tuple[str, dict[str, Any]]:

@@ -40,6 +40,24 @@ def test_right_wrong_refused_and_absent_are_told_apart() -> None:
     assert rows[0].absent == "ImportError: no such package"
 
 
+def test_from_where_on_a_contender_is_right_stands_in_its_row() -> None:
+    """Of numbers that are moved away from whole ones, a contender that rounds to ninths is right from 1e-9 on."""
+    items = np.arange(0.0, 100.0)
+
+    def moved(step: float) -> tuple[np.ndarray, np.ndarray]:
+        other = items[:40] + step
+        return other, other > np.floor(other)
+
+    asked = [Contender("ours", lambda: Prepared(lambda x: x > np.floor(x))),
+             Contender("peer", lambda: Prepared(lambda x: np.round(x, 9) > np.floor(x)))]  # fmt: skip
+    contest = Contest("n", "e", True, items, items > np.floor(items), errors.same, asked, moved=moved, near=0.25)
+    ours, peer = run_contest(contest, 1, 0.01, has_latency=True)
+    assert (ours.near, peer.near) == (0.25, 0.25)
+    assert [(step, rung["judged"], rung["wrong"]) for step, rung in peer.ladder.items()] == [
+        ("1e-12", 40, 40), ("1e-09", 40, 0), ("1e-06", 40, 0)]  # fmt: skip
+    assert all(rung["wrong"] == 0 for rung in ours.ladder.values())
+
+
 def test_coordinates_are_judged_in_ulps() -> None:
     exact = np.array([[1.0, 2.0], [np.nan, np.nan], [1.0, 1.0]])
     answers = np.array([[1.0, 2.0 + 2**-50], [0.0, 0.0], [1.0, 1.0]])
@@ -101,5 +119,5 @@ def test_the_page_lists_wrong_answers_of_ours_first() -> None:
     ]
     facts = {"rows": plain, "versions": {}, "commit": "x", "seed": 0, "processor": "p", "cores": 2}
     text = page.text_of(facts | {"load_before": 0, "load_after": 0, "seconds": 1.0})
-    assert text.index("Wrong answers of ours: 1 contest") < text.index("Where another is faster")
+    assert text.index("Wrong answers of exact-geometry: 1 contest") < text.index("Where another is faster")
     assert "peer" in text

@@ -42,13 +42,13 @@ FOUND: dict[str, Any] = dict.fromkeys(web_page.FACTS, 0) | {"versions": {"numpy"
 
 def test_a_question_is_said_in_words() -> None:
     (asked,) = web_page.questions(ROWS)
-    assert asked["sides"]["easy"] == {"ratio": 2.0, "name": "peer", "fails": 0}
-    assert asked["sides"]["hard"] == {"ratio": 1 / 3, "name": "peer", "fails": 0.25}
+    assert asked["sides"]["easy"] == {"ratio": 2.0, "name": "peer", "fails": 0, "seconds": [5e-7, 1e-6]}
+    assert asked["sides"]["hard"] == {"ratio": 1 / 3, "name": "peer", "fails": 0.25, "seconds": [1e-6, 1 / 3e6]}
     assert list(map(web_page.faults, asked["seen"])) == ["peer 25%", "picky 1.5% unsupported"]
     assert "Easy input: 2x faster than peer." in asked["say"]
     assert "3x slower than peer, wrong in 25% (20% to 31%); picky never wrong, but silent at times." in asked["say"]
     wrong = [row("boundary", "ours", 1.0, 3), row("boundary", "peer", 1.0, 0)]
-    assert "OURS IS WRONG in 3 of 200" in web_page.questions(wrong)[0]["say"]
+    assert "EXACT-GEOMETRY IS WRONG in 3 of 200" in web_page.questions(wrong)[0]["say"]
 
 
 def test_the_first_words_count_ours_then_who_is_faster() -> None:
