@@ -143,20 +143,36 @@ class OverlayBatch(Ragged):
     def areas(self) -> FloatArray:
         """The doubles nearest to the exact areas of all pairs, (n_pairs,), computed now. NaN where status is not 0,
         infinity for what is beyond the largest double."""
-        exact = self._exact
-        groups = exact.piece_offsets[summed(exact.counts[:, 0])]
-        sides = [
-            (RingArrays(*each[:2]), each[2]) for each in (_polygon_arrays(self._subjects), _polygon_arrays(self._clips))
-        ]
-        areas, _ = areas_of(*sides[0], *sides[1], read_only(exact.sources), read_only(exact.ring_offsets), groups)
-        uncertified = np.isnan(areas) | (exact.status == OPEN)
-        areas[self.status != PairStatus.DONE] = np.nan
-        for pair in np.flatnonzero(uncertified & (self.status == PairStatus.DONE)).tolist():
+        areas = self._sum_areas(np.empty((0, 3)))
+        uncertified = np.isnan(areas) & (self.status == PairStatus.DONE)
+        for pair in np.flatnonzero(uncertified).tolist():
             try:
                 areas[pair] = cast("Overlay", self[pair]).area
             except NotRepresentableError:
                 areas[pair] = np.inf
         return areas
+
+    def _sum_areas(self, sums: FloatArray) -> FloatArray:
+        """Return the areas that doubles prove, NaN for others; sums: (0, 3), or (n_pairs, 3) as for `sum_areas`, NaN
+        where they do not hold."""
+        exact = self._exact
+        groups = exact.piece_offsets[summed(exact.counts[:, 0])]
+        sides = [
+            (RingArrays(*each[:2]), each[2]) for each in (_polygon_arrays(self._subjects), _polygon_arrays(self._clips))
+        ]
+        sources, offsets = read_only(exact.sources), read_only(exact.ring_offsets)
+        areas, _ = areas_of(*sides[0], *sides[1], sources, offsets, groups, sums)
+        is_open = (exact.status == OPEN) | (self.status != PairStatus.DONE)
+        areas[is_open] = np.nan
+        sums[is_open[: len(sums)]] = np.nan
+        return areas
+
+    def twice_areas(self) -> FloatArray:
+        """Return twice the exact areas, (n_pairs, 3): high part, low part, error bound; NaN where floats prove
+        nothing."""
+        sums = np.empty((len(self), 3))
+        self._sum_areas(sums)
+        return sums
 
     @property
     def n_pieces_exact(self) -> IntArray:

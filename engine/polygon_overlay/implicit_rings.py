@@ -25,6 +25,7 @@ from engine.solids.checks import as_nested_offsets, as_points
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 _NEVER: Final = np.zeros(1, np.uint8)
+_NO_SUMS: Final = np.zeros((0, 3))
 
 
 NO_RINGS: Final = RingArrays(read_only(np.zeros((0, 2))), read_only(np.zeros(1, np.int64)))
@@ -44,13 +45,13 @@ def one_polygon(n_rings: int) -> IntArray:
 
 def areas_of(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray,
-    sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray,
+    sources: npt.NDArray[np.signedinteger], offsets: IntArray, groups: IntArray, sums: FloatArray = _NO_SUMS,
 ) -> tuple[FloatArray, int]:  # fmt: skip
     """Return the areas (n,) of groups of rings by `sum_areas`, NaN where no nearest double is certified, and the number
     of NaN. Arguments as there."""
     areas = np.empty(len(groups) - 1)
     sum_them = entry_of(sum_areas)
-    return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas)
+    return areas, sum_them(subjects, subject_items, clips, clip_items, sources, offsets, groups, _NEVER, areas, sums)
 
 
 def check_sources(sources: npt.NDArray[np.signedinteger], n_inputs: int | IntArray) -> None:

@@ -33,7 +33,7 @@ from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_vol
 from engine.types import IntArray, read_only
 
 _NO_SIDES: Final = read_only(np.zeros(0, np.int8))
-_MOST_BITS: Final = 1 << 12
+MOST_BITS: Final = 1 << 12
 Whole = tuple[int, int, int]
 
 
@@ -48,12 +48,16 @@ def _cut_off(points: Points, numbers: Iterable[int], bits: int) -> tuple[dict[in
     return places, k, max((abs(x) for place in places.values() for x in place), default=0) + 1
 
 
-def _narrowed(ends_of: Callable[[int], tuple[float, float]]) -> float | None:
-    """Return what both ends of a value round to, with as many bits as it takes; None beyond `_MOST_BITS`."""
+Ends = Callable[[int], tuple[Fraction, Fraction]]
+"""What a value is between, by the number of bits that are spent on it."""
+
+
+def _narrowed(ends_of: Ends, rounded: Callable[[Fraction], float] = nearest_float) -> float | None:
+    """Return what both ends of a value round to, with as many bits as it takes; None beyond `MOST_BITS`."""
     bits = 128
-    while bits <= _MOST_BITS:
+    while bits <= MOST_BITS:
         try:
-            low, high = ends_of(bits)
+            low, high = map(rounded, ends_of(bits))
             if low == high:
                 return low
         except NotRepresentableError:  # an end may be beyond the doubles where the value is not
@@ -70,6 +74,12 @@ def _parted(points: Points, triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: Fraction = Fraction(1)) -> float:
     """Return factor times the volume of a closed mesh of points, its faces outwards."""
+    value = _narrowed(volume_between(points, triangles, budget, factor))
+    return nearest_float(factor * volume_in_fractions(points, triangles)) if value is None else value
+
+
+def volume_between(points: Points, triangles: IntArray, budget: Budget, factor: Fraction) -> Ends:
+    """Return what `volume_of_cut` is between."""
     given, others = _parted(points, triangles)
     z0 = float(points.vertices[given[0, 0], 2]) if len(given) else 0.0
     sums = np.zeros((1, 3))
@@ -79,7 +89,7 @@ def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: F
     known, off = Fraction(sums[0, 0]) + Fraction(sums[0, 1]), Fraction(bound_of(float(sums[0, 2]), len(given)))
     rows = others.tolist()
 
-    def ends_of(bits: int) -> tuple[float, float]:
+    def ends_of(bits: int) -> tuple[Fraction, Fraction]:
         places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
         base = Fraction(z0) * Fraction(2) ** k
         z_unit, z_rest = base.numerator // base.denominator, base.denominator
@@ -92,10 +102,14 @@ def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: F
         slack = len(rows) * (120 * (most + abs(z_unit) + 1) ** 2 + (12 * (most + 1) ** 2 if z_rest > 1 else 0))
         unit = Fraction(1, 6) / Fraction(2) ** (3 * k)
         middle, width = known / 6 + total * unit, off / 6 + slack * unit
-        return nearest_float(factor * (middle - width)), nearest_float(factor * (middle + width))
+        return factor * (middle - width), factor * (middle + width)
 
-    value = _narrowed(ends_of)
-    return nearest_float(factor * exact_volume(_as_fractions(points, triangles))) if value is None else value
+    return ends_of
+
+
+def volume_in_fractions(points: Points, triangles: IntArray) -> Fraction:
+    """Return the volume of a closed mesh of points, its faces outwards."""
+    return exact_volume(_as_fractions(points, triangles)) if len(triangles) else Fraction(0)
 
 
 def _as_fractions(points: Points, triangles: IntArray) -> ExactMesh:
@@ -116,7 +130,7 @@ def area_of_cut(points: Points, triangles: IntArray, budget: Budget) -> float:
     off = Fraction(bound_of(float(sums[0, 2]), n) + n * LOST_TO_ROOTS)
     rows = others.tolist()
 
-    def ends_of(bits: int) -> tuple[float, float]:
+    def ends_of(bits: int) -> tuple[Fraction, Fraction]:
         places, k, most = _cut_off(points, np.unique(others).tolist(), bits)
         total = 0
         for i, j, m in rows:
@@ -126,7 +140,7 @@ def area_of_cut(points: Points, triangles: IntArray, budget: Budget) -> float:
         slack = len(rows) * (32 * most + 33)
         unit = Fraction(1, 2) / Fraction(2) ** (2 * k)
         middle, width = known / 2 + total * unit, off / 2 + slack * unit
-        return nearest_float(middle - width), nearest_float(middle + width)
+        return middle - width, middle + width
 
     value = _narrowed(ends_of)
     return nearest_area(_as_fractions(points, triangles)) if value is None else value
@@ -143,7 +157,7 @@ def area_of_section(view: Seen, plane: Plane, area: Area, budget: Budget) -> flo
         square = max(seen_area, Fraction(0)) ** 2 * tilt
         return nearest_root_over(1, square.numerator * square.denominator, square.denominator)
 
-    def ends_of(bits: int) -> tuple[float, float]:
+    def ends_of(bits: int) -> tuple[Fraction, Fraction]:
         places, k, most = _cut_off(view.points, (number for ring in rings for number in ring), bits)
         total, n = 0, 0
         for ring in rings:
@@ -152,9 +166,9 @@ def area_of_section(view: Seen, plane: Plane, area: Area, budget: Budget) -> flo
             n += len(ring)
         budget.check()
         unit = Fraction(1, 2) / Fraction(2) ** (2 * k)
-        return rounded((total - 4 * n * (most + 1)) * unit), rounded((total + 4 * n * (most + 1)) * unit)
+        return (total - 4 * n * (most + 1)) * unit, (total + 4 * n * (most + 1)) * unit
 
-    value = _narrowed(ends_of)
+    value = _narrowed(ends_of, rounded)
     if value is None:
         corners = [[view.exact(number) for number in ring] for ring in rings]
         value = rounded(

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from engine.collision.collide import posed, read_pair
+from engine.compiling.jit import entry_of
 from engine.errors import NotRepresentableError, RingTooShortError, UnsupportedPairError, WrongDimensionError
 from engine.polygon_clipping.planes import plan_of
 from engine.polygon_overlay.batch import overlay_batch
 from engine.polygon_overlay.overlay import overlay
 from engine.polygon_overlay.pair_arrays import PolygonSelection, arrays_of
-from engine.predicates.rational import cross, determinant, dot, exponent_of, nearest_float, scaled_integers
+from engine.predicates.rational import cross, determinant, dot, nearest_float, scaled_integers
 from engine.running.budget import Budget, Cancel
-from engine.running.parallel import Progress, check_options
+from engine.running.parallel import Progress, check_options, run_chunks
+from engine.solid_cutting.convex_rings import MOST_CORNERS, overlap_rings
 from engine.solid_cutting.cut import cut_by_planes
-from engine.solid_cutting.cut_measures import volume_of_cut
+from engine.solid_cutting.cut_measures import MOST_BITS, volume_between, volume_in_fractions, volume_of_cut
 from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
-from engine.solid_cutting.measures import measure
 from engine.solid_cutting.plane_cut import Points, plane_of
 from engine.solid_cutting.section import outward
 from engine.solid_cutting.simple_measures import product, sides_of
@@ -35,17 +36,10 @@ from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import Accuracy, FloatArray, read_only
 
 Rows = list[list[Fraction]]
+_FIRST_BITS: Final = 128
+_BOX_NUMBERS: Final = 5
 _COMFORTABLE: Final = 128
 """Exponents of coordinates up to which areas are far from the least and the largest double."""
-
-
-class _Common(NamedTuple):
-    """What two solids have in common, and what each has, exact if they are fractions."""
-
-    both: float | Fraction
-    first: float | Fraction
-    second: float | Fraction
-    is_exact: bool
 
 
 def overlap_volume(
@@ -64,10 +58,11 @@ def overlap_volume(
 
     Parameters
     ----------
-    first, second : Solid, list of Solid, or ndarray of float64, shape (n, k, 2)
+    first, second : Solid, list of Solid, or ndarray of float64, shape (n, k, 2) or (n, 5)
         Of space: an aabb, convex or convex polyhedron each, or one of them any polyhedron. Of the plane: polygon,
-        triangle or aabb each, or convex or aabb each. Lists and arrays of polygons of k corners (rectangles, turned
-        ones too) are pairs, item by item.
+        triangle or aabb each, or convex or aabb each. Lists and arrays are pairs, item by item: (n, k, 2) polygons of k
+        corners (rectangles, turned ones too), (n, 5) boxes by centre, width, height and angle in radians, whose corners
+        are computed in float64 and then taken as they are.
     first_pose, second_pose : Pose, optional
         As for `collide`; of lists, of all items. Polygons and triangles take none.
     workers, deadline, cancel, progress, report
@@ -93,7 +88,8 @@ def overlap_volume(
 
     Accuracy: of exact images under poses; corners of what is common are exact fractions.
 
-    Cost: milliseconds a pair of space, arrays of polygons some microseconds a pair.
+    Cost: milliseconds a pair of space; of arrays a part of a microsecond for convex polygons of at most 16 corners,
+    others some microseconds.
 
     References
     ----------
@@ -145,8 +141,7 @@ def iou(
     -----
     Boundary, degenerate input and cost: as `overlap_volume`.
 
-    Accuracy: the nearest double for an aabb, convex and convex polyhedron; for others from the nearest doubles of three
-    volumes or areas, within 6 units in the last place.
+    Accuracy: the nearest double.
 
     References
     ----------
@@ -169,19 +164,19 @@ def _of_pairs(first: Any, second: Any, poses: tuple[Any, Any], options: tuple[An
     with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
         if are_many and all(isinstance(each, np.ndarray) for each in (first, second)) and poses == (None, None):
-            values, n, n_exact = _of_arrays(first, second, is_ratio, workers, budget), len(first), 0
+            values, n_exact = _of_arrays(first, second, is_ratio, workers, budget)
         else:
             pairs = list(zip(first, second, strict=True)) if are_many and _same(first, second) else [(first, second)]
-            values, n, n_exact = np.empty(len(pairs)), len(pairs), 0
+            values, n_exact = np.empty(len(pairs)), 0
             for number, (one, other) in enumerate(pairs):
                 budget.check()
-                common = _common(one, other, poses, is_ratio, budget)
-                n_exact += common.is_exact
-                values[number] = _ratio(common) if is_ratio else nearest_float(common.both)
+                values[number], is_exact = _of_pair(one, other, poses, is_ratio, budget)
+                n_exact += is_exact
+    n = len(values)
     if progress is not None:
         progress(n)
     answer = values if are_many else float(values[0])
-    return (answer, Accuracy("exact", 6.0 if is_ratio else 0.5, n, n_exact, n_exact, "overlap")) if report else answer
+    return (answer, Accuracy("exact", 0.5, n, n_exact, n_exact, "overlap")) if report else answer
 
 
 def _is_rings(value: Any) -> bool:
@@ -195,36 +190,77 @@ def _same(first: Any, second: Any) -> bool:
     return True
 
 
-def _of_arrays(first: Any, second: Any, is_ratio: bool, workers: int | None, budget: Budget) -> FloatArray:
-    """Return areas, or their ratios, of arrays (n, k, 2) of polygons."""
-    sides = []
-    for name, each in (("first", first), ("second", second)):
-        corners = as_floats(each, 3, (name,))
-        if corners.shape[2] != 2:
-            raise WrongDimensionError(f"{name} must hold positions of 2 numbers each, got {corners.shape[2]}", (name,))
-        if corners.shape[1] < 3:
-            raise RingTooShortError(f"{name} has polygons of {corners.shape[1]} corners; give 3 or more", (name,))
-        sides.append(corners)
+def _of_arrays(first: Any, second: Any, is_ratio: bool, workers: int | None, budget: Budget) -> tuple[FloatArray, int]:
+    """Return areas, or their ratios, of arrays (n, k, 2) of polygons or (n, 5) of boxes, and how many took overlays."""
+    sides = [_corners_of(each, name) for name, each in (("first", first), ("second", second))]
     _same(*sides)
-    if is_ratio:
-        sides = _scaled(*sides)
+    values = np.full(len(sides[0]), np.nan)
+    if all(side.shape[1] <= MOST_CORNERS for side in sides):
 
-    def areas(one: FloatArray, other: FloatArray) -> FloatArray:
-        pairs = _selection(one), _selection(other)
-        made: Any = overlay_batch(*pairs, deadline=budget.left(), cancel=budget.cancel, workers=workers)
-        return np.asarray(made.areas)
+        def fill(start: int, stop: int) -> None:
+            some = [side[start:stop] for side in sides]
+            entry_of(overlap_rings)(*some, is_ratio, values[start:stop], budget.flag)
 
-    both = areas(*sides)
+        run_chunks(fill, len(values), budget=budget, workers=workers)
+    rows = np.flatnonzero(np.isnan(values))
+    if not len(rows):
+        return values, 0
+    one, other = (side[rows] for side in sides)
     if is_ratio:
-        own = [areas(side, _around(side)) for side in sides]
-        union = own[0] + (own[1] - both)
-        return np.divide(both, union, out=np.zeros(len(both)), where=union > 0.0)
-    if len(beyond := np.flatnonzero(np.isinf(both))):
+        one, other = _scaled(one, other)
+        pairs = (one, other), (one, _around(one)), (other, _around(other))
+        values[rows] = _ratios([(_selection(p), _selection(q)) for p, q in pairs], workers, budget)
+        return values, len(rows)
+    limits: Any = {"deadline": budget.left(), "cancel": budget.cancel, "workers": workers}
+    made: Any = overlay_batch(_selection(one), _selection(other), **limits)
+    values[rows] = made.areas
+    if len(beyond := np.flatnonzero(np.isinf(values))):
         pair = int(beyond[0])
         raise NotRepresentableError(
             f"the area of pair {pair} is beyond the largest float64; scale the input down", ("first", pair)
         )
-    return both
+    return values, len(rows)
+
+
+def _corners_of(each: Any, name: str) -> FloatArray:
+    """Return an array of polygons (n, k, 2), or of boxes (n, 5), as corners."""
+    if each.ndim == 2 and each.shape[1] == _BOX_NUMBERS:
+        x, y, width, height, angle = as_floats(each, 2, (name,)).T
+        along = np.stack([np.cos(angle), np.sin(angle)], axis=1) / 2
+        across = np.stack([-along[:, 1], along[:, 0]], axis=1) * height[:, None]
+        along = along * width[:, None]
+        ways = (-along - across, along - across, along + across, across - along)
+        each = np.stack([x, y], axis=1)[:, None] + np.stack(ways, axis=1)
+    corners = as_floats(each, 3, (name,))
+    if corners.shape[2] != 2:
+        raise WrongDimensionError(f"{name} must hold positions of 2 numbers each, got {corners.shape[2]}", (name,))
+    if corners.shape[1] < 3:
+        raise RingTooShortError(f"{name} has polygons of {corners.shape[1]} corners; give 3 or more", (name,))
+    return read_only(corners)
+
+
+def _ratios(pairs: Sequence[tuple[Any, Any]], workers: int | None, budget: Budget) -> FloatArray:
+    """Return the nearest doubles of ratios of areas. pairs: of polygons, and of each with a box around, within which it
+    has its own area."""
+    limits: Any = {"deadline": budget.left(), "cancel": budget.cancel, "workers": workers}
+    made: list[Any] = [overlay_batch(*pair, **limits) for pair in pairs]
+    sums, values = np.stack([each.twice_areas() for each in made], axis=1), np.empty(len(made[0]))
+    for row, parts in enumerate(sums.tolist()):
+        budget.check()
+        areas: list[list[Fraction]] = []
+        if np.isfinite(sums[row]).all():
+            middles = [Fraction(h) + Fraction(low) for h, low, _ in parts]
+            areas = [[mid + way * Fraction(part[2]) for mid, part in zip(middles, parts)] for way in (-1, 1)]
+        ends = [_ratio(some) for some in _extremes(*areas)] if areas else [0.0, 1.0]
+        if ends[0] != ends[1]:
+            ends = [_ratio([each[row].area_exact for each in made])]
+        values[row] = ends[0]
+    return values
+
+
+def _extremes(low: Sequence[Fraction], high: Sequence[Fraction]) -> Any:
+    """Return (both, first, second) at which their ratio is least, and greatest."""
+    return (low[0], *high[1:]), (high[0], *low[1:])
 
 
 def _selection(corners: FloatArray) -> PolygonSelection:
@@ -250,13 +286,15 @@ def _around(corners: FloatArray) -> FloatArray:
     return np.stack([low, np.c_[high[:, 0], low[:, 1]], high, np.c_[low[:, 0], high[:, 1]]], axis=1)
 
 
-def _ratio(common: _Common) -> float:
-    both, one, other = (Fraction(each) for each in common[:3])
-    union = one + other - both
-    return min(1.0, nearest_float(both / union)) if union > 0 else 0.0
+def _ratio(volumes: Sequence[Fraction]) -> float:
+    """Return the ratio of what two have in common to their union, from that and the volume of each."""
+    both, first, second = volumes
+    union = first + second - both
+    return min(1.0, max(0.0, nearest_float(both / union))) if union > 0 else 0.0
 
 
-def _common(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, budget: Budget) -> _Common:
+def _of_pair(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, budget: Budget) -> tuple[float, bool]:
+    """Return the common volume of two solids, or its ratio, and whether it took exact arithmetic."""
     if not (isinstance(first, Solid) and isinstance(second, Solid)):
         first, second, _ = read_pair(first, second, budget.left(), budget.cancel)
     if first.dimension != second.dimension:
@@ -267,20 +305,23 @@ def _common(first: Any, second: Any, poses: tuple[Any, Any], is_ratio: bool, bud
         )
     moves = posed(poses[0], first, "first_pose"), posed(poses[1], second, "second_pose")
     if first.dimension == 2 and any(isinstance(each, (Polygon, Triangle)) for each in (first, second)):
-        return _of_polygons(first, second, moves, is_ratio, budget)
+        return _of_polygons(first, second, moves, is_ratio, budget), False
     if isinstance(first, Aabb) and isinstance(second, Aabb) and moves == (None, None):
         ends = zip(first.min.tolist(), second.min.tolist(), first.max.tolist(), second.max.tolist())
         sides = [max(Fraction(0), Fraction(min(c, d)) - Fraction(max(a, b))) for a, b, c, d in ends]
-        return _Common(product(sides), product(sides_of(first)), product(sides_of(second)), True)
+        both = product(sides)
+        own = [product(sides_of(each)) for each in (first, second)]
+        return _ratio([both, *own]) if is_ratio else nearest_float(both), True
     rows = [_rows_of(each, move, budget) for each, move in zip((first, second), moves)]
     if rows[0] is not None and rows[1] is not None:
-        one, other = (_own_volume(each, move, budget) for each, move in zip((first, second), moves))
-        return _Common(_volume_within(rows[0] + rows[1], budget), one, other, True)
+        both = _volume_within(rows[0] + rows[1], budget)
+        if not is_ratio:
+            return nearest_float(both), True
+        return _ratio([both, *(_own_volume(*pair, budget) for pair in zip((first, second), moves))]), True
     if rows[0] is None and isinstance(first, Polyhedron) and rows[1] is not None:
-        return _of_mesh(first, moves[0], rows[1], is_ratio, budget)
+        return _of_mesh(first, moves[0], rows[1], is_ratio, budget), False
     if rows[1] is None and isinstance(second, Polyhedron) and rows[0] is not None:
-        turned = _of_mesh(second, moves[1], rows[0], is_ratio, budget)
-        return turned._replace(first=turned.second, second=turned.first)
+        return _of_mesh(second, moves[1], rows[0], is_ratio, budget), False
     more = (
         "cut one of them into convex parts"
         if first.type == second.type == "polyhedron"
@@ -336,7 +377,7 @@ def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
     return factor * solid.prepared("exact_volume", lambda: _volume_within(own, budget), budget.check)
 
 
-def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, budget: Budget) -> _Common:
+def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, budget: Budget) -> float:
     """Return what a polyhedron has in common with a convex region, whose planes are brought into its coordinates."""
     factor = Fraction(1)
     own = rows
@@ -346,27 +387,38 @@ def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, b
         columns = [tuple(line[k] for line in turn) for k in range(3)]
         own = [[*(dot(row[:3], column) for column in columns), dot(row[:3], move) + row[3]] for row in rows]
     left = cut_by_planes(solid, [plane_of(scaled_integers(row)) for row in own], budget)
-    exponent = 3 * exponent_of(solid.vertices) if is_ratio else 0
-    scale = Fraction(2) ** -exponent  # of ratios: volumes might be too large or small
-    both = volume_of_cut(left.points, left.triangles, budget, factor * scale) if len(left.triangles) else 0.0
-    volume = Fraction(0)
-    if is_ratio:
-        outer = outward(solid, budget)
-        volume = Fraction(volume_of_cut(Points(solid.vertices), outer, budget, factor * scale)) / scale
-    return _Common(Fraction(both) / scale, volume, _volume_within(rows, budget) if is_ratio else 0.0, False)
+    common = left.points, left.triangles
+    if not len(left.triangles):
+        return 0.0
+    if not is_ratio:
+        return volume_of_cut(*common, budget, factor)
+    whole = Points(solid.vertices), outward(solid, budget)
+    parts = [volume_between(*each, budget, factor) for each in (common, whole)]
+    other = _volume_within(rows, budget)
+
+    bits = _FIRST_BITS
+    while bits <= MOST_BITS:
+        low, high = zip(*(part(bits) for part in parts))
+        least, most = (_ratio(some) for some in _extremes((*low, other), (*high, other)))
+        if least == most:
+            return least
+        bits *= 4
+    return _ratio([*(factor * volume_in_fractions(*each) for each in (common, whole)), other])
 
 
-def _of_polygons(first: Solid, second: Solid, moves: tuple[Any, Any], is_ratio: bool, budget: Budget) -> _Common:
+def _of_polygons(first: Solid, second: Solid, moves: tuple[Any, Any], is_ratio: bool, budget: Budget) -> float:
     """Return what polygons have in common. is_ratio: maybe each axis multiplied by a power of two."""
     if moves != (None, None):
         raise UnsupportedPairError("polygons take no pose here; move their vertices", ("first_pose",))
     sides = [_as_polygon(each) for each in (first, second)]
-    if is_ratio and all(len(each.vertices) for each in sides):
-        places = _scaled(*(each.vertices[None] for each in sides))
-        sides = [Polygon.of_arrays(read_only(at[0]), each.ring_offsets) for at, each in zip(places, sides)]
-    both = overlay(sides[0], sides[1], deadline=budget.left(), cancel=budget.cancel).area
-    one, other = (measure(each, "area", budget)[0] for each in sides)
-    return _Common(both, one, other, False)
+    if not is_ratio:
+        return overlay(sides[0], sides[1], deadline=budget.left(), cancel=budget.cancel).area
+    if not all(len(each.vertices) for each in sides):
+        return 0.0
+    places = _scaled(*(each.vertices[None] for each in sides))
+    one, other = ([Polygon.of_arrays(read_only(at[0]), each.ring_offsets)] for at, each in zip(places, sides))
+    boxes = [[Polygon([_around(at)[0]])] for at in places]
+    return float(_ratios([(one, other), (one, boxes[0]), (other, boxes[1])], 1, budget)[0])
 
 
 def _as_polygon(solid: Any) -> Polygon:

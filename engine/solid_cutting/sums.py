@@ -32,18 +32,26 @@ _POLL: Final = 0x3FFF
 
 
 @inline
-def _minor(vertices: FloatArray, a: int, b: int, c: int, x: int, y: int) -> tuple[float, float, float]:
-    """Return (h, l, size): (b - a) x (c - a) on the axes x and y as a double-double, and the size of its products."""
-    uh, ul = two_diff(vertices[b, x], vertices[a, x])
-    vh, vl = two_diff(vertices[c, y], vertices[a, y])
-    sh, sl = two_diff(vertices[b, y], vertices[a, y])
-    th, tl = two_diff(vertices[c, x], vertices[a, x])
+def cross_of(
+    uh: float, ul: float, vh: float, vl: float, sh: float, sl: float, th: float, tl: float
+) -> tuple[float, float, float]:
+    """Return (h, l, size): u v - s t of exact pairs as a double-double, and the size of its products."""
     p, p_low = two_prod(uh, vh)
     q, q_low = two_prod(sh, th)
     h, low = two_diff(p, q)
     low += (p_low - q_low) + ((uh * vl + ul * vh) - (sh * tl + sl * th))
     h, low = fast_two_sum(h, low)
     return h, low, abs(p) + abs(q)
+
+
+@inline
+def _minor(vertices: FloatArray, a: int, b: int, c: int, x: int, y: int) -> tuple[float, float, float]:
+    """Return (h, l, size): (b - a) x (c - a) on the axes x and y as a double-double, and the size of its products."""
+    uh, ul = two_diff(vertices[b, x], vertices[a, x])
+    vh, vl = two_diff(vertices[c, y], vertices[a, y])
+    sh, sl = two_diff(vertices[b, y], vertices[a, y])
+    th, tl = two_diff(vertices[c, x], vertices[a, x])
+    return cross_of(uh, ul, vh, vl, sh, sl, th, tl)
 
 
 @inline

@@ -261,13 +261,14 @@ def _twice_area_from(
 @kernel
 def sum_areas(
     subjects: RingArrays, subject_items: IntArray, clips: RingArrays, clip_items: IntArray, sources: Int32Array,
-    offsets: IntArray, groups: IntArray, stop: FlagArray, areas: FloatArray,
+    offsets: IntArray, groups: IntArray, stop: FlagArray, areas: FloatArray, sums: FloatArray,
 ) -> int:  # fmt: skip
     """Fill ``areas``, (n,) float64, with the double nearest to the area of each group of rings, NaN if not proven.
 
-    Returns the number of NaN. subject_items, clip_items: offsets of polygons into the rings of subjects and clips, a
-    pair of polygons for each area, or one for all. sources, offsets: source of each vertex (`overlay_pairs`), offsets
-    of rings. groups: (n + 1,) int64 offsets of groups into the rings.
+    Returns the number of NaN. sums: (n, 3), twice the areas as double-doubles and their bounds, or (0, 3).
+    subject_items, clip_items: offsets of polygons into the rings of subjects and clips, a pair of polygons for each
+    area, or one for all. sources, offsets: source of each vertex (`overlay_pairs`), offsets of rings. groups: (n + 1,)
+    int64 offsets of groups into the rings.
     """
     n_uncertified = 0
     last_rings = workspace(2)
@@ -290,4 +291,6 @@ def sum_areas(
         is_certified = n_points == 0 or is_correctly_rounded(total_h, total_l, bound + 4.0 * U2 * abs(total_h))
         areas[k] = (total_h + total_l) / 2.0 + 0.0 if is_certified else float("nan")
         n_uncertified += not is_certified
+        if k < sums.shape[0]:
+            sums[k, 0], sums[k, 1], sums[k, 2] = total_h, total_l, bound
     return n_uncertified
