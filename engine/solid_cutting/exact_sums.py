@@ -141,6 +141,15 @@ def _arctangent(inverse: int, one: int) -> int:
 def mesh_of_half_spaces(rows: Sequence[Sequence[Number]], budget: Budget) -> ExactMesh | None:
     """Return the boundary of an intersection of half-spaces, None if it has no interior. rows: normal and offset, exact
     numbers. Raises: UnsupportedSolidError if it is unbounded."""
+    made = faces_of_half_spaces(rows, budget)
+    return None if made is None else made[0]._replace(faces=[face for some in made[1] for face in some])
+
+
+def faces_of_half_spaces(
+    rows: Sequence[Sequence[Number]], budget: Budget
+) -> tuple[ExactMesh, list[list[tuple[int, ...]]]] | None:
+    """Return the corners of an intersection of half-spaces, and of each face the triangles around its first corner, as
+    `mesh_of_half_spaces` does."""
     integers = [scaled_integers(row) for row in rows]
     corners = corners_of_half_spaces(integers, budget)
     if not corners.is_bounded:
@@ -149,17 +158,17 @@ def mesh_of_half_spaces(rows: Sequence[Sequence[Number]], budget: Budget) -> Exa
     size = len(integers[0]) - 1
     if len(corners.points) <= size:
         return None
-    points, w, _ = exact_mesh(corners.points, [])
+    mesh = exact_mesh(corners.points, [])
     faces: dict[frozenset[int], list[tuple[int, ...]]] = {}
     for *normal, offset in integers:
         budget.check()
-        values = [dot(tuple(normal), point) + offset * w for point in points]
+        values = [dot(tuple(normal), point) + offset * mesh.w for point in mesh.points]
         on = [k for k, value in enumerate(values) if value == 0]
-        if len(on) == len(points):
+        if len(on) == len(mesh.points):
             return None
         if len(on) >= size and frozenset(on) not in faces:
-            faces[frozenset(on)] = _around(points, on, normal)
-    return ExactMesh(points, w, [face for some in faces.values() for face in some])
+            faces[frozenset(on)] = _around(mesh.points, on, normal)
+    return mesh, list(faces.values())
 
 
 def _around(points: list[Point], on: list[int], normal: list[int]) -> list[tuple[int, ...]]:

@@ -18,6 +18,7 @@ from engine.polygon_overlay.pair_arrays import PolygonSelection, arrays_of
 from engine.predicates.rational import cross, determinant, dot, nearest_float, scaled_integers
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options, run_chunks
+from engine.solid_cutting.convex_bodies import of_bodies
 from engine.solid_cutting.convex_rings import MOST_CORNERS, overlap_rings
 from engine.solid_cutting.cut import cut_by_planes
 from engine.solid_cutting.cut_measures import MOST_BITS, volume_between, volume_in_fractions, volume_of_cut
@@ -167,10 +168,10 @@ def _of_pairs(first: Any, second: Any, poses: tuple[Any, Any], options: tuple[An
             values, n_exact = _of_arrays(first, second, is_ratio, workers, budget)
         else:
             pairs = list(zip(first, second, strict=True)) if are_many and _same(first, second) else [(first, second)]
-            values, n_exact = np.empty(len(pairs)), 0
-            for number, (one, other) in enumerate(pairs):
+            values, n_exact = of_bodies(pairs, poses, is_ratio, workers, budget), 0
+            for number in np.flatnonzero(np.isnan(values)).tolist():
                 budget.check()
-                values[number], is_exact = _of_pair(one, other, poses, is_ratio, budget)
+                values[number], is_exact = _of_pair(*pairs[number], poses, is_ratio, budget)
                 n_exact += is_exact
     n = len(values)
     if progress is not None:
