@@ -15,7 +15,8 @@ from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import cap_of, seen
 from engine.solid_cutting.cut_measures import area_of_cut, volume_of_cut
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles, plane_of
-from engine.solid_cutting.section import as_polyhedron, outward
+from engine.solid_cutting.section import as_polyhedron
+from engine.solid_cutting.shells import outward
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
 from engine.solids.checks import shown

@@ -58,12 +58,15 @@ def split_faces(triangles: IntArray, sides: Int8Array, whole: IntArray, mixed: I
 
 @kernel
 def cut_edges(
-    vertices: FloatArray, edges: IntArray, row: FloatArray, high: FloatArray, low: FloatArray, is_nearest: BoolArray
-) -> None:
-    """Fill high and low (n, 3) with the points where edges (n, 2) of vertices cross the plane `row` (4,), and
-    is_nearest (n,) with whether all of high is certain to be the nearest double, and low the rest, to 2^-84."""
+    vertices: FloatArray, edges: IntArray, rows: FloatArray, which: IntArray, high: FloatArray, low: FloatArray,
+    is_nearest: BoolArray,
+) -> None:  # fmt: skip
+    """Fill high and low (n, 3) with the points where edges (n, 2) of vertices cross their planes, which (n,) of `rows`
+    (k, 4), and is_nearest (n,) with whether all of high is certain to be the nearest double, and low the rest, to
+    2^-84."""
     for item in range(edges.shape[0]):
         p, q = edges[item, 0], edges[item, 1]
+        row = rows[which[item]]
         ph, pl, p_bound = dd_value(row[0], row[1], row[2], row[3], as_point3(vertices, p))
         qh, ql, q_bound = dd_value(row[0], row[1], row[2], row[3], as_point3(vertices, q))
         if ph < 0.0:

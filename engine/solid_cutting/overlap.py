@@ -24,7 +24,7 @@ from engine.solid_cutting.cut import cut_by_planes
 from engine.solid_cutting.cut_measures import MOST_BITS, volume_between, volume_in_fractions, volume_of_cut
 from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
 from engine.solid_cutting.plane_cut import Points, plane_of
-from engine.solid_cutting.section import outward
+from engine.solid_cutting.shells import outward
 from engine.solid_cutting.simple_measures import product, sides_of
 from engine.solids.accepted import PoseLike, SolidLike
 from engine.solids.base import Solid, named

@@ -72,7 +72,7 @@ class Points:
         )
         self._edges = np.zeros((0, 2), np.int64)
         self._planes: list[Plane] = []
-        self._plane_of: list[int] = []
+        self._plane_of = np.zeros(0, np.int64)
         self._places: dict[int, Place] = {}
 
     def __len__(self) -> int:
@@ -129,26 +129,34 @@ class Points:
         """Return the exact side of one point."""
         return sign_of(value_at(plane, self.exact(number)))
 
-    def add_crossings(self, edges: IntArray, on_plane: IntArray, plane: Plane, budget: Budget) -> IntArray:
-        """Add the points where edges (k, 2) cross a plane, the first end inside; return their numbers: of points at one
-        place the first, one of those on the plane if it is there."""
+    def add(self, edges: IntArray, planes: list[Plane], which: IntArray, budget: Budget) -> None:
+        """Add the points where edges (k, 2) cross their planes, which (k,) of `planes`, the first end inside."""
         first, n = len(self), len(edges)
         high, low, is_nearest = np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, np.bool_)
-        self._planes.append(plane)
-        self._plane_of += [len(self._planes) - 1] * n
+        self._plane_of = np.concatenate([self._plane_of, which + len(self._planes)])
+        self._planes += planes
         self._edges = np.concatenate([self._edges, edges])
-        if plane.is_exact and self.is_in_range and (not n or edges.max() < self.n_given):
+        if self.is_in_range and (not n or edges.max() < self.n_given):
+            rows = read_only(np.stack([plane.row for plane in planes]))
             with np.errstate(all="ignore"):
-                entry_of(cut_edges)(self.vertices, read_only(edges), plane.row, high, low, is_nearest)
+                entry_of(cut_edges)(self.vertices, read_only(edges), rows, which, high, low, is_nearest)
+            if not all(plane.is_exact for plane in planes):
+                is_nearest &= np.array([plane.is_exact for plane in planes])[which]
         for k in np.flatnonzero(~is_nearest).tolist():
             budget.check()
             x, y, z, w = self.exact(first + k)
             for axis, value in enumerate((x, y, z)):
                 high[k, axis], low[k, axis] = nearest_pair(value, w)
         self.high, self.low = np.concatenate([self.high, high]), np.concatenate([self.low, low])
+
+    def add_crossings(self, edges: IntArray, on_plane: IntArray, plane: Plane, budget: Budget) -> IntArray:
+        """Add the points where edges (k, 2) cross a plane, the first end inside; return their numbers: of points at one
+        place the first, one of those on the plane if it is there."""
+        first, n = len(self), len(edges)
+        self.add(edges, [plane], np.zeros(n, np.int64), budget)
         numbers = np.arange(first, first + n)
         known = np.concatenate([on_plane, numbers])
-        same = first_equal(np.concatenate([self.at(on_plane)[0], high])) if n else None
+        same = first_equal(np.concatenate([self.at(on_plane)[0], self.high[first - self.n_given :]])) if n else None
         if same is not None:
             for k in (np.flatnonzero(same[-n:] != np.arange(len(known) - n, len(known)))).tolist():
                 budget.check()

@@ -12,11 +12,11 @@ from engine.errors import InvalidArrayError, InvalidInputError, UnsupportedSolid
 from engine.predicates.rational import cross, dot, minus, scaled_integers, squared_length
 from engine.running.budget import Budget, Cancel, current, polled, reading
 from engine.running.parallel import Progress, check_options
-from engine.solid_cutting.caps import Area, Seen, areas_of, rings_of, seen
+from engine.solid_cutting.caps import Area, Seen
 from engine.solid_cutting.cut_measures import area_of_section
 from engine.solid_cutting.exact_sums import nearest_root_over
-from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles, plane_of
-from engine.solid_cutting.shells import shells
+from engine.solid_cutting.plane_cut import Plane, plane_of
+from engine.solid_cutting.slices import slices_at
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid, named
 from engine.solids.checks import as_floats, as_vector, shown
@@ -28,8 +28,7 @@ from engine.solids.registry import kind_of
 from engine.solids.shapes import as_solid
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
-_ONE_BY_ONE: Final = 3
-"""Planes up to which each looks at all faces."""
+_NO_HEIGHTS: Final = np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -188,15 +187,10 @@ def section(
     check_options(workers, progress, report=report, measures=measures)
     with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
-        rows, axis = _rows_of(planes, normal, budget)
-        faces = outward(body, budget)
-        made = []
-        for plane, points, triangles in _reached(body, faces, rows, axis, budget):
-            view = seen(points, plane)
-            chain = cut_triangles(points, triangles, plane, budget).chain
-            made.append((view, plane, _checked(view, chain, budget)))
-            if progress is not None:
-                progress(1)
+        rows, axis, heights = _rows_of(planes, normal, budget)
+        made = slices_at(body, rows, axis, heights, budget)
+        for _ in made if progress is not None else ():
+            progress(1)  # type: ignore[misc]
         result = _sections(made, measures, budget)
     n = len(made)
     return (
@@ -220,23 +214,8 @@ def as_polyhedron(
     return solid, deadline
 
 
-def outward(solid: Polyhedron, budget: Budget) -> IntArray:
-    """Return the triangles of a polyhedron, counter-clockwise seen from outside, without those that name a vertex
-    twice; cached with it."""
-    looks = shells(solid, budget)
-
-    def build() -> IntArray:
-        faces = solid.triangles
-        if looks.common <= 0:
-            turned = looks.sides < 0 if looks.common == 0 else np.ones(len(faces), np.bool_)
-            faces = np.where(turned[:, None], faces[:, ::-1], faces)
-        return read_only(faces)
-
-    return solid.prepared("outward", build, budget.check)
-
-
-def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], FloatArray | None]:
-    """Return the planes of an argument, and the normal of heights."""
+def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], FloatArray | None, FloatArray]:
+    """Return the planes of an argument, and the normal of heights, and heights."""
     listed = [planes] if isinstance(planes, HalfSpace) else planes
     if isinstance(listed, (list, tuple)) and any(isinstance(each, Solid) for each in listed):
         for number, each in enumerate(listed):
@@ -246,7 +225,7 @@ def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], Flo
                 )
         if normal is not None:
             raise InvalidInputError("normal goes with heights; leave it out", ("normal",))
-        return [plane_of(each.row.tolist()) for each in listed], None
+        return [plane_of(each.row.tolist()) for each in listed], None, _NO_HEIGHTS
     try:
         depth = np.ndim(planes)
     except (ValueError, TypeError):
@@ -260,7 +239,7 @@ def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], Flo
         for height in heights.tolist():
             budget.check()
             rows.append(plane_of([*axis.tolist(), -height]))
-        return rows, axis
+        return rows, read_only(axis), heights
     values = as_floats(planes, 2, ("planes",)) if depth == 2 else None
     if values is None or values.shape[1] != 3 or len(values) not in (2, 3):
         raise InvalidArrayError(
@@ -276,56 +255,7 @@ def _rows_of(planes: Any, normal: Any, budget: Budget) -> tuple[list[Plane], Flo
     if not any(across):
         what = "the normal is zero" if len(values) == 2 else "the three points are on one line"
         raise ZeroNormalError(f"{what}; give another plane", ("planes",))
-    return [plane_of([*(x * w for x in across), -dot(across, tuple(p))])], None
-
-
-def _reached(body: Polyhedron, faces: IntArray, rows: list[Plane], axis: FloatArray | None, budget: Budget) -> Any:
-    """Yield each plane with the points and triangles that it may cross."""
-    vertices = body.vertices
-    if axis is None or len(rows) <= _ONE_BY_ONE:
-        for plane in rows:
-            yield plane, Points(vertices), faces
-        return
-    with np.errstate(all="ignore"):
-        terms = vertices * axis
-        values, bound = terms.sum(axis=1), 2.0**-50 * np.abs(terms).sum(axis=1).max() + 2.0**-1000
-        heights = np.array(
-            [-float(plane.row[3]) * (np.abs(axis).max() / np.abs(plane.row[:3]).max()) for plane in rows]
-        )
-        margin = bound + 2.0**-50 * np.abs(heights).max()
-        corners = values[faces]
-        low, high = corners.min(axis=1) - margin, corners.max(axis=1) + margin
-    order = np.argsort(heights, kind="stable")
-    if not (np.isfinite(low).all() and np.isfinite(high).all() and np.isfinite(heights).all()):
-        for plane in rows:
-            yield plane, Points(vertices), faces
-        return
-    budget.check()
-    first, last = np.searchsorted(heights[order], low, "left"), np.searchsorted(heights[order], high, "right")
-    counts = last - first
-    budget.take(16 * int(counts.sum()))
-    of = np.repeat(np.arange(len(faces)), counts)
-    rank = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(first, counts)
-    by_rank = np.argsort(rank, kind="stable")
-    stops = np.searchsorted(rank[by_rank], np.arange(len(rows) + 1))
-    place = np.empty(len(rows), np.int64)
-    place[order] = np.arange(len(rows))
-    for number, plane in enumerate(rows):
-        budget.check()
-        some = faces[of[by_rank[stops[place[number]] : stops[place[number] + 1]]]]
-        used, local = np.unique(some, return_inverse=True)
-        if not len(used):
-            used = np.zeros(1, np.int64)
-        yield plane, Points(vertices[used]), local.reshape(-1, 3)
-
-
-def _checked(view: Seen, chain: IntArray, budget: Budget) -> list[Area]:
-    """Return the polygons of a chain; where one has holes, triangles prove which."""
-    rings = rings_of(view, chain, budget)
-    areas, _ = areas_of(view, rings, budget)
-    if len(areas) > 1 and any(area.holes for area in areas):
-        areas, _ = areas_of(view, rings, budget, True)
-    return areas
+    return [plane_of([*(x * w for x in across), -dot(across, tuple(p))])], None, _NO_HEIGHTS
 
 
 def _areas_of(made: Any, budget: Budget) -> FloatArray:

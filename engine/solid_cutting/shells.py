@@ -40,12 +40,14 @@ class Shells(NamedTuple):
     """Which way the triangles of a polyhedron look.
 
     sides (m,): 1 for a triangle that is counter-clockwise seen from outside the solid, -1 for one that is clockwise;
-    empty where all are as `common` says. common: 1, -1; 0 where they differ. n: number of shells.
+    empty where all are as `common` says. common: 1, -1; 0 where they differ. n: number of shells. touches: whether
+    faces have points in common besides their corners and edges.
     """
 
     sides: Int8Array
     common: int
     n: int
+    touches: bool
 
 
 def shells(solid: Polyhedron, budget: Budget) -> Shells:
@@ -54,11 +56,26 @@ def shells(solid: Polyhedron, budget: Budget) -> Shells:
     return solid.prepared("shells", lambda: _shells_of(solid, budget), budget.check)
 
 
+def outward(solid: Polyhedron, budget: Budget) -> IntArray:
+    """Return the triangles of a polyhedron, counter-clockwise seen from outside, without those that name a vertex
+    twice; cached with it."""
+    looks = shells(solid, budget)
+
+    def build() -> IntArray:
+        faces = solid.triangles
+        if looks.common <= 0:
+            turned = looks.sides < 0 if looks.common == 0 else np.ones(len(faces), np.bool_)
+            faces = np.where(turned[:, None], faces[:, ::-1], faces)
+        return read_only(faces)
+
+    return solid.prepared("outward", build, budget.check)
+
+
 def _shells_of(solid: Polyhedron, budget: Budget) -> Shells:
     none = read_only(np.zeros(0, np.int8))
     certificate = convexity(solid)
     if certificate is not None:
-        return Shells(none, 1 if certificate.is_outward else -1, 1)
+        return Shells(none, 1 if certificate.is_outward else -1, 1, False)
     points, faces = solid.vertices, solid.triangles
     budget.check()
     edges = edges_of(faces)
@@ -83,8 +100,8 @@ def _shells_of(solid: Polyhedron, budget: Budget) -> Shells:
         volume = sign_of_volume(points, faces[body.part], budget)
         sides[body.part] = 1 if volume == 0 or (volume > 0) == (depth % 2 == 0) else -1
     if (sides == sides[0]).all():
-        return Shells(none, int(sides[0]), len(bodies))
-    return Shells(read_only(sides), 0, len(bodies))
+        return Shells(none, int(sides[0]), len(bodies), len(contacts) > 0)
+    return Shells(read_only(sides), 0, len(bodies), len(contacts) > 0)
 
 
 def _numbers_of(parts: list[IntArray], n: int) -> IntArray:
