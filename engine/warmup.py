@@ -317,6 +317,7 @@ def _warm_cutting() -> None:
             made = cut(solid, keep, measures=True)
             made.solid  # noqa: B018
     overlap_volume(cube, Aabb([0.2] * 3, [0.8] * 3))
+    overlap_volume(notched, Aabb([0.2] * 3, [0.8] * 3))
     squares = np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]])
     iou(squares, squares + 1.0)
 

@@ -167,13 +167,6 @@ class OverlayBatch(Ragged):
         sums[is_open[: len(sums)]] = np.nan
         return areas
 
-    def twice_areas(self) -> FloatArray:
-        """Return twice the exact areas, (n_pairs, 3): high part, low part, error bound; NaN where floats prove
-        nothing."""
-        sums = np.empty((len(self), 3))
-        self._sum_areas(sums)
-        return sums
-
     @property
     def n_pieces_exact(self) -> IntArray:
         """How many pieces the exact result of each pair has, before rounding, (n_pairs,)."""
@@ -193,6 +186,14 @@ class OverlayBatch(Ragged):
     def overlays(self) -> tuple[Overlay | None, ...]:
         """One `Overlay` for each pair, made now; None where its status is not 0."""
         return tuple(self)
+
+
+def twice_areas(made: OverlayBatch) -> FloatArray:
+    """Return twice the exact areas of all pairs, (n_pairs, 3): high part, low part, error bound; NaN where floats prove
+    nothing."""
+    sums = np.empty((len(made), 3))
+    made._sum_areas(sums)
+    return sums
 
 
 def _polygons_in(solids: Any, name: str) -> Sequence[Solid]:

@@ -41,7 +41,7 @@ class Seen(NamedTuple):
 
     def doubles(self, ring: Sequence[int]) -> FloatArray:
         """Return the rounded positions (n, 2) of points."""
-        return self.points.at(np.array(ring, np.int64))[0][:, list(self.axes)]
+        return self.points.rounded(np.array(ring, np.int64))[:, list(self.axes)]
 
     def exact(self, number: int) -> tuple[Fraction, Fraction]:
         """Return the exact position of a point."""
@@ -331,7 +331,7 @@ def triangles_of(view: Seen, area: Area, is_exact: bool, budget: Budget) -> IntA
 def _failed(view: Seen, area: Area, is_exact: bool) -> Exception:
     if not is_exact:
         return _TurnedError()
-    at = view.points.at(np.array(area.shell[:1]))[0][0].tolist()
+    at = view.points.rounded(area.shell[:1])[0].tolist()
     return TooComplexError(f"the section around {at} is not a polygon whose rings only touch; move the plane a little")
 
 

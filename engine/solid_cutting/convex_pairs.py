@@ -41,10 +41,10 @@ from engine.predicates.error_free import (
     dd_scale,
     dd_sub,
     fast_two_sum,
-    is_correctly_rounded,
     two_sum,
     workspace,
 )
+from engine.solid_cutting.sums import certified
 from engine.types import FlagArray, FloatArray, IntArray
 
 PLACED: Final = 6
@@ -328,24 +328,6 @@ def _has_axis(
     return False
 
 
-@inline
-def _ratio_or_volume(sums: FloatArray, is_ratio: bool) -> float:
-    """Return the nearest double of the volume, or ratio, of sums (6,); NaN where it is not certain."""
-    h, low, bound = sums[0], sums[1], sums[2]
-    if is_ratio:
-        over_h, over_l = dd_sub(sums[3], sums[4], h, low)
-        over_bound = bound + sums[5] + 4.0 * U2 * abs(over_h)
-        if not over_h > 1024.0 * over_bound:
-            return float("nan")
-    else:
-        over_h, over_l, over_bound = 6.0, 0.0, 0.0
-    h, low = dd_div(h, low, over_h, over_l)
-    bound = 1.01 * (bound + abs(h) * over_bound) / over_h + 20.0 * U2 * abs(h)
-    if h > 2.0**-900 and is_correctly_rounded(h, low, bound):
-        return min(h, 1.0) if is_ratio else h
-    return float("nan")
-
-
 @called
 def _value_of_pair(
     corners: IntArray, rings: IntArray, bodies: IntArray, a: int, b: int, placed: FloatArray, planes: FloatArray,
@@ -389,7 +371,7 @@ def _value_of_pair(
         ):
             return 0.0
         return float("nan")
-    return _ratio_or_volume(sums, is_ratio)
+    return certified(sums, 6.0, is_ratio)
 
 
 @kernel

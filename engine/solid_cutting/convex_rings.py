@@ -29,12 +29,11 @@ from engine.predicates.error_free import (
     dd_div,
     dd_mul,
     dd_sub,
-    is_correctly_rounded,
     two_diff,
     workspace,
 )
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact
-from engine.solid_cutting.sums import cross_of
+from engine.solid_cutting.sums import certified, cross_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, Point2
 
 MOST_CORNERS: Final = 16
@@ -111,6 +110,35 @@ def _crossing(
     return h, low, bound if bound < _CLEAR else 1.0
 
 
+@inline
+def _part_within(
+    x: FloatArray, y: FloatArray, i: int, k: int, n: int, ox: FloatArray, oy: FloatArray, m: int, sides: FloatArray,
+    values: FloatArray, limits: tuple[float, float, float],
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return (h, l, bound): s - t of the edge from corner i to k. limits: t at least and s at most, within their
+    errors, and slack as for `_add_edges`."""
+    low, high, slack = limits
+    th, tl, t_error, sh, sl, s_error = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
+    for a in range(m):
+        p = sides[a * n + i]
+        if p * sides[a * n + k] < 0.0:
+            over = 1.0 / (values[a * n + i] - values[a * n + k])
+            t, off = values[a * n + i] * over, slack * abs(over) + 2.0**-50
+            if (p > 0.0 and t - off > high) or (p < 0.0 and t + off < low):
+                continue  # another line cuts more
+            h, rest, bound = _crossing(x, y, i, k, ox, oy, a, a + 1 if a + 1 < m else 0)
+            if p > 0.0:
+                s_error = max(s_error, bound)
+                if (h - sh) + (rest - sl) < 0.0:
+                    sh, sl = h, rest
+            else:
+                t_error = max(t_error, bound)
+                if (h - th) + (rest - tl) > 0.0:
+                    th, tl = h, rest
+    sh, sl = dd_sub(sh, sl, th, tl)
+    return sh, sl, t_error + s_error + 20.0 * U2
+
+
 @called
 def _add_edges(
     x: FloatArray, y: FloatArray, n: int, ox: FloatArray, oy: FloatArray, m: int, sides: FloatArray,
@@ -148,26 +176,9 @@ def _add_edges(
         if is_out or low > high:
             continue
         if n_cuts:
-            th, tl, t_error, sh, sl, s_error = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
-            for a in range(m):
-                p = sides[a * n + i]
-                if p * sides[a * n + k] < 0.0:
-                    over = 1.0 / (values[a * n + i] - values[a * n + k])
-                    t, off = values[a * n + i] * over, slack * abs(over) + 2.0**-50
-                    if (p > 0.0 and t - off > high) or (p < 0.0 and t + off < low):
-                        continue  # another line cuts more
-                    h, rest, bound = _crossing(x, y, i, k, ox, oy, a, a + 1 if a + 1 < m else 0)
-                    if p > 0.0:
-                        s_error = max(s_error, bound)
-                        if (h - sh) + (rest - sl) < 0.0:
-                            sh, sl = h, rest
-                    else:
-                        t_error = max(t_error, bound)
-                        if (h - th) + (rest - tl) > 0.0:
-                            th, tl = h, rest
-            error += abs(ph) * (t_error + s_error + 20.0 * U2)
-            sh, sl = dd_sub(sh, sl, th, tl)
-            ph, pl = dd_mul(sh, sl, ph, pl) if sh > 0.0 else (0.0, 0.0)
+            wh, wl, off = _part_within(x, y, i, k, n, ox, oy, m, sides, values, (low, high, slack))
+            error += abs(ph) * off
+            ph, pl = dd_mul(wh, wl, ph, pl) if wh > 0.0 else (0.0, 0.0)
         sums[0], sums[1] = dd_add(sums[0], sums[1], ph, pl)
         sums[2] += error
 
@@ -210,15 +221,7 @@ def overlap_rings(first: FloatArray, second: FloatArray, is_ratio: bool, values:
             origin, slack = (x[0], y[0]), 2.0**-47 * span * span + _TINY
             _add_edges(x, y, n, ox, oy, m, sides, products, origin, slack, True, sums)
             _add_edges(ox, oy, m, x, y, n, other_sides, other_products, origin, slack, False, sums)
-            h, rest, bound = sums[0], sums[1], sums[2]
-            if is_ratio:
-                over_h, over_l = dd_sub(sums[3], sums[4], h, rest)
-                over_bound = bound + sums[5] + 4.0 * U2 * abs(over_h)
-                h, rest = dd_div(h, rest, over_h, over_l)
-                bound = 1.01 * (bound + over_bound) / over_h + 17.0 * U2
-                bound = bound if bound < _CLEAR else 1.0
-            if is_correctly_rounded(h, rest, 1.01 * bound + 2.0 * U2 * abs(h)) and h > 2.0**-900:
-                result = min(h, 1.0) if is_ratio else 0.5 * h
+            result = certified(sums, 2.0, is_ratio)
         n_open += result != result
         values[item] = result
     return n_open

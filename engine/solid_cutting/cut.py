@@ -7,13 +7,15 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from engine.compiling.jit import entry_of
 from engine.errors import EmptyGeometryError, InvalidOperationError, WrongDimensionError
-from engine.polygon_clipping.planes import orientations, plan_of
-from engine.predicates.rational import cross, minus, scaled_integers
+from engine.polygon_clipping.planes import plan_of
+from engine.predicates.rational import cross, largest_axis, minus, scaled_integers, sign_of
 from engine.running.budget import Budget, Cancel, current, reading
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import cap_of, seen
 from engine.solid_cutting.cut_measures import area_of_cut, volume_of_cut
+from engine.solid_cutting.face_cuts import find_shapes
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles, plane_of
 from engine.solid_cutting.section import as_polyhedron
 from engine.solid_cutting.shells import outward
@@ -25,7 +27,7 @@ from engine.solids.mesh import Polyhedron
 from engine.solids.primitives import HalfSpace
 from engine.solids.registry import refused, row_of
 from engine.solids.shapes import as_solid
-from engine.types import Accuracy, FloatArray, IntArray, read_only
+from engine.types import UNDECIDED, Accuracy, FloatArray, IntArray, read_only
 
 _KEEPS: Final = ("inside", "outside", "both")
 _NONE: Final = np.zeros((0, 3), np.int64)
@@ -287,46 +289,25 @@ def _misshapen(solid: Polyhedron, left: Left, rows: IntArray, budget: Budget) ->
     """Return which of some triangles are flat after rounding, and which are turned over: seen along the axis on which
     the exact normal, of the cap's plane or of the face that each is a part of, is largest."""
     points, triangles, origins, _, planes = left
-    corners = points.at(triangles[rows].ravel())[0].reshape(-1, 3, 3)
-    given = np.flatnonzero(origins[rows] >= 0)
-    normals = np.zeros((len(rows), 3))
-    faces = outward(solid, budget)[origins[rows[given]]]
+    faces, shapes = outward(solid, budget), np.empty(len(rows), np.int8)
+    normals = read_only(np.stack([plane.row for plane in planes]))
     with np.errstate(all="ignore"):
-        normals[given] = _normals(solid.vertices[faces], budget)
-        for plane in np.unique(origins[rows][origins[rows] < 0]).tolist():
-            normals[origins[rows] == plane] = -planes[-1 - plane].row[:3]
-    axes = np.argmax(np.abs(normals), axis=1)
-    ways = np.take_along_axis(normals, axes[:, None], axis=1)[:, 0]
-    places = np.arange(len(rows))
-    flat = np.stack([corners[places, :, (axes + 1) % 3], corners[places, :, (axes + 2) % 3]], axis=2)
-    turns = _turns(flat) * np.sign(ways)
-    return read_only(rows[turns == 0]), read_only(rows[turns < 0])
-
-
-def _normals(corners: FloatArray, budget: Budget) -> FloatArray:
-    """Return normals of triangles (n, 3, 3), exact in the sign of their largest component, (0, 0, 0) for flat ones."""
-    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normals = np.cross(u, v)
-    bound = 2.0**-48 * np.abs(u).max(axis=1, initial=0.0) * np.abs(v).max(axis=1, initial=0.0) + 1e-300
-    for row in np.flatnonzero(~(np.abs(normals).max(axis=1, initial=0.0) > bound)).tolist():
+        corners = points.rounded(triangles[rows].ravel()).reshape(-1, 3, 3)
+        entry_of(find_shapes)(solid.vertices, faces, corners, origins[rows], normals, shapes)
+    for number in np.flatnonzero(shapes == UNDECIDED).tolist():
         budget.check()
-        numbers = scaled_integers(corners[row].ravel().tolist())
-        p, q, r = numbers[:3], numbers[3:6], numbers[6:]
-        exact = cross(minus(q, p), minus(r, p))
-        shift = max(x.bit_length() for x in exact)
-        normals[row] = [x / (1 << shift) for x in exact]
-    return normals
+        origin = int(origins[rows[number]])
+        normal: Any = [-x for x in normals[-1 - origin, :3].tolist()]
+        if origin >= 0:
+            normal = _normal(solid.vertices[faces[origin]])
+        axis = largest_axis(tuple(normal))
+        turn = _normal(corners[number])[axis] if normal[axis] else 0
+        shapes[number] = sign_of(turn) * sign_of(normal[axis])
+    return read_only(rows[shapes == 0]), read_only(rows[shapes < 0])
 
 
-def _turns(flat: FloatArray) -> Any:
-    """Return the exact signs of the turns of triangles of the plane (n, 3, 2)."""
-    u, v = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    with np.errstate(all="ignore"):
-        left, right = u[:, 0] * v[:, 1], u[:, 1] * v[:, 0]
-        turns = np.sign(left - right)
-        is_sure = np.abs(left - right) > 2.0**-50 * (np.abs(left) + np.abs(right)) + 2.0**-1000
-    some = np.flatnonzero(~is_sure)
-    up = np.array([0.0, 0.0, 1.0])
-    a, b, c = (np.concatenate([flat[some, k], np.zeros((len(some), 1))], axis=1) for k in range(3))
-    turns[some] = orientations(a, b, c, a + up)
-    return turns
+def _normal(corners: FloatArray) -> tuple[int, ...]:
+    """Return the exact normal of a triangle (3, 3), times a positive factor."""
+    numbers = scaled_integers(corners.ravel().tolist())
+    p, q, r = numbers[:3], numbers[3:6], numbers[6:]
+    return cross(minus(q, p), minus(r, p))

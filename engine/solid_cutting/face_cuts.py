@@ -14,7 +14,7 @@ from engine.compiling.jit import kernel
 from engine.predicates.cut_point import POINT_BOUND, TINY, point_along
 from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_sub, fast_two_sum, is_correctly_rounded
 from engine.predicates.side import dd_value, side_of_plane, side_of_plane_filter
-from engine.predicates.vectors import as_point3
+from engine.predicates.vectors import as_point3, corners_of, minus
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, Int8Array, IntArray
 
 _POLL = 0x3FFF
@@ -108,3 +108,30 @@ def find_turned(
         gap, _ = dd_sub(ph, pl, qh, ql)
         bound = 1.01 * off * (abs(uh) + abs(vh) + abs(sh) + abs(th) + off) + 2.0**-98 * (abs(ph) + abs(qh)) + TINY
         is_open[item] = not gap > bound
+
+
+@kernel
+def find_shapes(
+    vertices: FloatArray, faces: IntArray, corners: FloatArray, origins: IntArray, rows: FloatArray, shapes: Int8Array
+) -> None:
+    """Fill shapes (n,) with 1 for rounded triangles (n, 3, 3) that look as the faces that they are parts of, or against
+    the plane -1 - origin of `rows`, seen along the axis on which that normal is largest; -1 for the others, UNDECIDED
+    where rounding may have changed a sign. Products of differences are off by 4 u of the factors' sizes, cancelled or
+    not."""
+    for item in range(corners.shape[0]):
+        origin, sizes = origins[item], 0.0
+        n = (-rows[-1 - origin, 0], -rows[-1 - origin, 1], -rows[-1 - origin, 2]) if origin < 0 else (0.0, 0.0, 0.0)
+        if origin >= 0:
+            a, b, c = corners_of(vertices, faces, origin)
+            u, v = minus(b, a), minus(c, a)
+            n = (u.y * v.z - u.z * v.y, u.z * v.x - u.x * v.z, u.x * v.y - u.y * v.x)
+            sizes = max(abs(u.x), abs(u.y), abs(u.z)) * max(abs(v.x), abs(v.y), abs(v.z))
+        axis = 0
+        for k in range(1, 3):
+            axis = k if abs(n[k]) > abs(n[axis]) else axis
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        left = (corners[item, 1, i] - corners[item, 0, i]) * (corners[item, 2, j] - corners[item, 0, j])
+        right = (corners[item, 1, j] - corners[item, 0, j]) * (corners[item, 2, i] - corners[item, 0, i])
+        turn = left - right if n[axis] > 0.0 else right - left
+        is_sure = abs(n[axis]) > 2.0**-48 * sizes + TINY and abs(turn) > 2.0**-50 * (abs(left) + abs(right)) + TINY
+        shapes[item] = UNDECIDED if not is_sure else 1 if turn > 0.0 else -1

@@ -70,7 +70,7 @@ class Points:
         self.is_in_range = (
             bool(((sizes == 0.0) | (sizes > 2.0**-_MOST_EXPONENT)).all()) and self.size < 2.0**_MOST_EXPONENT
         )
-        self._edges = np.zeros((0, 2), np.int64)
+        self._edges, self._rounded = np.zeros((0, 2), np.int64), self.vertices
         self._planes: list[Plane] = []
         self._plane_of = np.zeros(0, np.int64)
         self._places: dict[int, Place] = {}
@@ -78,17 +78,17 @@ class Points:
     def __len__(self) -> int:
         return self.n_given + len(self.high)
 
+    def rounded(self, numbers: IntArray | list[int]) -> FloatArray:
+        """Return the nearest doubles (n, 3) of points."""
+        if len(self._rounded) != len(self):
+            self._rounded = np.concatenate([self.vertices, self.high])
+        return self._rounded[numbers]
+
     def at(self, numbers: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the nearest doubles (n, 3) of points, and the rest."""
-        is_new = numbers >= self.n_given
-        if not is_new.any():
-            return self.vertices[numbers], np.zeros((len(numbers), 3))
-        if is_new.all():
-            return self.high[numbers - self.n_given], self.low[numbers - self.n_given]
-        high, low = self.vertices[np.where(is_new, 0, numbers)], np.zeros((len(numbers), 3))
-        some = numbers[is_new] - self.n_given
-        high[is_new], low[is_new] = self.high[some], self.low[some]
-        return high, low
+        low, is_new = np.zeros((len(numbers), 3)), numbers >= self.n_given
+        low[is_new] = self.low[numbers[is_new] - self.n_given]
+        return self.rounded(numbers), low
 
     def exact(self, number: int) -> Place:
         """Return the exact place of a point, homogeneous with w > 0."""
@@ -156,7 +156,7 @@ class Points:
         self.add(edges, [plane], np.zeros(n, np.int64), budget)
         numbers = np.arange(first, first + n)
         known = np.concatenate([on_plane, numbers])
-        same = first_equal(np.concatenate([self.at(on_plane)[0], self.high[first - self.n_given :]])) if n else None
+        same = first_equal(np.concatenate([self.rounded(on_plane), self.high[first - self.n_given :]])) if n else None
         if same is not None:
             for k in (np.flatnonzero(same[-n:] != np.arange(len(known) - n, len(known)))).tolist():
                 budget.check()

@@ -267,10 +267,10 @@ def _sections(made: list[tuple[Seen, Plane, list[Area]]], measures: bool, budget
     rings, sizes, counts = [np.zeros((0, 3))], [], []
     for view, _, areas in made:
         budget.check()
-        areas.sort(key=lambda area: tuple(view.points.at(np.array(area.shell[:1]))[0][0].tolist()))
+        areas.sort(key=lambda area: tuple(view.points.rounded(area.shell[:1])[0].tolist()))
         for area in areas:
             sizes.append(1 + len(area.holes))
-            rings += [view.points.at(np.array(ring, np.int64))[0] for ring in (area.shell, *area.holes)]
+            rings += [view.points.rounded(np.array(ring, np.int64)) for ring in (area.shell, *area.holes)]
     counts = [len(areas) for _, _, areas in made]
     areas_made = _areas_of(made, budget) if measures else None
     offsets = summed([len(ring) for ring in rings[1:]])
@@ -282,7 +282,7 @@ def _flat(view: Seen, plane: Plane, number: int) -> tuple[float, float]:
     normal, offset = plane.integers[:3], plane.integers[3]
     place, i = view.points.exact(number), view.axes[0]
     if sum(x != 0 for x in normal) == 1:
-        return tuple((view.points.at(np.array([number]))[0][0, list(view.axes)]).tolist())
+        return tuple((view.points.rounded([number])[0, list(view.axes)]).tolist())
     square, w = squared_length(normal), place[3]
     rest = square - normal[i] ** 2
     first = square * place[i] + normal[i] * offset * w

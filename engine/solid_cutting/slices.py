@@ -68,11 +68,11 @@ def _swept(body: Polyhedron, planes: list[Plane], ranks: IntArray, is_on: BoolAr
         crosses = cuts[:, 1] >= 0
         numbers = cuts[:, 0].copy()
         numbers[crosses] = np.arange(len(points), len(points) + int(crosses.sum()))
-        points.add(cuts[crosses, :2], planes, cuts[crosses, 2], budget)
+        points.add(np.ascontiguousarray(cuts[crosses, :2]), planes, cuts[crosses, 2], budget)
         leftmost, signs = np.empty(n_rings, np.int64), np.empty(n_rings, np.int8)
         axes = seen(points, planes[0]).axes
         with np.errstate(all="ignore"):
-            entry_of(turn_rings)(points.at(numbers)[0], *axes, ends, leftmost, signs)
+            entry_of(turn_rings)(points.rounded(numbers), *axes, ends, leftmost, signs)
         is_open[of[signs == 0]] = True
         start = 0
         for number, stop, first, sign in zip(of.tolist(), ends.tolist(), leftmost.tolist(), signs.tolist()):

@@ -22,7 +22,18 @@ from math import sqrt
 from typing import Final
 
 from engine.compiling.jit import inline, kernel
-from engine.predicates.error_free import U2, dd_add, dd_mul, dd_sub, fast_two_sum, two_diff, two_prod, two_sum
+from engine.predicates.error_free import (
+    U2,
+    dd_add,
+    dd_div,
+    dd_mul,
+    dd_sub,
+    fast_two_sum,
+    is_correctly_rounded,
+    two_diff,
+    two_prod,
+    two_sum,
+)
 from engine.types import FlagArray, FloatArray, Int8Array, IntArray
 
 _TINY: Final = 2.0**-1000
@@ -88,6 +99,22 @@ def _add(sums: FloatArray, k: int, h: float, low: float, size: float) -> None:
     sums[k, 0], lost = two_sum(sums[k, 0], h)
     sums[k, 1] += lost + low
     sums[k, 2] += size
+
+
+@inline
+def certified(sums: FloatArray, whole: float, is_ratio: bool) -> float:
+    """Return the double nearest to sums[0:3], a double-double with a bound, over `whole`; or to its ratio to sums[3:6]
+    less it. NaN where that is not certain, or close to underflow."""
+    h, low, bound = sums[0], sums[1], sums[2]
+    over_h, over_l, over_bound = whole, 0.0, 0.0
+    if is_ratio:
+        over_h, over_l = dd_sub(sums[3], sums[4], h, low)
+        over_bound = bound + sums[5] + 4.0 * U2 * abs(over_h)
+    h, low = dd_div(h, low, over_h, over_l)
+    bound = 1.01 * (bound + abs(h) * over_bound) / over_h + 20.0 * U2 * abs(h)
+    if h > 2.0**-900 and over_h > 1024.0 * over_bound and is_correctly_rounded(h, low, bound):
+        return min(h, 1.0) if is_ratio else h
+    return float("nan")
 
 
 @kernel

@@ -98,23 +98,23 @@ def chain_faces(
                     is_up = ranks[triangles[face, k]] <= plane and ranks[triangles[face, (k + 1) % 3]] > plane
                     side = k if is_up else side
                 outside, inside = triangles[face, side], triangles[face, (side + 1) % 3]
-                if is_on[outside] and ranks[outside] == plane:
-                    if last != outside:
-                        if vertex_marks[outside] == plane + 1:
-                            is_open[plane] = is_open[plane] or outside != ring_first
-                            is_back = True
-                        else:
-                            vertex_marks[outside] = plane + 1
-                            is_open[plane] = is_open[plane] or is_back
-                            ring_first = outside if n_points == start else ring_first
-                            cuts[n_points, 0], cuts[n_points, 1], cuts[n_points, 2] = outside, -1, plane
-                            n_points += 1
-                    last = outside
-                else:
+                is_corner = is_on[outside] and ranks[outside] == plane
+                is_again = is_corner and vertex_marks[outside] == plane + 1
+                if is_again and last != outside:
+                    is_open[plane] = is_open[plane] or outside != ring_first
+                    is_back = True
+                elif not is_again:
                     is_open[plane] = is_open[plane] or is_back
-                    cuts[n_points, 0], cuts[n_points, 1], cuts[n_points, 2] = inside, outside, plane
+                    if is_corner:
+                        vertex_marks[outside] = plane + 1
+                        ring_first = outside if n_points == start else ring_first
+                    cuts[n_points, 0], cuts[n_points, 1] = (
+                        outside if is_corner else inside,
+                        -1 if is_corner else outside,
+                    )
+                    cuts[n_points, 2] = plane
                     n_points += 1
-                    last = -1
+                last = outside if is_corner else -1
                 face = across[face, side]
                 if face == first:
                     break

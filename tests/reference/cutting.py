@@ -63,3 +63,22 @@ def cut_volume(points: list[list[Fraction]], faces: Any, row: Sequence[float]) -
 
 def nearest(value: Fraction) -> float:
     return value.numerator / value.denominator + 0.0
+
+
+def ring_area(ring: list[list[Fraction]]) -> Fraction:
+    return sum((a[0] * b[1] - a[1] * b[0] for a, b in zip(ring, [*ring[1:], ring[0]])), Fraction(0)) / 2
+
+
+def convex_overlap(first: Any, second: Any) -> Fraction:
+    """Return the area that two convex rings have in common, by cutting one at the sides of the other."""
+    ring, other = (points if ring_area(points) >= 0 else points[::-1] for points in map(points_of, (first, second)))
+    for (ax, ay), (bx, by) in zip(other, [*other[1:], other[0]]):
+        sides = [(bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in ring]
+        left: list[list[Fraction]] = []
+        for p, q, v, w in zip(ring, [*ring[1:], *ring[:1]], sides, [*sides[1:], *sides[:1]]):
+            if v >= 0:
+                left.append(p)
+            if v * w < 0:
+                left.append([x + v / (v - w) * (y - x) for x, y in zip(p, q)])
+        ring = left
+    return ring_area(ring) if len(ring) > 2 else Fraction(0)
