@@ -297,16 +297,15 @@ def _misshapen(solid: Polyhedron, left: Left, rows: IntArray, budget: Budget) ->
     for number in np.flatnonzero(shapes == UNDECIDED).tolist():
         budget.check()
         origin = int(origins[rows[number]])
-        normal: Any = [-x for x in normals[-1 - origin, :3].tolist()]
-        if origin >= 0:
-            normal = _normal(solid.vertices[faces[origin]])
-        axis = largest_axis(tuple(normal))
+        is_cap = origin < 0
+        normal = tuple((-normals[-1 - origin, :3]).tolist()) if is_cap else _normal(solid.vertices[faces[origin]])
+        axis = largest_axis(normal)
         turn = _normal(corners[number])[axis] if normal[axis] else 0
         shapes[number] = sign_of(turn) * sign_of(normal[axis])
     return read_only(rows[shapes == 0]), read_only(rows[shapes < 0])
 
 
-def _normal(corners: FloatArray) -> tuple[int, ...]:
+def _normal(corners: FloatArray) -> Any:
     """Return the exact normal of a triangle (3, 3), times a positive factor."""
     numbers = scaled_integers(corners.ravel().tolist())
     p, q, r = numbers[:3], numbers[3:6], numbers[6:]
