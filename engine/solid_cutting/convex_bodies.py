@@ -1,4 +1,7 @@
-"""Convex bodies as flat arrays for `convex_pairs.py`: boxes, convex regions and convex polyhedra."""
+"""Convex bodies as flat arrays for `convex_pairs.py`: boxes, convex regions and convex polyhedra.
+
+Source: I. E. Sutherland, G. W. Hodgman, 1974; S. Gottschalk, 1996: see `convex_pairs.py`.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +47,7 @@ def of_bodies(
     """Return the common volumes, or ratios, of those pairs of solids that are convex bodies of space, proven to be the
     nearest doubles, NaN of others."""
     values = np.full(len(pairs), np.nan)
-    if len(pairs) == 1 and poses == (None, None) and all(isinstance(solid, Aabb) for solid in pairs[0]):
+    if len(pairs) == 1 and poses[0] is None and poses[1] is None and all(isinstance(solid, Aabb) for solid in pairs[0]):
         return values  # in closed form sooner
     unique = {id(solid): solid for pair in pairs for solid in pair}
     boxes = [solid for solid in unique.values() if isinstance(solid, Aabb) and solid.dimension == 3]

@@ -163,7 +163,7 @@ def _of_pairs(first: Any, second: Any, poses: tuple[Any, Any], options: tuple[An
     are_many = all(isinstance(each, (list, np.ndarray)) and not _is_rings(each) for each in (first, second))
     with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
-        if are_many and all(isinstance(each, np.ndarray) for each in (first, second)) and poses == (None, None):
+        if are_many and all(isinstance(each, np.ndarray) for each in (first, second)) and poses[0] is poses[1] is None:
             values, n_exact = overlaps_of_arrays(first, second, is_ratio, workers, budget)
         else:
             if are_many:

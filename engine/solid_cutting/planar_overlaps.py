@@ -1,4 +1,7 @@
-"""Areas that polygons of the plane have in common, and their ratios: one pair, or arrays of many."""
+"""Areas that polygons of the plane have in common, and their ratios: one pair, or arrays of many.
+
+Source: M. Cyrus, J. Beck, 1978; G. Green, 1828: see `convex_rings.py`.
+"""
 
 from __future__ import annotations
 

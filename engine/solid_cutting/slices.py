@@ -1,4 +1,7 @@
-"""The rings of sections by parallel planes: `sweep.py` finds them; a plane on which they touch is done by itself."""
+"""The rings of sections by parallel planes: `sweep.py` finds them; a plane on which they touch is done by itself.
+
+Source: S. McMains, C. Sequin, A coherent sweep plane slicer for layered manufacturing, 1999.
+"""
 
 from __future__ import annotations
 
