@@ -118,7 +118,7 @@ class GeometryRoute(APIRoute):
                 headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
                 call.coding = _coding_wanted(headers.get(b"accept-encoding", b""))
                 is_small = True
-                arguments = {**request.path_params, **_parse_query_params(request, query)}
+                arguments = {**request.path_params, **_parse_query_params(request, query, guard is None)}
                 job = _Job(endpoint, adapter, arguments, call, media_type is not None)
                 if media_type is not None:
                     kind = body.media_type_of(headers) if upload is not None else ""
@@ -343,9 +343,15 @@ def _is_known(tags: bytes, call: Call, method: str) -> bool:
     return method in ("GET", "HEAD") and call.headers.get("ETag", "") in named
 
 
-def _parse_query_params(request: Request, query: Query) -> dict[str, Any]:
-    """Return the declared query parameters; the endpoint has the defaults of absent ones."""
+def _parse_query_params(request: Request, query: Query, is_alone: bool) -> dict[str, Any]:
+    """Return the declared query parameters; the endpoint has the defaults of absent ones.
+
+    Others are refused, where no dependency of a host may read them (is_alone).
+    """
     values: dict[str, Any] = {}
+    if is_alone and (unknown := sorted(set(request.query_params) - set(query))):
+        known = f"there are {', '.join(map(repr, query))}" if query else "this call has none"
+        raise ServiceError("invalid_request", f"no query parameter {unknown[0]!r:.100}; {known}")
     for name, (adapter, is_required) in query.items():
         value = request.query_params.get(name)
         if value is None and not is_required:

@@ -95,3 +95,12 @@ async def test_broken_bodies_are_refused(client: httpx.AsyncClient, monkeypatch:
 async def test_many_broken_bodies_are_refused(client: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(arrays, "LEAST", 16)
     await break_bodies(client, 100_000)
+
+
+async def test_a_query_parameter_that_no_call_has_is_refused_by_name(client: httpx.AsyncClient) -> None:
+    body = {"solid": {"type": "aabb", "min": [0, 0], "max": [1, 1]}, "points": [[0.5, 0.5]]}
+    for path in ("/v1/contains", "/v1/solids"):
+        answer = await client.post(f"{path}?treads=2", json=body if path == "/v1/contains" else body["solid"])
+        assert "no query parameter 'treads'" in check_problem(answer, 422, "invalid_request")["detail"]
+    answer = await client.post("/v1/contains", json=body)
+    assert answer.json()["contained"] == [True]
