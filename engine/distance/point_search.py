@@ -1,8 +1,10 @@
 """The nearest triangle of a mesh to each of many points.
 
 1. Depth first through the tree, the nearest child first, boxes and triangles bounded eight at a time in float32
-   (`lanes/points.py`): the triangles that may be the nearest are the candidates.
-2. Each is bounded in float64 (`measure`). One that may contain the point is decided by exact signs: 0.
+   (`lanes/points.py`): the triangles that may be the nearest are the candidates. The next child of a node is
+   chosen when the one before is entered, so that no turn waits for it.
+2. Each is bounded in float64 (`measure`). One that may contain the point is decided by exact signs: 0. A single one
+   with the foot certainly within its face is left to step 3: off the plane, the distance from it is the answer.
 3. If all candidates left name one feature, and it certainly is the nearest of each (`_is_certain`), the distance is
    that of a vertex, a line or a plane: in double-doubles of the point's exact differences from the corners, scaled so
    that the longest is near 1 (`distance_to`).
@@ -28,12 +30,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.bounding.bvh import STACK
+from engine.bounding.bvh import STACK, WIDTH
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
-from engine.collision.meshes.near_triangles import relative_to
+from engine.collision.meshes.near_triangles import FACE, relative_to
 from engine.collision.meshes.placement import PoseArrays, as_placement, placed, rotate_back
 from engine.collision.meshes.triangle_triangle import Facet
-from engine.compiling.jit import called, inline, kernel
+from engine.compiling.jit import called, inline, kernel, merged
 from engine.distance.closed_forms import Wide, Wide3, less, less3
 from engine.distance.point_triangle import UNSURE, distance_to, feature_under, measure, seen_from
 from engine.distance.refined import (
@@ -46,17 +48,19 @@ from engine.distance.refined import (
     ends_of,
     named,
     retain_below,
+    scaled,
     write_offset_point,
 )  # fmt: skip
 from engine.distance.traversal import BEYOND, CLOSER, DONE, FULL, INTERRUPTED
 from engine.lanes.boxes import EMPTY
-from engine.lanes.lanes import lowest_bit
+from engine.lanes.lanes import aligned, lowest_bit
 from engine.lanes.points import (
-    BOUND_ROWS,
     MARGIN,
     SLACK,
     boxes_toward,
     boxes_within,
+    nearest_of,
+    new_masks,
     triangle_bounds,
     triangles_toward,
 )  # fmt: skip
@@ -65,27 +69,32 @@ from engine.predicates.error_free import is_correctly_rounded
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import FlagArray, Float32Array, FloatArray, Int32Array, IntArray, Point3
 
+LEVELS: Final = STACK // WIDTH
+ALL_LANES: Final = (1 << LANES) - 1
 _LARGEST: Final = 1e300
 _DISTANT: Final = 1024.0
 _ABOVE_ONE: Final = 1.0 + 2.0**-20
 
 
 class PointRoom(NamedTuple):
-    """Work space of one search at a time: candidates, of which the first and third columns are used; stack (STACK,) of
-    nodes with a lower bound on the distance of each, bounds (STACK,); work of `lanes/points.py`; origin (3,) zeros."""
+    """Work space of one search at a time: candidates, of which the first and third columns are used; nodes (LEVELS, 3)
+    on the way down, with the bits of their children that are left, and those of the nearest of these; work (LEVELS + 2,
+    8): their bounds, from row 2 on; masks: of `nearest_of`; origin (3,) zeros."""
 
     candidates: Candidates
-    stack: Int32Array
-    bounds: FloatArray
+    nodes: Int32Array
     work: Float32Array
+    masks: Float32Array
     origin: FloatArray
 
 
 def new_point_room(room: int) -> PointRoom:
     """Allocate work space for `room` candidates."""
-    candidates = Candidates(np.empty((room, 4), np.int64), np.empty(room))
-    work = np.empty((BOUND_ROWS, LANES), np.float32)
-    return PointRoom(candidates, np.empty(STACK, np.int32), np.empty(STACK), work, np.zeros(3))
+    candidates, work = (
+        Candidates(np.empty((room, 4), np.int64), np.empty(room)),
+        aligned((LEVELS + 2, LANES), np.float32),
+    )
+    return PointRoom(candidates, np.empty((LEVELS, 3), np.int32), work, new_masks(), np.zeros(3))
 
 
 class Goal(NamedTuple):
@@ -96,6 +105,14 @@ class Goal(NamedTuple):
     enough: float
     limit: float
     is_named: bool
+
+
+class Tree(NamedTuple):
+    """Of a mesh what a search reads, as in `MeshArrays`: few arguments of a call."""
+
+    boxes: Float32Array
+    child: Int32Array
+    blocks: Float32Array
 
 
 class Spot(NamedTuple):
@@ -119,68 +136,75 @@ def _spot_of(at: Point3) -> Spot:
 
 
 @inline
-def _push_children(mesh: MeshArrays, node: int, spot: Spot, most: float, room: PointRoom, n: int) -> int:
-    """Push a node's children that may be within `most` of a point on the stack of n nodes, the farthest first; return
-    its new size."""
-    at, margin, limit = spot.at, MARGIN * spot.reach, most + 2.0**-20 * abs(most) + 1e-37  # rounded to float32
+def _limit_of(spot: Spot, most: float) -> float:
+    """Return what bounds of boxes are compared with, the square unless the point is distant, no less than for `most`
+    once it is rounded to float32."""
+    limit = most if spot.spread > 0.0 else most * most
+    return limit + 2.0**-20 * abs(limit) + 1e-37
+
+
+@inline
+def _bound_boxes(tree: Tree, node: int, spot: Spot, work: Float32Array, row: int) -> int:
+    """Bound the children of a node as `boxes_within` does."""
+    at = spot.at
     if spot.spread > 0.0:
-        bits = boxes_toward(mesh.boxes, node, at.x, at.y, at.z, SLACK * spot.reach, limit, room.work)
-    else:
-        bits = boxes_within(mesh.boxes, node, at.x, at.y, at.z, margin, limit, room.work)
-    first = n
-    while bits != 0:  # bound: each turn takes a bit
-        lane = lowest_bit(bits)
-        bits &= bits - 1
-        child, bound = mesh.child[node, lane], room.work[0, lane]
-        if child == EMPTY:
-            break
-        place = n
-        while place > first and room.bounds[place - 1] < bound:  # bound: eight children
-            room.bounds[place], room.stack[place] = room.bounds[place - 1], room.stack[place - 1]
-            place -= 1
-        room.bounds[place], room.stack[place] = bound, child
-        n += 1
-    return n
+        return boxes_toward(tree.boxes, node, at.x, at.y, at.z, SLACK * spot.reach, work, row)
+    return boxes_within(tree.boxes, node, at.x, at.y, at.z, MARGIN * spot.reach, work, row)
+
+
+@inline
+def _bound_block(tree: Tree, node: int, spot: Spot, most: float, work: Float32Array) -> int:
+    """Bound the triangles of a block as `triangle_bounds` does."""
+    at, slack, most = spot.at, SLACK * spot.reach, most + 2.0**-20 * abs(most) + 1e-37  # rounded to float32
+    if spot.spread > 0.0:
+        return triangles_toward(tree.blocks, node, at.x, at.y, at.z, slack, spot.spread, most, work)
+    return triangle_bounds(tree.blocks, node, at.x, at.y, at.z, slack, most, work)
 
 
 @called
-def _search(
-    mesh: MeshArrays, spot: Spot, most: float, enough: float, room: PointRoom, flag: FlagArray
-) -> tuple[int, int]:
+def _search(tree: Tree, spot: Spot, most: float, enough: float, room: PointRoom, flag: FlagArray) -> tuple[int, int]:
     """Fill the candidates; return (outcome, number). CLOSER: a triangle is nearer than `enough`; INTERRUPTED; FULL.
     Lengths are in tree coordinates."""
-    candidates, n_candidates, n, at = room.candidates, 0, 1, spot.at
-    room.stack[0], room.bounds[0] = 0, -np.inf
-    while n > 0:  # bound: each node enters once
-        n -= 1
-        node = int(room.stack[n])
-        if room.bounds[n] > most:
-            continue
-        if mesh.child[node, 0] >= 0:
-            n = _push_children(mesh, node, spot, most, room, n)
-            continue
-        if flag[0] != 0:
+    candidates, nodes, work = room.candidates, room.nodes, room.work
+    n_candidates, level, node, limit = 0, 0, 0, _limit_of(spot, most)
+    while True:  # bound: each node is entered once
+        if tree.child[node, 0] >= 0:
+            bits = _bound_boxes(tree, node, spot, work, level + 2)
+            nodes[level, 0], nodes[level, 1], nodes[level, 2] = node, ALL_LANES, bits
+            level += 1
+        elif flag[0] != 0:
             return INTERRUPTED, 0
-        if spot.spread > 0.0:
-            triangles_toward(mesh.blocks, node, at.x, at.y, at.z, SLACK * spot.reach, spot.spread, room.work)
         else:
-            triangle_bounds(mesh.blocks, node, at.x, at.y, at.z, SLACK * spot.reach, room.work)
-        for lane in range(LANES):
-            child, low = mesh.child[node, lane], float(room.work[0, lane])
-            if child == EMPTY:
-                break
-            if low > most:
+            near = _bound_block(tree, node, spot, most, work)
+            if work[0, 0] < most:
+                most = float(work[0, 0])
+                limit = _limit_of(spot, most)
+                if most < enough:
+                    return CLOSER, 0
+            while near != 0:  # bound: each turn takes a bit
+                lane = lowest_bit(near)
+                near &= near - 1
+                child = tree.child[node, lane]
+                if child == EMPTY:
+                    break
+                if n_candidates == len(candidates.bounds):
+                    n_candidates = retain_below(candidates, n_candidates, most)
+                    if 2 * n_candidates > len(candidates.bounds):
+                        return FULL, n_candidates
+                candidates.pairs[n_candidates, 0], candidates.bounds[n_candidates] = -1 - child, work[1, lane]
+                n_candidates += 1
+        node = -1
+        while level > 0 and node < 0:  # bound: each turn leaves a level, or takes a child
+            bits = int(nodes[level - 1, 2])
+            lane = lowest_bit(bits | ALL_LANES + 1)
+            if bits == 0 or work[level + 1, lane] > limit:
+                level -= 1
                 continue
-            most = min(most, float(room.work[1, lane]))
-            if most < enough:
-                return CLOSER, 0
-            if n_candidates == len(candidates.bounds):
-                n_candidates = retain_below(candidates, n_candidates, most)
-                if 2 * n_candidates > len(candidates.bounds):
-                    return FULL, n_candidates
-            candidates.pairs[n_candidates, 0], candidates.bounds[n_candidates] = -1 - child, low
-            n_candidates += 1
-    return DONE, retain_below(candidates, n_candidates, most)
+            rest = int(nodes[level - 1, 1]) & ~(1 << lane)
+            nodes[level - 1, 1], nodes[level - 1, 2] = rest, nearest_of(work, level + 1, room.masks, rest)
+            node = int(tree.child[nodes[level - 1, 0], lane])
+        if node < 0:
+            return DONE, retain_below(candidates, n_candidates, most)
 
 
 @inline
@@ -240,7 +264,12 @@ def _certify(
     return write_offset_point(view, here, p, way, 0.0, start, move, error, foot)
 
 
-@called
+@inline
+def _scaled(t: Facet, unit: float) -> Facet:
+    return Facet(scaled(t.p, unit), scaled(t.q, unit), scaled(t.r, unit))
+
+
+@merged
 def _decide(
     mesh: MeshArrays, pose: PoseArrays, start: FloatArray, unit: float, n: int, goal: Goal, room: PointRoom,
     foot: FloatArray,
@@ -252,20 +281,20 @@ def _decide(
     pairs = candidates.pairs
     error = 2.0**-50 * (3.0 * mesh.extent.reach + largest_of(move)) + 2.0**-1060 if pose.is_posed else 0.0
     place = as_placement(pose, 0, move, error)
-    scaled_q, slack = Point3(q.x * unit, q.y * unit, q.z * unit), 2.0 * unit * error
-    most, largest, on, is_unsure = goal.most * unit, 0.0, -1, False
+    scaled_q, slack = scaled(q, unit), 2.0 * unit * error
+    most, largest, on, is_unsure, is_over = goal.most * unit, 0.0, -1, False, False
     for k in range(n):
         t = triangle_of(mesh, pairs[k, 0])
         t = Facet(placed(t.p, place), placed(t.q, place), placed(t.r, place))
-        t = relative_to(scaled_q, Facet(
-            Point3(t.p.x * unit, t.p.y * unit, t.p.z * unit), Point3(t.q.x * unit, t.q.y * unit, t.q.z * unit),
-            Point3(t.r.x * unit, t.r.y * unit, t.r.z * unit),
-        ))  # fmt: skip
+        t = relative_to(scaled_q, _scaled(t, unit))
         low, high, code, is_certain = measure(t)
-        if low <= slack:
+        is_over = n == 1 and code == FACE and is_certain and not pose.is_posed
+        if low <= slack and not is_over:
             under = UNSURE if pose.is_posed else feature_under(mesh, pairs[k, 0], q)
             is_unsure = is_unsure or under == UNSURE
             if under >= 0:
+                if not goal.is_named:
+                    return 0.0, 1, True
                 if on < 0 or mesh.faces[pairs[k, 0]] < mesh.faces[pairs[on, 0]]:
                     on = k
                 code = under
@@ -283,19 +312,25 @@ def _decide(
     if goal.limit < np.inf:
         if most < goal.enough * unit:
             return 0.0, n, False
-        if goal.limit == 0.0:
+        if goal.limit == 0.0 and not is_over:
             return np.inf, n, False
-    view, is_certain = View(mesh, place, unit), True
-    here = named(view, pairs[0, 0], pairs[0, 2])
-    for k in range(n):
-        is_certain = is_certain and pairs[k, 1] == 1 and named(view, pairs[k, 0], pairs[k, 2]) == here
+    view, is_certain = View(mesh, place, unit), pairs[0, 1] == 1
+    for k in range(1, n):
+        is_alike = named(view, pairs[k, 0], pairs[k, 2]) == named(view, pairs[0, 0], pairs[0, 2])
+        is_certain = is_certain and pairs[k, 1] == 1 and is_alike
     if not pose.is_posed:  # differences are exact: in units of the longest
         view = View(mesh, place, math.ldexp(1.0, _power(largest / unit)))
     if is_certain:
-        distance, bound = distance_to(seen_from(view, pairs[0, 0], q), pairs[0, 2])
+        distance, bound = distance_to(
+            _scaled(triangle_of(mesh, pairs[0, 0]), view.unit), scaled(q, view.unit), pairs[0, 2]
+        )
         value = _rounded(distance, bound, view.unit)
     else:
         value, n = _refine(view, q, n, candidates)
+    if value < 0.0 and is_over and feature_under(mesh, pairs[0, 0], q) == FACE:
+        for k in range(foot.shape[0]):
+            foot[k] = start[0, k]
+        return 0.0, 1, True
     if goal.limit < np.inf:
         if value < 0.0 or value == goal.limit:
             return -1.0, n, False
@@ -339,7 +374,9 @@ def find_nearest_on_mesh(
         most, enough = goal.most / scale * _ABOVE_ONE, goal.enough / scale / _ABOVE_ONE
         if spot.spread > 0.0 or not goal.enough > 0.0:
             enough = -np.inf
-        how, n = _search(mesh, spot, np.inf if spot.spread > 0.0 else most, enough, room, flag)
+        how, n = _search(
+            Tree(mesh.boxes, mesh.child, mesh.blocks), spot, np.inf if spot.spread > 0.0 else most, enough, room, flag
+        )
         if how == CLOSER:
             answers[item] = 0.0
             continue

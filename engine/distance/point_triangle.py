@@ -8,7 +8,7 @@ Source: C. Ericson, Real-Time Collision Detection, 2005, 5.1.5 (the closest poin
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -16,20 +16,17 @@ from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import FACE
 from engine.collision.meshes.triangle_triangle import Facet, corner, projected
 from engine.compiling.jit import called, inline
-from engine.distance.closed_forms import Wide, Wide3, dot3, less, less3, over, root, times
+from engine.distance.closed_forms import Wide, Wide3, over, root
 from engine.distance.refined import View, corners_of
-from engine.predicates.error_free import is_correctly_rounded, two_diff, workspace
-from engine.predicates.expansion import add_scaled, compress
+from engine.predicates.error_free import fma, two_diff, two_prod, two_sum
 from engine.predicates.orientation import orient2d, orient3d
-from engine.predicates.parameters import minor
 from engine.predicates.vectors import cross, dot, largest_of, minus
 from engine.types import UNDECIDED, Point3
 
 _ROUNDING: Final = 2.0**-47
 """Bound on the rounding of `_measure`, of coordinates below 1: one rounding of each, 12 of a combination of corners,
 its length and products with corners, each less than 16 u in all."""
-_SMALLEST: Final = 2.0**-300
-"""Least magnitude whose products of three are exact with tails."""
+_TINY: Final = 2.0**-1000
 
 
 class Closest(NamedTuple):
@@ -44,7 +41,17 @@ class Closest(NamedTuple):
 
 @inline
 def _closest(t: Facet) -> Closest:
-    best, least = Closest(t.p, 0, np.inf), np.inf
+    u, v, best, least = minus(t.q, t.p), minus(t.r, t.p), Closest(t.p, 0, np.inf), np.inf
+    n = cross(u, v)
+    nn, a, size = dot(n, n), t.p, max(largest_of(u), largest_of(v))
+    if nn > 0.0:
+        top, other = dot(cross(v, a), n), dot(cross(a, u), n)
+        x, y = top / nn, other / nn
+        p = Point3(a.x + x * u.x + y * v.x, a.y + x * u.y + y * v.y, a.z + x * u.z + y * v.z)
+        if x >= 0.0 and y >= 0.0 and x + y <= 1.0:
+            best, least = Closest(p, FACE, min(top, other, nn - top - other)), dot(p, p)
+            if best.inside > 2.0**-44 * size * size:
+                return best
     for k in range(3):
         a, b = corner(t, k), corner(t, k + 1)
         u = minus(b, a)
@@ -52,19 +59,10 @@ def _closest(t: Facet) -> Closest:
         x = min(max(along / uu, 0.0), 1.0) if uu > 0.0 else 0.0
         p = b if x == 1.0 else Point3(a.x + x * u.x, a.y + x * u.y, a.z + x * u.z)
         square = dot(p, p)
-        if square < least:
+        if square < least or (k == 0 and best.code != FACE):
             is_end, end = x <= 0.0 or x >= 1.0, k if x <= 0.0 else (k + 1) % 3
             best = Closest(p, end if is_end else 3 + k, np.inf if is_end else min(along, uu - along))
             least = square
-    u, v = minus(t.q, t.p), minus(t.r, t.p)
-    n = cross(u, v)
-    nn, a = dot(n, n), t.p
-    if nn > 0.0:
-        top, other = dot(cross(v, a), n), dot(cross(a, u), n)
-        x, y = top / nn, other / nn
-        p = Point3(a.x + x * u.x + y * v.x, a.y + x * u.y + y * v.y, a.z + x * u.z + y * v.z)
-        if x >= 0.0 and y >= 0.0 and x + y <= 1.0 and dot(p, p) < least:
-            best = Closest(p, FACE, min(top, other, nn - top - other))
     return best
 
 
@@ -189,65 +187,143 @@ def seen_from(view: View, item: int, q: Point3) -> Facet:
 
 
 @inline
-def _add_minor(e: Any, n: int, m: Any, z: Wide, a: tuple[Wide, Wide], b: tuple[Wide, Wide]) -> int:
-    """Add z times the determinant of two rows to the expansion e of n components; return the new length."""
-    size = minor(m, a[0].h, a[0].low, a[1].h, a[1].low, b[0].h, b[0].low, b[1].h, b[1].low)
-    return add_scaled(e, add_scaled(e, n, m, size, z.low), m, size, z.h)
-
-
-@inline
 def _reach(u: Wide3) -> float:
     return max(abs(u.x.h), abs(u.y.h), abs(u.z.h))
 
 
 @inline
-def _cross3(u: Wide3, v: Wide3) -> Wide3:
+def _between(a: Point3, b: Point3) -> Wide3:
+    """Return b - a, exact."""
+    return Wide3(Wide(*two_diff(b.x, a.x)), Wide(*two_diff(b.y, a.y)), Wide(*two_diff(b.z, a.z)))
+
+
+@inline
+def _product(a: Wide, b: Wide) -> tuple[float, float]:
+    """Return a b as its rounded leading part and the rest."""
+    p, low = two_prod(a.h, b.h)
+    return p, fma(a.h, b.low, fma(a.low, b.h, low))
+
+
+@inline
+def _dot(u: Wide3, v: Wide3) -> Wide:
+    """Return u . v within 2^-101 of the sum of the magnitudes S of its products: the rest of one is below 3 u of it,
+    and off by 8 u^2; what five terms of 5 u S in all lose in four sums is below 20 u^2 S."""
+    (p, p_low), (q, q_low), (r, r_low) = _product(u.x, v.x), _product(u.y, v.y), _product(u.z, v.z)
+    p, e = two_sum(p, q)
+    p, f = two_sum(p, r)
+    return Wide(*two_sum(p, (e + f) + ((p_low + q_low) + r_low)))
+
+
+@inline
+def _turned(a: Wide, b: Wide, c: Wide, d: Wide) -> Wide:
+    """Return a b - c d, as precise as `_dot`."""
+    (p, p_low), (q, q_low) = _product(a, b), _product(c, d)
+    p, e = two_diff(p, q)
+    return Wide(*two_sum(p, e + (p_low - q_low)))
+
+
+@inline
+def _cross(u: Wide3, v: Wide3) -> Wide3:
     return Wide3(
-        less(times(u.y, v.z), times(u.z, v.y)), less(times(u.z, v.x), times(u.x, v.z)),
-        less(times(u.x, v.y), times(u.y, v.x)),
+        _turned(u.y, v.z, u.z, v.y), _turned(u.z, v.x, u.x, v.z), _turned(u.x, v.y, u.y, v.x)
     )  # fmt: skip
 
 
-@called
-def _determinant(t: Facet) -> Wide:
-    """Return |det| of the corners of a triangle, computed exactly, then rounded to 2^-104 of itself; 0 if out of
-    range."""
-    for k in range(3):
-        p = corner(t, k)
-        for x in (p.x, p.y, p.z):
-            if (x.h != 0.0 and abs(x.h) < _SMALLEST) or (x.low != 0.0 and abs(x.low) < _SMALLEST):
-                return Wide(0.0, 0.0)
-    e, m = workspace(192), workspace(16)
-    n = _add_minor(e, 0, m, t.p.z, (t.q.x, t.q.y), (t.r.x, t.r.y))
-    n = _add_minor(e, n, m, t.q.z, (t.r.x, t.r.y), (t.p.x, t.p.y))
-    n = compress(e, _add_minor(e, n, m, t.r.z, (t.p.x, t.p.y), (t.q.x, t.q.y)))
-    det = Wide(e[n - 1] if n > 0 else 0.0, e[n - 2] if n > 1 else 0.0)
-    return det if det.h >= 0.0 else Wide(-det.h, -det.low)
+class Levels(NamedTuple):
+    """A sum of three numbers: products and their sums rounded, what these leave out, and what that leaves out."""
+
+    first: float
+    second: float
+    third: float
+
+
+@inline
+def _minor(a: Wide, b: Wide, c: Wide, d: Wide) -> Levels:
+    """Return a b - c d."""
+    p, p_low = two_prod(a.h, b.h)
+    q, q_low = two_prod(c.h, d.h)
+    x, x_low = two_prod(a.h, b.low)
+    y, y_low = two_prod(a.low, b.h)
+    z, z_low = two_prod(c.h, d.low)
+    w, w_low = two_prod(c.low, d.h)
+    first, e = two_diff(p, q)
+    f, f_low = two_diff(p_low, q_low)
+    x, e_low = two_sum(x, y)
+    z, g_low = two_sum(z, w)
+    f, h_low = two_sum(f, e)
+    x, k_low = two_diff(x, z)
+    second, m_low = two_sum(f, x)
+    third = (f_low + e_low - g_low) + (h_low + k_low + m_low) + (x_low + y_low - z_low - w_low)
+    return Levels(first, second, third + (a.low * b.low - c.low * d.low))
+
+
+@inline
+def _scaled(z: Wide, m: Levels) -> tuple[float, float, Levels]:
+    """Return z m as two numbers more, of the size of the second of its levels."""
+    first, first_low = two_prod(m.first, z.h)
+    x, x_low = two_prod(m.second, z.h)
+    y, y_low = two_prod(m.first, z.low)
+    return first_low, y, Levels(first, x, (x_low + y_low) + (m.third * z.h + m.second * z.low))
 
 
 @called
-def distance_to(t: Facet, code: int) -> tuple[Wide, float]:
-    """Return the distance of the vertex, or of the line or plane of an edge or a face, of a triangle from the origin,
-    and a bound on its error: |a|, |a x e| / |e|, |a . n| / |n|. With A, U, V the longest coordinates of a and of the
-    edges: a component of a product of two vectors is off by less than 2^-101 of the product of these; the length of
-    one, root and quotient together by 2^-99 of itself. What 2^-98 A U V / |n| does not decide, the exact determinant
-    does."""
-    a = corner(t, code % 3)
+def _determinant(t: Facet) -> tuple[Wide, float]:
+    """Return the determinant of the corners of a triangle, below 2, and a bound on its error. With M the sum of the magnitudes of
+    its six products: second levels sum up to 10 u M, third ones, and what sums of second ones leave out, to 150 u^2 M,
+    which some 30 roundings move by less than 2^13 u^3 M; `_TINY` is far above what underflows."""
+    a, b, c = t.p, t.q, t.r
+    bc, ca, ab = _minor(b.x, c.y, b.y, c.x), _minor(c.x, a.y, c.y, a.x), _minor(a.x, b.y, a.y, b.x)
+    terms = abs(a.z.h) * (abs(b.x.h * c.y.h) + abs(b.y.h * c.x.h)) + abs(b.z.h) * (
+        abs(c.x.h * a.y.h) + abs(c.y.h * a.x.h)
+    )
+    terms += abs(c.z.h) * (abs(a.x.h * b.y.h) + abs(a.y.h * b.x.h))
+    (i, j, p), (k, m, q), (n, o, r) = _scaled(a.z, bc), _scaled(b.z, ca), _scaled(c.z, ab)
+    first, e = two_sum(p.first, q.first)
+    first, f = two_sum(first, r.first)
+    i, i_low = two_sum(i, j)
+    k, k_low = two_sum(k, m)
+    n, n_low = two_sum(n, o)
+    e, e_low = two_sum(e, f)
+    x, x_low = two_sum(p.second, q.second)
+    i, j_low = two_sum(i, k)
+    n, m_low = two_sum(n, r.second)
+    x, y_low = two_sum(x, e)
+    i, o_low = two_sum(i, n)
+    second, z_low = two_sum(i, x)
+    third = (i_low + k_low + n_low + e_low) + (x_low + j_low + m_low) + (y_low + o_low + z_low)
+    third += p.third + q.third + r.third
+    h, low = two_sum(first, second)
+    h, low = two_sum(h, low + third)
+    return Wide(h, low), 2.0**-145 * terms + 2.0**-104 * abs(h) + _TINY
+
+
+@called
+def distance_to(t: Facet, q: Point3, code: int) -> tuple[Wide, float]:
+    """Return the distance of the vertex, or of the line or plane of an edge or a face, of a triangle from a point, and
+    a bound on its error: |a|, |a x e| / |e|, |a . n| / |n|, a being exact from the point to a corner.
+
+    With A, U, V the longest coordinates of a and of the edges: a component of a product of two vectors is off by less
+    than 2^-100 of the product of these, a . n by 2^-97 A U V; a length of 3 such components by 2^-98 U V, and with
+    its rounding, root and quotient by 2^-99 of itself more. Where that would decide too little, below a millionth of
+    A U V, a . n is the determinant in three levels."""
+    corner_, other = corner(t, code % 3), corner(t, code % 3 + 1)
+    a = _between(q, corner_)
     if code < 3:
-        size = root(dot3(a, a))
+        size = root(_dot(a, a))
         return size, 2.0**-99 * size.h
-    u = less3(corner(t, code % 3 + 1), a)
+    u, reach = _between(corner_, other), _reach(a)
     if code < FACE:
-        normal, size = _cross3(a, u), root(dot3(u, u))
-        distance = over(root(dot3(normal, normal)), size)
-        return distance, 2.0**-98 * _reach(a) * _reach(u) / size.h + 2.0**-98 * distance.h
-    v = less3(t.r, a)
-    normal, lengths = _cross3(u, v), _reach(u) * _reach(v)
-    size = root(dot3(normal, normal))
-    distance, share = over(dot3(a, normal), size), 2.0**-98 * (lengths / size.h + 1.0)
+        normal, size = _cross(a, u), root(_dot(u, u))
+        distance = over(root(_dot(normal, normal)), size)
+        return distance, 2.0**-97 * reach * _reach(u) / size.h + 2.0**-97 * distance.h
+    v = _between(t.p, t.r)
+    normal, lengths = _cross(u, v), _reach(u) * _reach(v)
+    size = root(_dot(normal, normal))
+    rough = a.x.h * normal.x.h + a.y.h * normal.y.h + a.z.h * normal.z.h
+    if abs(rough) < 2.0**-20 * reach * lengths:
+        height, error = _determinant(Facet(a, _between(q, t.q), _between(q, t.r)))
+    else:
+        height, error = _dot(a, normal), 2.0**-97 * reach * lengths
+    distance = over(height, size)
     distance = distance if distance.h >= 0.0 else Wide(-distance.h, -distance.low)
-    error = _reach(a) * share + distance.h * share
-    if not is_correctly_rounded(distance.h, distance.low, error):
-        distance = over(_determinant(t), size)
-        error = distance.h * share if distance.h > 0.0 else np.inf
-    return distance, error
+    return distance, 1.01 * error / size.h + distance.h * 2.0**-97 * (lengths / size.h + 1.0)

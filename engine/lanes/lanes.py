@@ -100,6 +100,19 @@ def lane_of(value: Lanes, lane: int) -> Lanes:
     return spread(value[lane])
 
 
+def _emit_across(value: EmittedLanes, step: int) -> EmittedLanes:
+    places = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [lane ^ step for lane in range(LANES)])
+    return EmittedLanes(
+        value.builder, value.builder.shuffle_vector(value.value, ir.Constant(VECTOR, ir.Undefined), places)
+    )
+
+
+@instruction(_emit_across)
+def across(value: Lanes, step: int) -> Lanes:
+    """Return in each lane the number of lane ^ step; step: a compile-time constant."""
+    return value[[lane ^ step for lane in range(LANES)]]
+
+
 def _emit_select(mask: EmittedMask, a: Any, b: Any) -> EmittedLanes:
     a, b = (EmittedLanes.of(mask.builder, value).value for value in (a, b))
     return EmittedLanes(mask.builder, mask.builder.select(mask.value, a, b))
@@ -212,6 +225,13 @@ def aligned(shape: tuple[int, ...], dtype: Any) -> Any:
 def lesser(a: Lanes, b: Lanes) -> Lanes:
     """Return the minimum, lane by lane; b where the two are not ordered."""
     return select(a < b, a, b)
+
+
+def least_of(value: Lanes) -> Lanes:
+    """Return eight copies of the least of eight numbers."""
+    for step in (4, 2, 1):
+        value = lesser(value, across(value, step))
+    return value
 
 
 def greater(a: Lanes, b: Lanes) -> Lanes:

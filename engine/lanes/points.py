@@ -25,55 +25,78 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.faces import CORNER_ROWS
-from engine.lanes.lanes import bits_of, dot, greater, lesser, load, root, select, store
-from engine.lanes.tracing import Lanes, Number, Rows, traced
+from engine.lanes.lanes import bits_of, dot, greater, least_of, lesser, load, root, select, store
+from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
+from engine.types import Float32Array
 
 MARGIN: Final = 2.0**-21
 SLACK: Final = 2.0**-19
 """Over S: `margin` of boxes and `slack` of triangles."""
-BOUND_ROWS: Final = 2
-"""Rows of the work space: a lower and an upper bound."""
+_UNUSED: Final = 1e20
+"""Above all bounds but those of unused lanes (`bvh.py`)."""
 _BELOW_ONE: Final = 1.0 - 2.0**-20
 
 
 @traced
-def boxes_within(
-    boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, most: Number, work: Rows
-) -> int:
-    """Return the mask of a node's children whose boxes may be within `most` of a point; write lower bounds on their
-    distances to row 0 of work."""
-    box = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
+def boxes_within(boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, work: Rows, row: int) -> int:
+    """Write lower bounds on the squared distances of a point from the boxes of a node's children to a row of work;
+    return the nearest as `nearest_of` does."""
+    box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     gaps = [greater(abs(box[k] - at) - (box[3 + k] + margin), 0.0) for k, at in enumerate((x, y, z))]
-    bound = root(dot(gaps, gaps)) * _BELOW_ONE
-    store(work, 0, bound)
-    return bits_of(~(bound > most))
+    low = dot(gaps, gaps) * _BELOW_ONE
+    store(work, row, low)
+    return _least_lanes(low)
 
 
 @traced
-def boxes_toward(
-    boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, most: Number, work: Rows
-) -> int:
-    """Do so for a distant point in the direction x, y, z: the bounds are less its distance from the origin."""
-    box = [load(boxes, BOX_ROWS * node + row) for row in range(BOX_ROWS)]
+def boxes_toward(boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, work: Rows, row: int) -> int:
+    """Do so for a distant point in the direction x, y, z: the bounds are on distances less its own from the origin."""
+    box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     along, reach = dot((x, y, z), box[:3]), dot((abs(x), abs(y), abs(z)), box[3:])
-    bound = -(along + reach) - margin
-    store(work, 0, bound)
-    return bits_of(~(bound > most))
+    low = -(along + reach) - margin
+    store(work, row, low)
+    return _least_lanes(low)
+
+
+@traced
+def nearest_of(work: Rows, row: int, masks: Rows, bits: int) -> int:
+    """Return, as bits, those of the lanes `bits` of a row of lower bounds that have the least. masks: `new_masks`."""
+    return _least_lanes(load(work, row) + load(masks, bits))
+
+
+def _least_lanes(low: Lanes) -> int:
+    return bits_of((low <= least_of(low)) & (low < _UNUSED))
+
+
+def new_masks() -> Float32Array:
+    """Return rows of 0 in the lanes that are set in the number of the row, infinity in the others."""
+    are_set = np.arange(1 << LANES)[:, None] >> np.arange(LANES) & 1 == 1
+    return np.where(are_set, np.float32(0.0), np.float32(np.inf))
 
 
 @traced
 def triangles_toward(
-    blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, spread: Number, work: Rows
-) -> None:
-    """Write bounds on the distances of a distant point in the direction x, y, z from the triangles of a block, less its
-    distance from the origin, as `triangle_bounds` does."""
+    blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, more: Number, most: Number, work: Rows
+) -> int:
+    """Bound the distances of a distant point in the direction x, y, z from the triangles of a block, less its distance
+    from the origin, as `triangle_bounds` does."""
     corners = [[load(blocks, CORNER_ROWS * node + 3 * corner + k) for k in range(3)] for corner in range(3)]
     a, b, c = (dot((x, y, z), corner) for corner in corners)
     level = -greater(a, greater(b, c))
-    store(work, 0, level - slack)
-    store(work, 1, level + slack + spread)
+    return _write(level - slack, select(corners[0][0] < _UNUSED, level + slack + more, np.inf), most, work)
+
+
+def _write(low: Lanes, high: Lanes, most: Number, work: Rows) -> int:
+    """Write the least of upper bounds to row 0 of work, lower bounds to row 1; return the mask of the triangles that
+    may be the nearest and within `most`."""
+    least = least_of(high)
+    store(work, 0, least)
+    store(work, 1, low)
+    return bits_of(~(low > lesser(least, most)))
 
 
 def _nearest_of_edge(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
@@ -84,9 +107,11 @@ def _nearest_of_edge(a: Sequence[Lanes], b: Sequence[Lanes]) -> list[Lanes]:
 
 
 @traced
-def triangle_bounds(blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, work: Rows) -> None:
-    """Write lower bounds on the distances of a point from the eight triangles of a block to row 0 of work, and upper
-    bounds to row 1; what it writes for unused lanes means nothing."""
+def triangle_bounds(
+    blocks: Rows, node: int, x: Number, y: Number, z: Number, slack: Number, most: Number, work: Rows
+) -> int:
+    """Return the mask of the triangles of a block that may be the nearest to a point and within `most`, unused lanes
+    maybe among them; write an upper bound on the least distance to row 0 of work, and lower bounds to row 1."""
     a, b, c = (
         [load(blocks, CORNER_ROWS * node + 3 * corner + k) - at for k, at in enumerate((x, y, z))]
         for corner in range(3)
@@ -109,5 +134,4 @@ def triangle_bounds(blocks: Rows, node: int, x: Number, y: Number, z: Number, sl
     p = [select(is_nearer, foot[k], nearest[k]) for k in range(3)]
     length = root(select(is_nearer, foot_square, square))
     least = lesser(dot(p, a), lesser(dot(p, b), dot(p, c))) / length
-    store(work, 0, greater(least - slack, 0.0))
-    store(work, 1, length + slack)
+    return _write(greater(least - slack, 0.0), length + slack, most, work)
