@@ -30,7 +30,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from engine.bounding.bvh import STACK, WIDTH
+from engine.bounding.bvh import MAX_DEPTH
 from engine.collision.meshes.mesh_arrays import MeshArrays, triangle_of
 from engine.collision.meshes.near_triangles import FACE, relative_to
 from engine.collision.meshes.placement import PoseArrays, as_placement, placed, rotate_back
@@ -53,14 +53,13 @@ from engine.distance.refined import (
 )  # fmt: skip
 from engine.distance.traversal import BEYOND, CLOSER, DONE, FULL, INTERRUPTED
 from engine.lanes.boxes import EMPTY
-from engine.lanes.lanes import aligned, lowest_bit
+from engine.lanes.lanes import lowest_bit
 from engine.lanes.points import (
     MARGIN,
     SLACK,
     boxes_toward,
     boxes_within,
     nearest_of,
-    new_masks,
     triangle_bounds,
     triangles_toward,
 )  # fmt: skip
@@ -69,7 +68,6 @@ from engine.predicates.error_free import is_correctly_rounded
 from engine.predicates.vectors import as_point3, dot, largest_of, minus
 from engine.types import FlagArray, Float32Array, FloatArray, Int32Array, IntArray, Point3
 
-LEVELS: Final = STACK // WIDTH
 ALL_LANES: Final = (1 << LANES) - 1
 _LARGEST: Final = 1e300
 _DISTANT: Final = 1024.0
@@ -77,24 +75,22 @@ _ABOVE_ONE: Final = 1.0 + 2.0**-20
 
 
 class PointRoom(NamedTuple):
-    """Work space of one search at a time: candidates, of which the first and third columns are used; nodes (LEVELS, 3)
-    on the way down, with the bits of their children that are left, and those of the nearest of these; work (LEVELS + 2,
-    8): their bounds, from row 2 on; masks: of `nearest_of`; origin (3,) zeros."""
+    """Work space of one search at a time: candidates, of which the first and third columns are used; by level of
+    the way down a node, the bits of its children that are left, and those of the nearest of these, nodes (n, 3), and
+    their bounds (n, 8); work (2, 8): of `lanes/points.py`; origin (3,) zeros."""
 
     candidates: Candidates
     nodes: Int32Array
+    bounds: Float32Array
     work: Float32Array
-    masks: Float32Array
     origin: FloatArray
 
 
 def new_point_room(room: int) -> PointRoom:
     """Allocate work space for `room` candidates."""
-    candidates, work = (
-        Candidates(np.empty((room, 4), np.int64), np.empty(room)),
-        aligned((LEVELS + 2, LANES), np.float32),
-    )
-    return PointRoom(candidates, np.empty((LEVELS, 3), np.int32), work, new_masks(), np.zeros(3))
+    candidates = Candidates(np.empty((room, 4), np.int64), np.empty(room))
+    nodes, bounds = np.empty((MAX_DEPTH + 1, 3), np.int32), np.empty((MAX_DEPTH + 1, LANES), np.float32)
+    return PointRoom(candidates, nodes, bounds, np.empty((2, LANES), np.float32), np.zeros(3))
 
 
 class Goal(NamedTuple):
@@ -144,12 +140,28 @@ def _limit_of(spot: Spot, most: float) -> float:
 
 
 @inline
-def _bound_boxes(tree: Tree, node: int, spot: Spot, work: Float32Array, row: int) -> int:
+def _bound_boxes(tree: Tree, node: int, spot: Spot, bounds: Float32Array, row: int) -> int:
     """Bound the children of a node as `boxes_within` does."""
     at = spot.at
     if spot.spread > 0.0:
-        return boxes_toward(tree.boxes, node, at.x, at.y, at.z, SLACK * spot.reach, work, row)
-    return boxes_within(tree.boxes, node, at.x, at.y, at.z, MARGIN * spot.reach, work, row)
+        return boxes_toward(tree.boxes, node, at.x, at.y, at.z, SLACK * spot.reach, bounds, row)
+    return boxes_within(tree.boxes, node, at.x, at.y, at.z, MARGIN * spot.reach, bounds, row)
+
+
+@inline
+def _next_child(tree: Tree, room: PointRoom, level: int, limit: float) -> tuple[int, int]:
+    """Return (node, level): the next child whose bound is not above the limit, -1 if there is none."""
+    nodes, node = room.nodes, -1
+    while level > 0 and node < 0:  # bound: each turn leaves a level, or takes a child
+        bits = int(nodes[level - 1, 2])
+        lane = lowest_bit(bits | ALL_LANES + 1)
+        if bits == 0 or room.bounds[level - 1, lane] > limit:
+            level -= 1
+            continue
+        rest = int(nodes[level - 1, 1]) & ~(1 << lane)
+        nodes[level - 1, 1], nodes[level - 1, 2] = rest, nearest_of(room.bounds, level - 1, rest)
+        node = int(tree.child[nodes[level - 1, 0], lane])
+    return node, level
 
 
 @inline
@@ -169,7 +181,7 @@ def _search(tree: Tree, spot: Spot, most: float, enough: float, room: PointRoom,
     n_candidates, level, node, limit = 0, 0, 0, _limit_of(spot, most)
     while True:  # bound: each node is entered once
         if tree.child[node, 0] >= 0:
-            bits = _bound_boxes(tree, node, spot, work, level + 2)
+            bits = _bound_boxes(tree, node, spot, room.bounds, level)
             nodes[level, 0], nodes[level, 1], nodes[level, 2] = node, ALL_LANES, bits
             level += 1
         elif flag[0] != 0:
@@ -193,16 +205,7 @@ def _search(tree: Tree, spot: Spot, most: float, enough: float, room: PointRoom,
                         return FULL, n_candidates
                 candidates.pairs[n_candidates, 0], candidates.bounds[n_candidates] = -1 - child, work[1, lane]
                 n_candidates += 1
-        node = -1
-        while level > 0 and node < 0:  # bound: each turn leaves a level, or takes a child
-            bits = int(nodes[level - 1, 2])
-            lane = lowest_bit(bits | ALL_LANES + 1)
-            if bits == 0 or work[level + 1, lane] > limit:
-                level -= 1
-                continue
-            rest = int(nodes[level - 1, 1]) & ~(1 << lane)
-            nodes[level - 1, 1], nodes[level - 1, 2] = rest, nearest_of(work, level + 1, room.masks, rest)
-            node = int(tree.child[nodes[level - 1, 0], lane])
+        node, level = _next_child(tree, room, level, limit)
         if node < 0:
             return DONE, retain_below(candidates, n_candidates, most)
 

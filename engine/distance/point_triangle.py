@@ -268,9 +268,9 @@ def _scaled(z: Wide, m: Levels) -> tuple[float, float, Levels]:
 
 @called
 def _determinant(t: Facet) -> tuple[Wide, float]:
-    """Return the determinant of the corners of a triangle, below 2, and a bound on its error. With M the sum of the magnitudes of
-    its six products: second levels sum up to 10 u M, third ones, and what sums of second ones leave out, to 150 u^2 M,
-    which some 30 roundings move by less than 2^13 u^3 M; `_TINY` is far above what underflows."""
+    """Return the determinant of the corners of a triangle, below 2, and a bound on its error. With M the sum of the
+    magnitudes of its six products: second levels sum up to 10 u M, third ones, and what sums of second ones leave out,
+    to 150 u^2 M, which some 30 roundings move by less than 2^13 u^3 M; `_TINY` is far above what underflows."""
     a, b, c = t.p, t.q, t.r
     bc, ca, ab = _minor(b.x, c.y, b.y, c.x), _minor(c.x, a.y, c.y, a.x), _minor(a.x, b.y, a.y, b.x)
     terms = abs(a.z.h) * (abs(b.x.h * c.y.h) + abs(b.y.h * c.x.h)) + abs(b.z.h) * (

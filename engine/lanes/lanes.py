@@ -29,6 +29,7 @@ from numba.extending import intrinsic
 from engine.compiling.jit import inline
 from engine.lanes.tracing import (
     LANES,
+    TRUTHS,
     VECTOR,
     WORD,
     Array,
@@ -145,6 +146,17 @@ def _emit_bits(mask: EmittedMask) -> EmittedWord:
 def bits_of(mask: Mask) -> int:
     """Return a mask as an integer: bit k is lane k."""
     return int(np.packbits(mask, bitorder="little")[0])
+
+
+def _emit_mask(bits: EmittedWord) -> EmittedMask:
+    byte = bits.builder.trunc(bits.value, ir.IntType(LANES))
+    return EmittedMask(bits.builder, bits.builder.bitcast(byte, TRUTHS))
+
+
+@instruction(_emit_mask)
+def mask_of(bits: int) -> Mask:
+    """Return the mask of the lanes whose bits are set."""
+    return np.unpackbits(np.uint8(bits), bitorder="little").astype(bool)
 
 
 def _emit_any(mask: EmittedMask) -> EmittedWord:

@@ -29,9 +29,8 @@ import numpy as np
 
 from engine.lanes.boxes import BOX_ROWS
 from engine.lanes.faces import CORNER_ROWS
-from engine.lanes.lanes import bits_of, dot, greater, least_of, lesser, load, root, select, store
-from engine.lanes.tracing import LANES, Lanes, Number, Rows, traced
-from engine.types import Float32Array
+from engine.lanes.lanes import bits_of, dot, greater, least_of, lesser, load, mask_of, root, select, store
+from engine.lanes.tracing import Lanes, Number, Rows, traced
 
 MARGIN: Final = 2.0**-21
 SLACK: Final = 2.0**-19
@@ -42,40 +41,38 @@ _BELOW_ONE: Final = 1.0 - 2.0**-20
 
 
 @traced
-def boxes_within(boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, work: Rows, row: int) -> int:
+def boxes_within(
+    boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, bounds: Rows, row: int
+) -> int:
     """Write lower bounds on the squared distances of a point from the boxes of a node's children to a row of work;
     return the nearest as `nearest_of` does."""
     box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     gaps = [greater(abs(box[k] - at) - (box[3 + k] + margin), 0.0) for k, at in enumerate((x, y, z))]
     low = dot(gaps, gaps) * _BELOW_ONE
-    store(work, row, low)
+    store(bounds, row, low)
     return _least_lanes(low)
 
 
 @traced
-def boxes_toward(boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, work: Rows, row: int) -> int:
+def boxes_toward(
+    boxes: Rows, node: int, x: Number, y: Number, z: Number, margin: Number, bounds: Rows, row: int
+) -> int:
     """Do so for a distant point in the direction x, y, z: the bounds are on distances less its own from the origin."""
     box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     along, reach = dot((x, y, z), box[:3]), dot((abs(x), abs(y), abs(z)), box[3:])
     low = -(along + reach) - margin
-    store(work, row, low)
+    store(bounds, row, low)
     return _least_lanes(low)
 
 
 @traced
-def nearest_of(work: Rows, row: int, masks: Rows, bits: int) -> int:
-    """Return, as bits, those of the lanes `bits` of a row of lower bounds that have the least. masks: `new_masks`."""
-    return _least_lanes(load(work, row) + load(masks, bits))
+def nearest_of(bounds: Rows, row: int, bits: int) -> int:
+    """Return, as bits, those of the lanes `bits` of a row of bounds that have the least."""
+    return _least_lanes(select(mask_of(bits), load(bounds, row), np.inf))
 
 
 def _least_lanes(low: Lanes) -> int:
     return bits_of((low <= least_of(low)) & (low < _UNUSED))
-
-
-def new_masks() -> Float32Array:
-    """Return rows of 0 in the lanes that are set in the number of the row, infinity in the others."""
-    are_set = np.arange(1 << LANES)[:, None] >> np.arange(LANES) & 1 == 1
-    return np.where(are_set, np.float32(0.0), np.float32(np.inf))
 
 
 @traced
