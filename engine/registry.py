@@ -12,7 +12,8 @@ from typing import Final
 from engine.containment import locators
 from engine.containment import posed_locators as posed
 from engine.containment.methods import rational_locate
-from engine.distance.point_measures import BallMeasure, PlanesMeasure, TriangleMeasure
+from engine.distance.ball_and_planes import BallMeasure, PlanesMeasure
+from engine.distance.point_measures import TriangleMeasure
 from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import hits, profiles

@@ -19,6 +19,7 @@ from engine.distance.point_measures import (
     NOWHERE,
     OTHER,
     Answers,
+    Features,
     Lines,
     Measure,
     TriangleMeasure,
@@ -112,6 +113,51 @@ def measure_of(solid: Any, pose: Pose | None, where: tuple[str | int, ...] = ("s
     return measure
 
 
+def _fill(
+    measure: Measure, points: FloatArray, span: tuple[int, int], answers: Answers, limit: float | None,
+    places: Int8Array | None, stops_inside: bool, is_signed: bool, budget: Budget,
+) -> int:  # fmt: skip
+    """Fill the answers for points number span[0] .. span[1] - 1 as a measure does; what lies inside is 0 away or
+    negative. places: the locations of these points, if they matter."""
+    start, stop = span
+    distance = answers.distance[start:stop]
+    if places is not None:
+        if not answers.is_named:
+            distance[places >= 0 if stops_inside else places == 0] = 0.0
+        elif stops_inside:
+            distance[places > 0] = 0.0
+            answers.feet[start:stop][places > 0] = points[start:stop][places > 0]
+    n_exact = measure.fill(points, start, stop, answers, limit, budget)
+    if is_signed and places is not None:
+        distance[places > 0] *= -1.0
+    return n_exact
+
+
+def _new_answers(points: FloatArray, is_named: bool) -> Answers:
+    distance = np.empty(len(points))
+    distance.fill(np.nan)
+    if not is_named:
+        return Answers(distance, _NO_FEET, _NO_CODES, False)
+    codes = np.empty((len(points), 2), np.int64)
+    codes.fill(-1)
+    return Answers(distance, np.empty(points.shape), codes, True)
+
+
+def _result(measure: Measure, answers: Answers, limit: float | None) -> tuple[Any, ...]:
+    """Return the columns of the result, once all answers are filled."""
+    if limit is not None:
+        return (answers.distance == 0.0,)
+    if not answers.is_named:
+        return (answers.distance,)
+    n = len(answers.distance)
+    features = Features(np.empty(n, np.int64), np.empty(n, np.int8), np.empty((n, 2), np.int64))
+    features.face.fill(-1)
+    features.kind.fill(NOWHERE)
+    features.numbers.fill(-1)
+    measure.name(answers.codes, features)
+    return answers.distance, answers.feet, *features
+
+
 class PointQuery:
     """Distances of points (n, d) from one solid, by ranges of points; threads may fill different ranges.
 
@@ -121,57 +167,36 @@ class PointQuery:
         self, points: FloatArray, solid: Any, pose: Pose | None, limit: float | None, is_named: bool, budget: Budget,
         to_boundary: bool = False, is_signed: bool = False, where: tuple[str | int, ...] = ("solid",),
     ) -> None:  # fmt: skip
-        n = len(points)
         self.measure, self.n_exact = measure_of(solid, pose, where), 0
         self._order = self.measure.order(points)
         self.points = points if self._order is None else read_only(points[self._order])
-        self.limit, self.is_signed, self.is_named = limit, is_signed, is_named
-        rows = n if is_named else 0
-        feet, codes = np.empty((rows, points.shape[1])), np.full((rows, 2), -1, np.int64)
-        self.answers = Answers(np.full(n, np.nan), feet, codes)
+        self.limit, self.is_signed = limit, is_signed
+        self.answers = _new_answers(points, is_named)
         self._stops_inside = has_inside(solid) and not (to_boundary or is_signed)
         self._locator: Locator | None = None
         if has_inside(solid) and (is_signed or not to_boundary):
-            self._locator = posed_locator(solid, pose).chosen(n, budget)
-        self.locations = np.full(n if self._locator else 0, -1, np.int8)
-        self.is_within = np.zeros(rows, np.bool_)
+            self._locator = posed_locator(solid, pose).chosen(len(points), budget)
 
     def fill(self, start: int, stop: int, budget: Budget) -> None:
         """Fill the answers start .. stop - 1."""
-        distance = self.answers.distance
+        places = None
         if self._locator is not None:
-            places = self.locations[start:stop]
+            places = np.full(stop - start, -1, np.int8)
             self.n_exact += self._locator.fill(self.points[start:stop], places, budget).rational
-            if not self.answers.is_named:
-                distance[start:stop][places == 0] = 0.0
-            if self._stops_inside:
-                distance[start:stop][places > 0] = 0.0
-                if self.answers.is_named:
-                    self.answers.feet[start:stop][places > 0] = self.points[start:stop][places > 0]
-                    self.is_within[start:stop] = places > 0
-        self.n_exact += self.measure.fill(self.points, start, stop, self.answers, self.limit, budget)
-        if self.is_signed:
-            distance[start:stop][self.locations[start:stop] > 0] *= -1.0
+        self.n_exact += _fill(
+            self.measure, self.points, (start, stop), self.answers, self.limit, places, self._stops_inside,
+            self.is_signed, budget,
+        )  # fmt: skip
 
     def result(self) -> Any:
         """Return the answers, once all are filled."""
-        if self.limit is not None:
-            return self._as_given(self.answers.distance == 0.0)
-        if not self.is_named:
-            return self._as_given(self.answers.distance)
-        rows = np.flatnonzero(~self.is_within)
-        n = len(self.points)
-        face, kind, index = np.full(n, -1), np.full(n, NOWHERE, np.int8), np.full((n, 2), -1)
-        face[rows], kind[rows], index[rows] = self.measure.features(self.answers.codes[rows])
-        return Distances(*map(self._as_given, (self.answers.distance, self.answers.feet, face, kind, index)))
-
-    def _as_given(self, rows: Any) -> Any:
-        """Return rows in the order in which the points were given."""
-        if self._order is None:
-            return rows
-        result = np.empty_like(rows)
-        result[self._order] = rows
-        return result
+        columns = _result(self.measure, self.answers, self.limit)
+        if self._order is not None:
+            given = [np.empty_like(column) for column in columns]
+            for column, rows in zip(columns, given):
+                rows[self._order] = column
+            columns = tuple(given)
+        return columns[0] if len(columns) == 1 else Distances(*columns)
 
 
 Result: TypeAlias = FloatArray | BoolArray | Distances
@@ -261,8 +286,8 @@ def distances(
     >>> distances([[3, 1, 1], [5, 6, 1]], box, within=1).tolist()
     [True, False]
     """
-    if pose is None and report is False and nearest is False and is_unlimited(workers, deadline, cancel, progress):
-        few = _few(points, solid, to, signed, within)
+    if pose is None and report is False and is_unlimited(workers, deadline, cancel, progress):
+        few = _few(points, solid, to, signed, within, nearest)
         if few is not None:
             return few
     check_options(workers, progress, report=report, signed=signed, nearest=nearest)
@@ -294,34 +319,26 @@ def distances(
     )
 
 
-def _few(points: Any, solid: Any, to: Any, signed: Any, within: Any) -> FloatArray | BoolArray | None:
+def _few(points: Any, solid: Any, to: Any, signed: Any, within: Any, nearest: Any) -> Result | None:
     """Return the answer for few points and a solid whose measure is there, without a budget and chunks; None where the
     general path has to answer."""
     measure = solid.cached("measure") if isinstance(solid, Solid) else None
-    if measure is None or not (signed is False or signed is True) or not isinstance(to, str) or to not in _TO:
+    if measure is None or type(signed) is not bool or type(nearest) is not bool or not isinstance(to, str):
         return None
-    if within is not None and (signed or type(within) is not float or not 0.0 <= within < np.inf):
+    if within is not None and (signed or nearest or type(within) is not float or not 0.0 <= within < np.inf):
         return None
     array: Any = points if is_ready(points, solid.dimension) else as_points(points, solid.dimension)
-    n, locations = len(array), None
-    if not 0 < n <= SMALL_BATCH:
+    located, is_solid = None, to == "solid"
+    if not 0 < len(array) <= SMALL_BATCH or not (is_solid or to == "boundary"):
         return None
-    distance = np.empty(n)
-    distance.fill(np.nan)
-    if (signed or to == "solid") and has_inside(solid):
+    if (signed or is_solid) and has_inside(solid):
         located = locate_small_batch(array, solid)
-        if located is None:
-            return None
-        locations = located[0]
-        distance[locations == 0 if signed else locations >= 0] = 0.0
-    elif signed:
+    if located is None and (signed or (is_solid and has_inside(solid))):
         return None
-    measure.fill(array, 0, n, Answers(distance, _NO_FEET, _NO_CODES), within, UNLIMITED)
-    if within is not None:
-        return distance == 0.0
-    if signed and locations is not None:
-        distance[locations > 0] *= -1.0
-    return distance
+    answers, places = _new_answers(array, nearest), None if located is None else located[0]
+    _fill(measure, array, (0, len(array)), answers, within, places, is_solid and not signed, signed, UNLIMITED)
+    columns = _result(measure, answers, within)
+    return columns[0] if len(columns) == 1 else Distances(*columns)
 
 
 def _lines_or_solid(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""How far points are from one solid: by the search over its triangles, or exactly by formulas of a ball and planes.
+"""How far points are from one solid: what a measure is, and that of triangles, by the search over them.
 
 A measure fills the distances of a batch; it does not ask on which side of the boundary a point lies.
 """
@@ -6,30 +6,24 @@ A measure fills the distances of a batch; it does not ask on which side of the b
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
 from fractions import Fraction
-from itertools import combinations
 from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from engine.collision.exact_images import image_half_space, image_point
 from engine.collision.meshes.mesh_arrays import STILL, MeshBody, mesh_body_of_triangles
 from engine.collision.meshes.near_triangles import FACE
-from engine.compiling.jit import entry_of
+from engine.compiling.jit import entry_of, kernel
 from engine.distance.exact import ScaledGap
-from engine.distance.point_formulas import fill_from_ball, fill_from_planes
 from engine.distance.point_search import Goal, PointRoom, find_nearest_on_mesh, new_point_room
 from engine.distance.spreads import SpreadPair, feature_of, in_space, spread_of
 from engine.distance.traversal import BEYOND, DONE
-from engine.errors import EmptyGeometryError, NotRepresentableError
-from engine.predicates.rational import dot, nearest_with_root
-from engine.running.budget import Budget, poll
+from engine.running.budget import Budget
 from engine.solids.base import Preparing, Solid
 from engine.solids.checks import check_finite
 from engine.solids.mesh import Mesh
 from engine.solids.pose import Pose
-from engine.solids.primitives import Convex, HalfSpace, Sphere, Triangle
+from engine.solids.primitives import Sphere, Triangle
 from engine.types import FloatArray, Int8Array, IntArray, read_only
 
 VERTEX, EDGE, WITHIN_FACE, OTHER, NOWHERE = range(5)
@@ -42,17 +36,21 @@ _MANY: Final = 4096
 
 class Answers(NamedTuple):
     """The arrays that a measure fills. distance (n,): NaN where it is wanted; with a limit 0.0 within it, infinity
-    beyond. If nearest points are wanted, feet (n, d), codes (n, 2), what of the solid is there, as the measure has it;
-    else without rows."""
+    beyond. If nearest points are wanted, feet (n, d), codes (n, 2), what of the solid is there, as the measure has it,
+    -1 where nothing is; else without rows. is_named: whether they are."""
 
     distance: FloatArray
     feet: FloatArray
     codes: IntArray
+    is_named: bool
 
-    @property
-    def is_named(self) -> bool:
-        """Whether the nearest points are wanted."""
-        return len(self.feet) > 0
+
+class Features(NamedTuple):
+    """What nearest points lie on: face (n,) and numbers (n, 2), filled with -1, kind (n,) with NOWHERE."""
+
+    face: IntArray
+    kind: Int8Array
+    numbers: IntArray
 
 
 class Measure(Protocol):
@@ -66,8 +64,8 @@ class Measure(Protocol):
     def order(self, points: FloatArray) -> IntArray | None:
         """Return an order of points (n, d) in which they are answered sooner, None for as they are."""
 
-    def features(self, codes: IntArray) -> tuple[IntArray, Int8Array, IntArray]:
-        """Return faces (n,), kinds (n,) and the indices (n, 2) of features, -1 where there are none."""
+    def name(self, codes: IntArray, features: Features) -> None:
+        """Fill the features with codes (n, 2), but for rows whose second code is -1."""
 
 
 class Lines(Preparing):
@@ -210,25 +208,35 @@ class TriangleMeasure:
             d = self.solid.dimension
             answers.codes[item], answers.feet[item] = (triangle, gap.gap.first), gap.ends()[0][:d]
 
-    def features(self, codes: IntArray) -> tuple[IntArray, Int8Array, IntArray]:
-        """As `Measure.features`; codes: triangles and codes of features."""
-        n, faces = len(codes), self.body.faces[codes[:, 0]]
-        kinds, indices = np.empty(n, np.int8), np.full((n, 2), -1)
-        rows, code = np.arange(n), codes[:, 1]
-        is_face = code == FACE
-        kinds[is_face], indices[is_face, 0] = WITHIN_FACE, faces[is_face]
-        table = _corner_names(self.solid, self.body)
-        if table is None:
-            for row in np.flatnonzero(~is_face).tolist():
-                kind, numbers = feature_of(self.solid, self.body, int(codes[row, 0]), int(code[row]))
-                kinds[row], indices[row, : len(numbers)] = KINDS.index(kind), numbers
-            return faces, kinds, indices
-        ends = np.stack([table[codes[:, 0], code % 3], table[codes[:, 0], (code + 1) % 3]], axis=1)
-        is_edge = (code >= 3) & ~is_face & (ends[:, 0] != ends[:, 1])
-        kinds[is_edge], indices[is_edge] = EDGE, np.sort(ends[is_edge], axis=1)
-        is_vertex = ~is_face & ~is_edge
-        kinds[is_vertex], indices[rows[is_vertex], 0] = VERTEX, ends[is_vertex, 0]
-        return faces, kinds, indices
+    def name(self, codes: IntArray, features: Features) -> None:
+        """As `Measure.name`; codes: triangles and codes of features."""
+        corners = _corner_names(self.solid, self.body)
+        if corners is not None:
+            entry_of(fill_features)(codes, self.body.faces, corners, features)
+            return
+        for row in np.flatnonzero(codes[:, 1] >= 0).tolist():
+            triangle, code = codes[row].tolist()
+            kind, numbers = feature_of(self.solid, self.body, triangle, code)
+            features.face[row], features.kind[row] = self.body.faces[triangle], KINDS.index(kind)
+            features.numbers[row, : len(numbers)] = numbers
+
+
+@kernel
+def fill_features(codes: IntArray, faces: IntArray, corners: IntArray, features: Features) -> None:
+    """Fill features with codes (n, 2), but for rows whose second code is -1. faces (m,), corners (m, 3): by triangle
+    the caller's numbers; an edge between two corners of one number is a vertex."""
+    for row in range(codes.shape[0]):
+        triangle, code = codes[row]
+        if code < 0:
+            continue
+        features.face[row] = faces[triangle]
+        i, j = corners[triangle, code % 3], corners[triangle, (code + 1) % 3]
+        if code == FACE:
+            features.kind[row], features.numbers[row, 0] = WITHIN_FACE, faces[triangle]
+        elif code < 3 or i == j:
+            features.kind[row], features.numbers[row, 0] = VERTEX, i
+        else:
+            features.kind[row], features.numbers[row, 0], features.numbers[row, 1] = EDGE, min(i, j), max(i, j)
 
 
 def _corner_names(solid: Any, body: MeshBody) -> IntArray | None:
@@ -242,163 +250,5 @@ def _corner_names(solid: Any, body: MeshBody) -> IntArray | None:
         numbers = np.arange(3)[None]
     else:
         return None
-    return np.asarray(solid.prepared("corner_names", lambda: numbers[body.faces]))
-
-
-class Rooted(NamedTuple):
-    """The number a + b sqrt(s), exact; s >= 0."""
-
-    a: Fraction
-    b: Fraction
-    s: Fraction
-
-    def rounded(self) -> float:
-        """Return the nearest double. Raises: NotRepresentableError beyond the largest."""
-        (p, q), w = self.a.as_integer_ratio(), self.s.numerator * self.s.denominator  # sqrt(s) = sqrt(w) / denominator
-        b = self.b / self.s.denominator
-        try:
-            return nearest_with_root(p * b.denominator, b.numerator * q, w, q * b.denominator) + 0.0
-        except OverflowError:
-            raise NotRepresentableError(
-                "a distance is beyond the largest double, 1.8e308; scale the scene down by a power of two", ("points",)
-            ) from None
-
-    def is_at_most(self, most: Fraction) -> bool:
-        """Return whether the number is at most `most`."""
-        rest, square = most - self.a, self.b * self.b * self.s
-        if self.b < 0:
-            return rest >= 0 or square >= rest * rest
-        return rest >= 0 and square <= rest * rest
-
-
-Vector = Sequence[Fraction]
-
-
-class _ByFormula:
-    """Base of the measures of balls and planes: each point in rational arithmetic."""
-
-    kernels: tuple[Any, ...] = ()
-    """A kernel that decides most distances, with its arguments between span and limit."""
-
-    def order(self, _: FloatArray) -> None:
-        """As `Measure.order`."""
-
-    def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
-        """Return the distance of a point from the boundary or, outside, from the solid, its nearest point there, and
-        the number of a plane, -1 for none."""
-        raise NotImplementedError
-
-    def fill(
-        self, points: FloatArray, start: int, stop: int, answers: Answers, limit: float | None, budget: Budget
-    ) -> int:
-        """As `Measure.fill`."""
-        if not answers.is_named:
-            most = np.inf if limit is None else limit
-            for kernel, *numbers in self.kernels:
-                entry_of(kernel)(points, (start, stop), *numbers, most, answers.distance, budget.flag)
-                budget.check()
-        left = (start + np.flatnonzero(np.isnan(answers.distance[start:stop]))).tolist()
-        if left:
-            check_finite(points, ("points",))
-        for item in left:
-            budget.check()
-            value, foot, plane = self.measured([Fraction(x) for x in points[item].tolist()])
-            if limit is not None:
-                answers.distance[item] = 0.0 if value.is_at_most(Fraction(limit)) else np.inf
-                continue
-            answers.distance[item] = value.rounded() or (0.0 if value.is_at_most(_ZERO) else 5e-324)
-            if answers.is_named:
-                answers.feet[item], answers.codes[item] = [x.rounded() for x in foot], (plane, 0)
-        return len(left)
-
-    def features(self, codes: IntArray) -> tuple[IntArray, Int8Array, IntArray]:
-        """As `Measure.features`: the number of the plane as the face."""
-        return codes[:, 0].copy(), np.full(len(codes), OTHER, np.int8), np.full((len(codes), 2), -1)
-
-
-_ZERO, _ONE = Fraction(0), Fraction(1)
-
-
-class BallMeasure(_ByFormula):
-    """Distances from the surface of a ball, whose radius a pose keeps; of its centre the nearest point is that in the
-    direction of the first axis."""
-
-    def __init__(self, solid: Sphere, pose: Pose | None) -> None:
-        self.centre, self.radius = image_point(solid.center.tolist(), pose), Fraction(float(solid.radius))
-        if pose is None:
-            self.kernels = ((fill_from_ball, solid.center, float(solid.radius)),)
-
-    def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
-        """As `_ByFormula.measured`: |sqrt(s) - r|, and c + (q - c) r / sqrt(s)."""
-        way = [x - c for x, c in zip(point, self.centre)]
-        s, r = sum((x * x for x in way), _ZERO), self.radius
-        if s == 0:
-            foot = [Rooted(c + (r if axis == 0 else 0), _ZERO, _ONE) for axis, c in enumerate(self.centre)]
-            return Rooted(r, _ZERO, _ONE), foot, -1
-        sign = 1 if s >= r * r else -1
-        return Rooted(-sign * r, _ONE * sign, s), [Rooted(c, x * r / s, s) for c, x in zip(self.centre, way)], -1
-
-
-class PlanesMeasure(_ByFormula):
-    """Distances from a half-space, or from an intersection of half-spaces.
-
-    Within it the nearest plane is that with the least |h| / |n|: the largest ball about the point that lies in all
-    half-spaces lies in the solid. Outside the nearest point p is the only one of the solid with q - p a sum of outward
-    normals of planes through p with weights that are not negative (Karush, Kuhn, Tucker): all sets of at most d planes
-    are tried, in floats first.
-    """
-
-    def __init__(self, solid: HalfSpace | Convex, pose: Pose | None) -> None:
-        rows = [solid] if isinstance(solid, HalfSpace) else [HalfSpace(r[:-1], r[-1]) for r in solid.planes.tolist()]
-        self.rows = [image_half_space(row, pose) for row in rows]
-        self.d = solid.dimension
-        if pose is None:
-            own = solid.row[None] if isinstance(solid, HalfSpace) else solid.planes
-            self.kernels = ((fill_from_planes, read_only(own)),)
-
-    def measured(self, point: Vector) -> tuple[Rooted, list[Rooted], int]:
-        """As `_ByFormula.measured`."""
-        heights = [(dot(n, point) + offset, dot(n, n)) for n, offset in self.rows]
-        if all(h >= 0 for h, _ in heights):
-            squares = [h * h / size for h, size in heights]
-            plane = min(range(len(squares)), key=squares.__getitem__)
-            h, size = heights[plane]
-            foot = [x - h / size * y for x, y in zip(point, self.rows[plane][0])]
-            return Rooted(_ZERO, _ONE, squares[plane]), [Rooted(x, _ZERO, _ONE) for x in foot], plane
-        below = [k for k, (h, _) in enumerate(heights) if h < 0]
-        for n_planes in range(1, self.d + 1):
-            for some in combinations(range(len(self.rows)), n_planes):
-                poll()
-                if not any(k in below for k in some):
-                    continue
-                foot_ = self._foot(point, some, heights)
-                if foot_ is not None:
-                    s = sum(((x - y) ** 2 for x, y in zip(point, foot_)), _ZERO)
-                    return Rooted(_ZERO, _ONE, s), [Rooted(x, _ZERO, _ONE) for x in foot_], some[0]
-        raise EmptyGeometryError("solid has no point to be near: its half-spaces have none in common", ("solid",))
-
-    def _foot(
-        self, point: Vector, some: Sequence[int], heights: Sequence[tuple[Fraction, Fraction]]
-    ) -> list[Fraction] | None:
-        """Return the foot of a point on the planes `some`, if it is the nearest point of the solid."""
-        normals = [self.rows[k][0] for k in some]
-        weights = _solved([[dot(a, b) for b in normals] for a in normals], [-heights[k][0] for k in some])
-        if weights is None or min(weights) < 0:
-            return None
-        foot = [x + sum((w * n[axis] for w, n in zip(weights, normals)), _ZERO) for axis, x in enumerate(point)]
-        return foot if all(dot(n, foot) + offset >= 0 for n, offset in self.rows) else None
-
-
-def _solved(matrix: list[list[Fraction]], right: list[Fraction]) -> list[Fraction] | None:
-    """Return the solution of a symmetric system of one to three equations, None if it is singular."""
-    rows = [[*row, value] for row, value in zip(matrix, right)]
-    for k in range(len(rows)):
-        pivot = next((i for i in range(k, len(rows)) if rows[i][k] != 0), None)
-        if pivot is None:
-            return None
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(len(rows)):
-            if i != k:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k])]
-    return [row[-1] for row in rows]
+    names: IntArray = solid.prepared("corner_names", lambda: read_only(numbers[body.faces]))
+    return names
