@@ -30,9 +30,13 @@ from engine.types import OPEN, Accuracy, BoolArray, FlagArray, FloatArray, Int8A
 
 Keep = Literal["all", "first", "any"]
 _KEEPS: Final = {"all": ALL, "first": FIRST, "any": ANY}
+_FEW: Final = 256
+"""Lines that are searched for at once, without a measure of time."""
 _ROOM: Final = 128
 _BYTES: Final = 400
 """Memory counted for a hit, in its part and joined."""
+_NO_LINES: Final = read_only(np.zeros((0, 2, 3)))
+_NO_BLURS: Final = read_only(np.zeros(0))
 NO_FRAME: Final = read_only(np.zeros((0, 7)))
 
 
@@ -45,8 +49,10 @@ class Lines(NamedTuple):
     is_ray: bool
     exact: Callable[[int], tuple[Any, Any]]
 
-    def part(self, rows: Any) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-        """Return what kernels read of some of the lines."""
+    def part(self, rows: Any = None) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+        """Return what kernels read of some of the lines, of all for None."""
+        if rows is None:
+            return self.rows, self.tails, self.blurs, self.is_ray
         placed = rows if len(self.tails) else slice(None)
         return read_only(self.rows[rows]), read_only(self.tails[placed]), read_only(self.blurs[placed]), self.is_ray
 
@@ -224,7 +230,7 @@ def plain_lines(lines: FloatArray, is_ray: bool) -> Lines:
         p, q = lines[item].tolist()
         return p, q if is_ray else [Fraction(y) - Fraction(x) for x, y in zip(p, q)]
 
-    return Lines(lines, lines[:0], np.zeros(0), is_ray, exact)
+    return Lines(lines, _NO_LINES, _NO_BLURS, is_ray, exact)
 
 
 def search(
@@ -243,19 +249,27 @@ def search(
                 np.empty(m, np.int64), np.empty(m), np.empty(m, np.int64), np.empty(m, np.int8), np.empty((m, 3))
             )
             entry_of(find_hits)(
-                *(array[first:last] for array in arrays), is_ray, target.mesh, target.rims, keep, room, budget.flag,
-                out, state[first:last], reached,
+                *(arrays if last - first == n else [array[first:last] for array in arrays]), is_ray, target.mesh,
+                target.rims, keep, room, budget.flag, out, state[first:last], reached,
             )  # fmt: skip
             budget.check()
-            budget.take(_BYTES * int(reached[1]))
-            parts[first].append(Rows(*(column[: reached[1]] for column in out)))
-            parts[first][-1].source[:] += first
+            rows = int(reached[1])
+            budget.take(_BYTES * rows)
+            part = Rows(out.source[:rows], out.t[:rows], out.triangle[:rows], out.kind[:rows], out.barycentric[:rows])
+            if first:
+                part.source[:] += first
+            parts[first].append(part)
             room *= 2 if reached[0] == before else 1
 
-    run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=256)
+    if 0 < n <= _FEW and progress is None:
+        task(0, n)
+    else:
+        run_chunks(task, n, budget=budget, workers=workers, progress=progress, first_chunk=_FEW)
     every = [part for first in sorted(parts) for part in parts[first]]
-    none = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int8), np.zeros((0, 3))
-    return Rows(*join_columns(every or [Rows(*none)], budget, workers)), state
+    if not every:
+        none = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.int8), np.zeros((0, 3))
+        return Rows(*none), state
+    return Rows(*join_columns(every, budget, workers)), state
 
 
 def find(
@@ -263,7 +277,7 @@ def find(
 ) -> tuple[Any, IntArray]:
     """Return (source, t, t_end, triangle, kind, barycentric), with ANY bools, and the lines that took the exact
     fallback."""
-    columns, state = search(lines.part(slice(None)), target, keep, budget, workers, progress)
+    columns, state = search(lines.part(), target, keep, budget, workers, progress)
     left = np.flatnonzero(state == OPEN)
     exact = exact_on(lines, left, target, budget) if len(left) else {}
     if keep == ANY:
@@ -312,7 +326,8 @@ def with_faces(
     """Return hits with the faces of their triangles and their unit normals (m, 3), of which rows of NaN are computed
     exactly. image: of the corners of a triangle."""
     source, t, t_end, triangle, kind, barycentric = columns
-    for each in {*triangle[np.isnan(normal[:, 0])].tolist()}:
+    are_open = np.isnan(normal[:, 0])
+    for each in {*triangle[are_open].tolist()} if are_open.any() else ():
         budget.check()
         normal[triangle == each] = exact_normal(image(target.mesh.elements[each].tolist()))
     return Hits(source, t, t_end, target.mesh.faces[triangle], triangle, kind, barycentric, normal)
