@@ -17,6 +17,8 @@ detected by `make`. The kinds, their subjects, items and answers:
     polygon areas     Aabb of the plane       (n, size, 2)                area of what is left
     pair              a couple                None                        bool: a common point
     poses             Pair                    rows of its poses           bool
+    point distances   Mesh                    points                      distances from its surface
+    points within     (Mesh, distance)        points                      bool: at most so far from its surface
     clearance poses   Pair                    rows of its poses           distances
     clearance pairs   None                    couples                     distances, NaN refused, infinite not taken
     crowd             Crowd                   frames of poses             first * n_bodies + second, sorted

@@ -1,14 +1,15 @@
-"""libigl: fast winding numbers, and meshes that meet by its copyleft CGAL part."""
+"""libigl: fast winding numbers, distances by its tree of boxes, and meshes that meet by its copyleft CGAL part."""
 
 from __future__ import annotations
 
 import igl
+import numpy as np
 
 from benchmarks.contenders import Couple, Prepared, meshes_of
 from benchmarks.workloads import Mesh
 
 PACKAGE = "libigl"
-NAMES = {"": "libigl", "points": "libigl winding number"}
+NAMES = {"": "libigl", "points": "libigl winding number", "point distances": "libigl AABB tree"}
 
 
 def _points(mesh: Mesh, threads: int) -> Prepared:
@@ -24,4 +25,15 @@ def _pair(pair: Couple, threads: int) -> Prepared:
     )
 
 
-MAKERS = {"points": _points, "pair": _pair}
+def _distances(mesh: Mesh, threads: int) -> Prepared:
+    tree = igl.AABB()
+    tree.init(mesh.vertices, mesh.faces)
+    return Prepared(lambda points: np.sqrt(tree.squared_distance(mesh.vertices, mesh.faces, points)[0]))
+
+
+def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
+    prepared = _distances(asked[0], threads)
+    return Prepared(prepared.ask, answer=lambda result: result <= asked[1])
+
+
+MAKERS = {"points": _points, "pair": _pair, "point distances": _distances, "points within": _within}

@@ -100,6 +100,22 @@ def _pair(pair: Couple, threads: int) -> Prepared:
     return Prepared(lambda _: first.is_intersecting(second))
 
 
-MAKERS = {"points": _points, "scene": _scene, "pair": _pair} | {
+def _distances(mesh: Mesh, threads: int) -> Prepared:
+    scene = _scene_of(mesh, threads)
+    return Prepared(
+        lambda points: scene.compute_distance(points, nthreads=threads),
+        lambda points: Tensor(points.astype(np.float32)),
+        lambda result: result.numpy().astype(float),
+    )
+
+
+def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
+    prepared = _distances(asked[0], threads)
+    return Prepared(prepared.ask, prepared.native, lambda result: result.numpy() <= asked[1])
+
+
+MAKERS = {
+    "points": _points, "scene": _scene, "pair": _pair, "point distances": _distances, "points within": _within,
+} | {
     f"scene {keep}": _through(keep) for keep in ("all", "first", "any")
-}
+}  # fmt: skip

@@ -156,6 +156,11 @@ def _clearance_poses(pair: Pair, threads: int) -> Prepared:
     )
 
 
+def _distances(mesh: Mesh, threads: int, **options: Any) -> Prepared:
+    solid = solid_of(mesh)
+    return Prepared(lambda points: engine.distances(points, solid, to="boundary", workers=threads, **options))
+
+
 def _tree(mesh: Mesh, threads: int) -> Prepared:
     """From arrays to the answer of a first question with nothing near: constructor and tree."""
     far = engine.Surface([[9, 9, 9], [9, 9, 9.5], [9, 9.5, 9]], [[0, 1, 2]])
@@ -270,6 +275,8 @@ MAKERS = {
     "witnesses": lambda pair, threads: _poses(pair, threads, witnesses=True),
     "detail": lambda pair, threads: _poses(pair, threads, detail=True),
     "relations": lambda pair, threads: _poses(pair, threads, boolean=False),
+    "point distances": _distances,
+    "points within": lambda asked, threads: _distances(asked[0], threads, within=asked[1]),
     "clearance poses": _clearance_poses,
     "clearance pairs": lambda _, threads: each_alone(_bodies_of, lambda made: engine.clearance(*made).distance),
     "tree": _tree, "crowd": _crowd, "overlay": _overlay, "overlay of made": _overlay_of_made,

@@ -80,7 +80,18 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(ask, native, lambda result: None)
 
 
+def _distances(mesh: Mesh, threads: int) -> Prepared:
+    made = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    return Prepared(lambda points: trimesh.proximity.closest_point(made, points)[1])
+
+
+def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
+    prepared = _distances(asked[0], threads)
+    return Prepared(prepared.ask, answer=lambda result: result <= asked[1])
+
+
 MAKERS = {
+    "point distances": _distances, "points within": _within,
     "points": _points, "hits": _hits, "pieces": _pieces, "kept polygons": _kept_polygons, "scene all": _through,
     "scene any": lambda bodies, threads: _hits(merged(bodies)[0], threads),
 }  # fmt: skip

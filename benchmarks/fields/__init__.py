@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.contest import Size, Task
 
-FIELDS = ("containment", "collision", "clearance", "segments", "scenes", "polygons", "overlay", "calls")
+FIELDS = ("containment", "collision", "clearance", "distances", "segments", "scenes", "polygons", "overlay", "calls")
 
 
 @dataclass(slots=True)

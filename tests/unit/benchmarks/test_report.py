@@ -81,7 +81,7 @@ def test_every_judge_of_numbers_tells_what_the_page_shows() -> None:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("field", ["clearance", "polygons", "segments"])
+@pytest.mark.parametrize("field", ["clearance", "distances", "polygons", "segments"])
 def test_ours_has_no_wrong_answer(field: str) -> None:
     for task in tasks(Size(0, 0.01), (field,), is_page=True):
         each = task.make()
