@@ -211,6 +211,19 @@ def test_of_convex_solids_as_of_the_box_they_are() -> None:
         engine.distances(points, engine.Convex([[1, 0, 0, -1], [-1, 0, 0, -1]]))
 
 
+def test_a_distant_point_sees_no_unused_lane() -> None:
+    """The blocks of 11 triangles are not full: what fills them up lies nearer to some point than any triangle."""
+    fan = engine.Surface(
+        [[0, 0, 0], *([np.cos(k), np.sin(k), 0.1 * k] for k in range(12))], [[0, k, k + 1] for k in range(1, 12)]
+    )
+    ways = np.array([[x, y, z] for x in (-1.0, 0.5, 1.0) for y in (-1.0, 0.5, 1.0) for z in (-2.0, 0.0, 1.0)])
+    for size in (3e3, 1e9):
+        told = engine.distances(size * ways, fan)
+        least = np.linalg.norm(size * ways[:, None] - fan.vertices, axis=2).min(axis=1)
+        assert (told <= least * (1.0 + 1e-12)).all()
+        assert (told >= least - 2.0).all()
+
+
 def test_many_ties_are_one_feature() -> None:
     """Around the apex of a fan all triangles are as near: their vertex is, and the least face is named."""
     angles = np.linspace(0, 2 * np.pi, 3000, endpoint=False)
