@@ -37,8 +37,8 @@ from engine.files.solids import (
     write_mesh,
     write_table,
 )
-from engine.layers.feature_joins import clip_features, join_features
-from engine.layers.features import dissolve_features, locate_features, overlay_features
+from engine.layers.feature_joins import join_features, locate_features
+from engine.layers.features import clip_features, dissolve_features, overlay_features
 from engine.layers.relate import PREDICATES
 from engine.layers.rows import HOWS
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons

@@ -1,8 +1,8 @@
 """Layers: points, lines and polygons with attributes, as maps have them; GeoDataFrames, and GeoJSON for HTTP, files."""
 
-from engine.layers.feature_joins import clip_features, join_features
+from engine.layers.feature_joins import join_features, locate_features
 from engine.layers.feature_rows import FeatureRows
-from engine.layers.features import dissolve_features, locate_features, overlay_features
+from engine.layers.features import clip_features, dissolve_features, overlay_features
 from engine.layers.frame_joins import sjoin, sjoin_nearest
 from engine.layers.frames import clip, dissolve, overlay
 from engine.layers.geojson import polygon_of

@@ -1,101 +1,34 @@
-"""Clips and joins of layers as GeoJSON, for HTTP and the command line."""
+"""Joins of layers as GeoJSON, for HTTP and the command line."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, overload
+from collections.abc import Callable
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.layers.feature_rows import ROW, FeatureRows, with_geometries
+from engine.errors import CancelledError, DeadlineExceededError, EngineError
+from engine.layers.feature_rows import ROW, FeatureRows
 from engine.layers.features import Answer
-from engine.layers.geojson import EVERY, collection_of, crs_of, members_of, mixed_of, texts_of
+from engine.layers.geojson import (
+    EVERY,
+    Collection,
+    check_each,
+    collection_of,
+    crs_of,
+    members_of,
+    mixed_of,
+    polygons_of,
+    texts_of,
+)
 from engine.layers.joins import check_predicate, related_pairs
-from engine.layers.limits import Limits
-from engine.layers.path_rows import clip_mixed
-from engine.layers.rows import NONE
+from engine.layers.limits import Limits, TimeOptions
+from engine.layers.rows import NONE, locate_points_in_layer, with_unmatched
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
+from engine.solids.checks import as_points
 from engine.solids.ragged import summed
-from engine.types import Accuracy, read_only
-
-
-@overload
-def clip_features(
-    layer: Any,
-    mask: Any,
-    *,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[False] = False,
-) -> FeatureRows: ...
-@overload
-def clip_features(
-    layer: Any,
-    mask: Any,
-    *,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[True],
-) -> tuple[FeatureRows, Accuracy]: ...
-def clip_features(
-    layer: Any, mask: Any, *, grid: float | None = None, deadline: float | None = None, cancel: Cancel | None = None,
-    report: bool = False,
-) -> Answer:  # fmt: skip
-    """Cut the features of a FeatureCollection to the union of some polygons.
-
-    Parameters
-    ----------
-    layer, mask : dict
-        GeoJSON FeatureCollections, the mask of polygons.
-    grid : float, optional
-        As for `engine.layers.overlay`.
-    deadline, cancel, report
-        As for `engine.locate`.
-
-    Returns
-    -------
-    FeatureRows
-        With ``report=True`` a pair of it and an `Accuracy`.
-
-    Raises
-    ------
-    EngineError
-        As `engine.layers.overlay`, with the path to the element at fault and its id.
-
-    Notes
-    -----
-    Boundary, accuracy and cost: as `engine.layers.clip`; of a polygon that only touches the mask there is no row.
-
-    References
-    ----------
-    RFC 7946 (GeoJSON).
-
-    Examples
-    --------
-    >>> from engine import layers
-    >>> def collection(kind, coordinates):
-    ...     geometry = {"type": kind, "coordinates": coordinates}
-    ...     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
-    ...     return {"type": "FeatureCollection", "features": [feature]}
-    >>> triangle = collection("Polygon", [[[0, 0], [2, 0], [0, 2], [0, 0]]])
-    >>> rows = layers.clip_features(collection("LineString", [[0, 1], [9, 1]]), triangle)
-    >>> rows.make(0, 1)[0]["geometry"]["coordinates"]
-    [[0.0, 1.0], [1.0, 1.0]]
-    """
-    check_options(None, None, report=report)
-    limits = Limits(deadline, cancel, grid=grid)
-    side = collection_of(layer, ("layer",), limits, EVERY)
-    region = collection_of(mask, ("mask",), limits)
-    nothing = collection_of({"type": "FeatureCollection", "features": []}, ("mask",), limits)
-    crs = crs_of([side, region], limits)
-    write_members, n_bytes = members_of([side, nothing], ("layer", "mask"), limits)
-    features, mask = mixed_of(side, limits), mixed_of(region, limits)
-    rows = clip_mixed(features, mask, limits, frozenset(features.dims.tolist()) - {-1}, False)
-    none = np.full(len(rows), NONE)
-    made = with_geometries(rows, lambda row: write_members(int(rows.left[row]), NONE), n_bytes(rows.left, none), crs)
-    return (made, limits.accuracy) if report else made
+from engine.types import Accuracy, IntArray, read_only
 
 
 @overload
@@ -106,9 +39,8 @@ def join_features(
     *,
     distance: float | None = None,
     outside: bool = False,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
     report: Literal[False] = False,
+    **options: Unpack[TimeOptions],
 ) -> FeatureRows: ...
 @overload
 def join_features(
@@ -118,9 +50,8 @@ def join_features(
     *,
     distance: float | None = None,
     outside: bool = False,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
     report: Literal[True],
+    **options: Unpack[TimeOptions],
 ) -> tuple[FeatureRows, Accuracy]: ...
 def join_features(
     left: Any, right: Any, predicate: str = "intersects", *, distance: float | None = None, outside: bool = False,
@@ -160,32 +91,111 @@ def join_features(
 
     Examples
     --------
-    >>> from engine import layers
-    >>> def collection(kind, coordinates):
-    ...     geometry = {"type": kind, "coordinates": coordinates}
-    ...     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
-    ...     return {"type": "FeatureCollection", "features": [feature]}
-    >>> triangle = collection("Polygon", [[[0, 0], [2, 0], [0, 2], [0, 0]]])
-    >>> len(layers.join_features(collection("LineString", [[0, 1], [9, 1]]), triangle, "crosses"))
+    >>> from engine import layers, read_layer
+    >>> triangle = read_layer(b'{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [0, 2], [0, 0]]]}')
+    >>> line = read_layer(b'{"type": "LineString", "coordinates": [[0, 1], [9, 1]]}')
+    >>> len(layers.join_features(line, triangle, "crosses"))
     1
     """
     check_options(None, None, report=report, outside=outside)
     reach, limits = check_predicate(predicate, distance), Limits(deadline, cancel)
     sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits, EVERY)]
-    crs = crs_of(sides, limits)
-    geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
-    write_members, n_bytes = members_of(sides, ("left", "right"), limits)
+    write = _writer(sides, ("left", "right"), limits)
     layers = [mixed_of(side, limits) for side in sides]
-    first, second = related_pairs(layers[0], layers[1], predicate, reach, limits).T
-    if outside:
-        alone = np.setdiff1d(np.arange(len(sides[0].features)), first)
-        order = np.argsort(np.concatenate([first, alone]), kind="stable")
-        first = np.concatenate([first, alone])[order]
-        second = np.concatenate([second, np.full(len(alone), NONE)])[order]
-    sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
-    limits.budget().take(8 * 4 * len(first))
-    made = FeatureRows(
-        lambda row: write_members(int(first[row]), int(second[row])), read_only(np.arange(len(first) + 1)),
-        summed(ROW + sizes), crs, geometry=lambda row: geometries[first[row]],
-    )  # fmt: skip
+    made = write(related_pairs(layers[0], layers[1], predicate, reach, limits), outside, None)
     return (made, limits.accuracy) if report else made
+
+
+@overload
+def locate_features(
+    points: Any, polygons: Any, *, outside: bool = False, report: Literal[False] = False, **options: Unpack[TimeOptions]
+) -> FeatureRows: ...
+@overload
+def locate_features(
+    points: Any, polygons: Any, *, outside: bool = False, report: Literal[True], **options: Unpack[TimeOptions]
+) -> tuple[FeatureRows, Accuracy]: ...
+def locate_features(
+    points: Any, polygons: Any, *, outside: bool = False, deadline: float | None = None, cancel: Cancel | None = None,
+    report: bool = False,
+) -> Answer:  # fmt: skip
+    """Join each Point to the polygons that contain it, boundary included.
+
+    Parameters
+    ----------
+    points, polygons : dict
+        GeoJSON FeatureCollections.
+    outside : bool, default False
+        Also a row for a point that no polygon contains.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        A row each, with `boundary`, and the properties of both. With ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`.
+
+    Notes
+    -----
+    Boundary: a point on a border that two polygons share is in both. Exact; cost as `engine.locate_scene`.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers, read_layer
+    >>> triangle = read_layer(b'{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [0, 2], [0, 0]]]}')
+    >>> len(layers.locate_features(read_layer(b'{"type": "Point", "coordinates": [1, 1]}'), triangle))
+    1
+    """
+    check_options(None, None, report=report, outside=outside)
+    limits = Limits(deadline, cancel)
+    sides = [collection_of(points, ("points",), limits, ("Point",)), collection_of(polygons, ("polygons",), limits)]
+    there = [k for k, each in enumerate(sides[0].features) if each.get("geometry") is not None]
+    places = [sides[0].features[k]["geometry"].get("coordinates") for k in there]
+    with limits.budget():
+        try:
+            positions = as_points(places, 2, ("points",))
+        except (DeadlineExceededError, CancelledError):
+            raise
+        except EngineError:
+            positions = check_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
+    write = _writer(sides, ("point", "polygon"), limits)
+    first, second, on_boundary = locate_points_in_layer(positions, polygons_of(sides[1], limits), limits)
+    words = (b',"boundary":false', b',"boundary":true')
+    pairs = np.column_stack([np.array(there, np.int64)[first], second])
+    made = write(pairs, outside, lambda pair: words[int(on_boundary[pair])])
+    return (made, limits.accuracy) if report else made
+
+
+def _writer(
+    sides: list[Collection], names: tuple[str, str], limits: Limits
+) -> Callable[[IntArray, bool, Callable[[int], bytes] | None], FeatureRows]:
+    """Return a function that makes the rows of a join: of pairs (n, 2) of features, with the geometry and the members
+    of the first; outside: also a row for each first feature without one; more: further members of a pair, as JSON."""
+    crs = crs_of(sides if names[0] == "left" else sides[:1], limits)
+    geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
+    write_members, n_bytes = members_of(sides, names, limits)
+
+    def write(pairs: IntArray, outside: bool, more: Callable[[int], bytes] | None) -> FeatureRows:
+        first, second = pairs.T
+        places = np.arange(len(pairs))
+        if outside:
+            first, second, places = with_unmatched(len(sides[0].features), first, second)
+        limits.budget().take(8 * 4 * len(first))
+
+        def members(row: int) -> bytes:
+            text = write_members(int(first[row]), int(second[row]))
+            return text + more(int(places[row])) if more is not None and places[row] != NONE else text
+
+        sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
+        offsets = read_only(np.arange(len(first) + 1))
+        return FeatureRows(members, offsets, summed(ROW + sizes), crs, geometry=lambda row: geometries[first[row]])
+
+    return write

@@ -8,72 +8,37 @@ and `right` are the numbers of these features.
 
 from __future__ import annotations
 
-from typing import Any, Literal, overload
+from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
-from engine.errors import CancelledError, DeadlineExceededError, EngineError, InvalidInputError
-from engine.layers.feature_rows import ROW, FeatureRows, with_geometries
-from engine.layers.geojson import (
-    EVERY,
-    check_each,
-    collection_of,
-    crs_of,
-    groups_of,
-    members_of,
-    mixed_of,
-    polygons_of,
-    texts_of,
-)
+from engine.errors import InvalidInputError
+from engine.layers.feature_rows import FeatureRows, with_geometries
+from engine.layers.geojson import EVERY, collection_of, crs_of, groups_of, members_of, mixed_of, texts_of
 from engine.layers.json_text import text_of
-from engine.layers.limits import Limits
-from engine.layers.path_rows import dissolve_mixed, overlay_mixed
-from engine.layers.rows import (
-    NONE,
-    locate_points_in_layer,
-    with_unmatched_points,
-)
+from engine.layers.limits import GridOptions, Limits, UnionOptions
+from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
+from engine.layers.rows import NONE
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
-from engine.solids.checks import as_points, shown
-from engine.solids.ragged import summed
-from engine.types import Accuracy, read_only
+from engine.solids.checks import shown
+from engine.types import Accuracy
 
 Answer = FeatureRows | tuple[FeatureRows, Accuracy]
 
 
 @overload
 def overlay_features(
-    left: Any,
-    right: Any,
-    how: str = "intersection",
-    *,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[False] = False,
+    left: Any, right: Any, how: str = "intersection", *, report: Literal[False] = False, **options: Unpack[GridOptions]
 ) -> FeatureRows: ...
 @overload
 def overlay_features(
-    left: Any,
-    right: Any,
-    how: str = "intersection",
-    *,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[True],
+    left: Any, right: Any, how: str = "intersection", *, report: Literal[True], **options: Unpack[GridOptions]
 ) -> tuple[FeatureRows, Accuracy]: ...
 def overlay_features(
-    left: Any,
-    right: Any,
-    how: str = "intersection",
-    *,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: bool = False,
-) -> Answer:
+    left: Any, right: Any, how: str = "intersection", *, grid: float | None = None, deadline: float | None = None,
+    cancel: Cancel | None = None, report: bool = False,
+) -> Answer:  # fmt: skip
     """Overlay a FeatureCollection with one of polygons.
 
     Parameters
@@ -108,13 +73,11 @@ def overlay_features(
 
     Examples
     --------
-    >>> from engine import layers
-    >>> def layer(low, high):
-    ...     ring = [[low, low], [high, low], [high, high], [low, high], [low, low]]
-    ...     geometry = {"type": "Polygon", "coordinates": [ring]}
-    ...     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
-    ...     return {"type": "FeatureCollection", "features": [feature]}
-    >>> rows = layers.overlay_features(layer(0, 2), layer(1, 3))
+    >>> from engine import layers, read_layer
+    >>> def square(x, y):
+    ...     ring = [[x, x], [y, x], [y, y], [x, y], [x, x]]
+    ...     return read_layer(('{"type": "Polygon", "coordinates": [%s]}' % ring).encode())
+    >>> rows = layers.overlay_features(square(0, 2), square(1, 3))
     >>> rows.make(0, len(rows))[0]["geometry"]["coordinates"][0].tolist()
     [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0]]
     """
@@ -124,8 +87,7 @@ def overlay_features(
     crs = crs_of(sides, limits)
     write_members, n_bytes = members_of(sides, ("left", "right"), limits)
     layers = [mixed_of(side, limits) for side in sides]
-    kinds = frozenset(layers[0].dims.tolist()) - {-1}
-    rows = overlay_mixed(layers[0], layers[1], how, limits, kinds, False)
+    rows = overlay_mixed(layers[0], layers[1], how, limits, frozenset(layers[0].dims.tolist()) - {-1}, False)
     made = with_geometries(
         rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
     )
@@ -133,37 +95,80 @@ def overlay_features(
 
 
 @overload
+def clip_features(
+    layer: Any, mask: Any, *, report: Literal[False] = False, **options: Unpack[GridOptions]
+) -> FeatureRows: ...
+@overload
+def clip_features(
+    layer: Any, mask: Any, *, report: Literal[True], **options: Unpack[GridOptions]
+) -> tuple[FeatureRows, Accuracy]: ...
+def clip_features(
+    layer: Any, mask: Any, *, grid: float | None = None, deadline: float | None = None, cancel: Cancel | None = None,
+    report: bool = False,
+) -> Answer:  # fmt: skip
+    """Cut the features of a FeatureCollection to the union of some polygons.
+
+    Parameters
+    ----------
+    layer, mask : dict
+        GeoJSON FeatureCollections, the mask of polygons.
+    grid : float, optional
+        As for `engine.layers.overlay`.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        With ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`, with the path to the element at fault and its id.
+
+    Notes
+    -----
+    Boundary, accuracy and cost: as `engine.layers.clip`; of a polygon that only touches the mask there is no row.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers, read_layer
+    >>> triangle = read_layer(b'{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [0, 2], [0, 0]]]}')
+    >>> line = read_layer(b'{"type": "LineString", "coordinates": [[0, 1], [9, 1]]}')
+    >>> rows = layers.clip_features(line, triangle)
+    >>> rows.make(0, 1)[0]["geometry"]["coordinates"]
+    [[0.0, 1.0], [1.0, 1.0]]
+    """
+    check_options(None, None, report=report)
+    limits = Limits(deadline, cancel, grid=grid)
+    sides = [collection_of(layer, ("layer",), limits, EVERY), collection_of(mask, ("mask",), limits)]
+    crs = crs_of(sides, limits)
+    write_members, n_bytes = members_of(sides[:1], ("layer", "mask"), limits)
+    features, region = (mixed_of(side, limits) for side in sides)
+    rows = clip_mixed(features, region, limits, frozenset(features.dims.tolist()) - {-1}, False)
+    made = with_geometries(
+        rows, lambda row: write_members(int(rows.left[row]), NONE), n_bytes(rows.left, np.full(len(rows), NONE)), crs
+    )
+    return (made, limits.accuracy) if report else made
+
+
+@overload
 def dissolve_features(
-    layer: Any,
-    by: list[str] | None = None,
-    *,
-    coverage: bool = False,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[False] = False,
+    layer: Any, by: list[str] | None = None, *, report: Literal[False] = False, **options: Unpack[UnionOptions]
 ) -> FeatureRows: ...
 @overload
 def dissolve_features(
-    layer: Any,
-    by: list[str] | None = None,
-    *,
-    coverage: bool = False,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[True],
+    layer: Any, by: list[str] | None = None, *, report: Literal[True], **options: Unpack[UnionOptions]
 ) -> tuple[FeatureRows, Accuracy]: ...
 def dissolve_features(
-    layer: Any,
-    by: list[str] | None = None,
-    *,
-    coverage: bool = False,
-    grid: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: bool = False,
-) -> Answer:
+    layer: Any, by: list[str] | None = None, *, coverage: bool = False, grid: float | None = None,
+    deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
+) -> Answer:  # fmt: skip
     """Unite the features of a FeatureCollection that agree in the properties `by`; all of them by default.
 
     Parameters
@@ -237,103 +242,3 @@ def _checked_names(by: Any) -> list[str]:
     if "count" in names:
         raise InvalidInputError("count is how many features were united; give that property another name", ("by",))
     return list(dict.fromkeys(names))
-
-
-@overload
-def locate_features(
-    points: Any,
-    polygons: Any,
-    *,
-    outside: bool = False,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[False] = False,
-) -> FeatureRows: ...
-@overload
-def locate_features(
-    points: Any,
-    polygons: Any,
-    *,
-    outside: bool = False,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: Literal[True],
-) -> tuple[FeatureRows, Accuracy]: ...
-def locate_features(
-    points: Any,
-    polygons: Any,
-    *,
-    outside: bool = False,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    report: bool = False,
-) -> Answer:
-    """Join each Point to the polygons that contain it, boundary included.
-
-    Parameters
-    ----------
-    points, polygons : dict
-        GeoJSON FeatureCollections.
-    outside : bool, default False
-        Also a row for a point that no polygon contains.
-    deadline, cancel, report
-        As for `engine.locate`.
-
-    Returns
-    -------
-    FeatureRows
-        A row each, with `boundary`, and the properties of both. With ``report=True`` a pair of it and an `Accuracy`.
-
-    Raises
-    ------
-    EngineError
-        As `engine.layers.overlay`.
-
-    Notes
-    -----
-    Boundary: a point on a border that two polygons share is in both. Exact; cost as `engine.locate_scene`.
-
-    References
-    ----------
-    RFC 7946 (GeoJSON).
-
-    Examples
-    --------
-    >>> from engine import layers
-    >>> def collection(kind, coordinates):
-    ...     geometry = {"type": kind, "coordinates": coordinates}
-    ...     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
-    ...     return {"type": "FeatureCollection", "features": [feature]}
-    >>> triangle = collection("Polygon", [[[0, 0], [2, 0], [0, 2], [0, 0]]])
-    >>> len(layers.locate_features(collection("Point", [1, 1]), triangle))
-    1
-    """
-    check_options(None, None, report=report, outside=outside)
-    limits = Limits(deadline, cancel)
-    sides = [collection_of(points, ("points",), limits, ("Point",)), collection_of(polygons, ("polygons",), limits)]
-    crs = crs_of(sides[:1], limits)
-    there = [k for k, each in enumerate(sides[0].features) if each.get("geometry") is not None]
-    places = [sides[0].features[k]["geometry"].get("coordinates") for k in there]
-    with limits.budget():
-        try:
-            positions = as_points(places, 2, ("points",))
-        except (DeadlineExceededError, CancelledError):
-            raise
-        except EngineError:
-            positions = check_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
-    geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
-    write_members, n_bytes = members_of(sides, ("point", "polygon"), limits)
-    layer = polygons_of(sides[1], limits)
-    first, second, on_boundary = locate_points_in_layer(positions, layer, limits)
-    first = np.array(there, np.int64)[first]
-    if outside:
-        first, second, on_boundary = with_unmatched_points(len(sides[0].features), first, second, on_boundary)
-
-    def members(row: int) -> bytes:
-        more = (b',"boundary":false', b',"boundary":true')[int(on_boundary[row])] if second[row] != NONE else b""
-        return write_members(int(first[row]), int(second[row])) + more
-
-    sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
-    offsets, n_bytes_before = read_only(np.arange(len(first) + 1)), summed(ROW + sizes)
-    made = FeatureRows(members, offsets, n_bytes_before, crs, geometry=lambda row: geometries[first[row]])
-    return (made, limits.accuracy) if report else made

@@ -11,7 +11,7 @@ from engine.errors import InvalidInputError, InvalidOperationError
 from engine.layers.frame_reading import check_frames, geopandas_and_shapely, mixed_of
 from engine.layers.joins import check_predicate, nearest_features, related_pairs
 from engine.layers.limits import Limits
-from engine.layers.rows import NONE
+from engine.layers.rows import NONE, with_unmatched
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
 from engine.solids.checks import shown
@@ -191,17 +191,10 @@ def _joined(
     column: name for distances (n,)."""
     first, second = pairs.T
     places = np.arange(len(pairs))
-    if how != "inner":
-        own, n = (second, len(right)) if how == "right" else (first, len(left))
-        alone = np.setdiff1d(np.arange(n), own)
-        order = np.argsort(np.concatenate([own, alone]), kind="stable")
-        none = np.full(len(alone), NONE)
-        first, second, places = (
-            np.concatenate(each)[order]
-            for each in (
-                (first, none if how == "right" else alone), (second, alone if how == "right" else none), (places, none),
-            )
-        )  # fmt: skip
+    if how == "left":
+        first, second, places = with_unmatched(len(left), first, second)
+    elif how == "right":
+        second, first, places = with_unmatched(len(right), second, first)
     frame = _assembled(left, right, first, second, how, suffixes)
     if column is not None and distances is not None:
         frame[column] = np.append(distances, np.nan)[places]

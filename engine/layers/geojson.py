@@ -132,7 +132,8 @@ def members_of(
             "one",
             (),
         )
-    left, right = (_copied_members(side, shared, end, limits) for side, end in zip(sides, ("_1", "_2")))
+    nothing = Collection([], [], None, ())
+    left, right = (_copied_members(side, shared, end, limits) for side, end in zip([*sides, nothing], ("_1", "_2")))
 
     def members(first: int, second: int) -> bytes:
         inside, sources, ids = [], b"", b""

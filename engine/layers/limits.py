@@ -3,11 +3,33 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, TypedDict
 
+import numpy as np
+
+from engine.bounding.box_grid import pairs_of_boxes
 from engine.polygon_overlay.grid import grid_of
 from engine.running.budget import Budget, Cancel
-from engine.types import Accuracy
+from engine.types import Accuracy, FloatArray, IntArray
+
+
+class TimeOptions(TypedDict, total=False):
+    """Keyword options of layers as GeoJSON."""
+
+    deadline: float | None
+    cancel: Cancel | None
+
+
+class GridOptions(TimeOptions, total=False):
+    """Those where new coordinates are made."""
+
+    grid: float | None
+
+
+class UnionOptions(GridOptions, total=False):
+    """Those of unions."""
+
+    coverage: bool
 
 
 class Limits:
@@ -33,6 +55,19 @@ class Limits:
     def budget(self) -> Budget:
         """Return a budget of the remaining time."""
         return Budget(self.options()["deadline"], self._cancel)
+
+    def pairs_of_boxes(self, low: FloatArray, high: FloatArray, is_chosen: Any = None, n_bytes: int = 16) -> IntArray:
+        """Return pairs (n, 2), first < second, sorted, of boxes that intersect. is_chosen: function of pairs that says
+        which are returned; n_bytes: memory that is charged for one."""
+        blocks = [np.zeros((0, 2), np.int64)]
+        with self.budget() as budget:
+            for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
+                budget.check()
+                blocks.append(pairs if is_chosen is None else pairs[is_chosen(pairs)])
+                budget.take(n_bytes * len(blocks[-1]))
+            budget.check()
+        pairs = np.concatenate(blocks)
+        return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))] if len(blocks) > 2 else pairs
 
     def record(self, answer: tuple[Any, Accuracy]) -> Any:
         """Add the accuracy of an answer (result, accuracy) to the sum; return the result."""

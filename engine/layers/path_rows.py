@@ -8,6 +8,7 @@ merged by rank; pieces that reach the end of a segment are joined with those tha
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,7 +18,17 @@ from engine.bounding.box_grid import pairs_of_boxes
 from engine.errors import UnsupportedSolidError
 from engine.layers.joins import related_pairs
 from engine.layers.limits import Limits
-from engine.layers.rows import HOWS, NONE, Layer, LayerRows, check_how, concatenate_rows, dissolve_rows, unite
+from engine.layers.rows import (
+    HOWS,
+    NONE,
+    Layer,
+    LayerRows,
+    check_how,
+    concatenate_rows,
+    dissolve_rows,
+    unite,
+    without_areas,
+)  # fmt: skip
 from engine.layers.rows import overlay_rows as overlay_areas
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
@@ -91,11 +102,7 @@ def sorted_rows(parts: list[LayerRows]) -> LayerRows:
     touching = concatenate_touching(some) if some else None
     if touching is not None:
         touching = touching._replace(lines=back[touching.lines], points=back[touching.points])
-    pieces = PolygonArrays(rows.vertices, rows.ring_offsets, rows.piece_offsets).take(
-        places_of(rows.row_offsets, order)
-    )
-    sizes = summed(np.diff(rows.row_offsets)[order])
-    return LayerRows(rows.left[order], rows.right[order], *pieces, sizes, rows.n_collapsed, touching)
+    return replace(rows.take(order), touching=touching)
 
 
 def path_rows(
@@ -120,9 +127,7 @@ def path_rows(
         owners[lines], vertices[places_of(offsets, lines)], summed(sizes[lines]), owners[points],
         vertices[offsets[points]],
     )  # fmt: skip
-    right = np.full(len(names), NONE) if is_outside else names[:, 1]
-    nothing, zeros = np.zeros(1, np.int64), np.zeros(len(names) + 1, np.int64)
-    return LayerRows(names[:, 0], right, np.zeros((0, 2)), nothing, nothing, zeros, 0, touching)
+    return without_areas(names[:, 0], np.full(len(names), NONE) if is_outside else names[:, 1], touching)
 
 
 class _Parts(NamedTuple):
@@ -311,9 +316,7 @@ def _dissolve_paths(paths: Paths, groups: IntArray, n_groups: int, limits: Limit
         np.array([group for group, _ in points], np.int64),
         np.array([place for _, place in points]).reshape(-1, 2),
     )
-    nothing, zeros = np.zeros(1, np.int64), np.zeros(n_groups + 1, np.int64)
-    groups_, none = np.arange(n_groups), np.full(n_groups, NONE)
-    return LayerRows(groups_, none, np.zeros((0, 2)), nothing, nothing, zeros, 0, touching)
+    return without_areas(np.arange(n_groups), np.full(n_groups, NONE), touching)
 
 
 def _split(edges: list[tuple[Place, Place]], budget: Budget) -> list[tuple[Place, Place]]:

@@ -14,7 +14,6 @@ from typing import Any, Final, cast
 
 import numpy as np
 
-from engine.bounding.box_grid import pairs_of_boxes
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
 from engine.layers.limits import Limits
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
@@ -48,11 +47,9 @@ HOWS: Final[dict[str, tuple[bool, bool, bool]]] = {
 """By operation, whether the result has rows for pairs, for remainders of the left layer, for remainders of the right.
 """
 NONE: Final = -1
-_PAIR_BYTES: Final = 16
 _ROW_BYTES: Final = 300
 _HIT_BYTES: Final = 40
-"""Bytes of memory of a pair of boxes; at least, of the overlay of a pair; of a pair (point, feature that contains it).
-"""
+"""Bytes of memory, at least, of the overlay of a pair; of a pair (point, feature that contains it)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,6 +92,12 @@ class LayerRows:
 
     def __len__(self) -> int:
         return len(self.left)
+
+    def take(self, order: IntArray) -> LayerRows:
+        """Return the rows in an order; `touching` is left out."""
+        pieces = PolygonArrays(self.vertices, self.ring_offsets, self.piece_offsets)
+        pieces, sizes = pieces.take(places_of(self.row_offsets, order)), summed(np.diff(self.row_offsets)[order])
+        return LayerRows(self.left[order], self.right[order], *pieces, sizes, self.n_collapsed)
 
     @property
     def ragged(self) -> tuple[FloatArray, tuple[IntArray, IntArray, IntArray]]:
@@ -141,23 +144,14 @@ def candidate_pairs(
     corners = [layer.arrays.boxes(numbers) for layer, numbers in zip((left, right), filled)]
     low, high = (np.concatenate(each) for each in zip(*corners))
     numbers = np.concatenate([filled[0], filled[1] + len(left)])
-    blocks = [np.zeros((0, 2), np.int64)]
-    rivals: tuple[list[IntArray], list[IntArray]] = ([blocks[0]], [blocks[0]])
-    with limits.budget() as budget:
-        for block in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
-            budget.check()
-            pairs = numbers[block]
-            is_left = pairs < len(left)
-            blocks.append(pairs[is_left[:, 0] & ~is_left[:, 1]])
-            budget.take(_ROW_BYTES * len(blocks[-1]))
-            if with_rivals:
-                rivals[0].append(pairs[is_left[:, 1]])
-                rivals[1].append(pairs[~is_left[:, 0]] - len(left))
-                budget.take(_PAIR_BYTES * len(block))
-        budget.check()
-    pairs = np.concatenate(blocks) - np.array([0, len(left)])
-    order = np.lexsort((pairs[:, 1], pairs[:, 0])) if len(blocks) > 2 else slice(None)
-    return pairs[order], (np.concatenate(rivals[0]), np.concatenate(rivals[1]))
+    n = len(filled[0])
+    both = limits.pairs_of_boxes(
+        low, high, None if with_rivals else lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n), _ROW_BYTES
+    )
+    first, second = n > both.T
+    pairs = numbers[both]
+    rivals = pairs[second], pairs[~first] - len(left)
+    return pairs[first & ~second] - np.array([0, len(left)]), rivals
 
 
 def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntArray, limits: Limits) -> LayerRows:
@@ -184,15 +178,10 @@ def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntAr
                 rests.append(limits.record(overlay(own, clip, "difference", grid=limits.grid, **limits.options())))
         rows = concatenate_rows([rows, _rows_of(rests, singly)])
     missing = np.flatnonzero(layer.is_missing)
-    left = np.concatenate([rows.left, missing])
-    stays = np.concatenate([np.diff(rows.row_offsets) > 0, np.ones(len(missing), np.bool_)])
-    order = np.flatnonzero(stays)[np.argsort(left[stays], kind="stable")]
+    stays = np.flatnonzero(np.append(np.diff(rows.row_offsets) > 0, np.ones(len(missing), np.bool_)))
     offsets = np.append(rows.row_offsets, np.full(len(missing), rows.row_offsets[-1]))
-    pieces = PolygonArrays(rows.vertices, rows.ring_offsets, rows.piece_offsets)
-    if len(singly):
-        pieces = pieces.take(places_of(offsets, order))
-    sizes = summed(np.diff(offsets)[order])
-    return LayerRows(left[order], np.full(len(order), NONE), *pieces, sizes, rows.n_collapsed)
+    rows = replace(rows, left=np.append(rows.left, missing), right=np.full(len(offsets) - 1, NONE), row_offsets=offsets)
+    return rows.take(stays[np.argsort(rows.left[stays], kind="stable")])
 
 
 def _groups_overlap(others: Layer, rivals: IntArray, groups: IntArray, seconds: IntArray, limits: Limits) -> BoolArray:
@@ -229,14 +218,8 @@ def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, lim
     filled = np.flatnonzero(parts.sizes())
     several = filled[(np.diff(offsets) > 1)[owner[filled]]]
     low, high = parts.boxes(several)
-    blocks = [np.zeros((0, 2), np.int64)]
-    with limits.budget() as budget:
-        for block in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
-            budget.check()
-            pairs = several[block]
-            blocks.append(pairs[owner[pairs[:, 0]] == owner[pairs[:, 1]]])
-        budget.check()
-    pairs = np.concatenate(blocks)
+    of = owner[several]
+    pairs = several[limits.pairs_of_boxes(low, high, lambda pairs: of[pairs[:, 0]] == of[pairs[:, 1]])]
     overlapping = np.unique(owner[pairs[_pairs_overlap(parts, pairs, limits), 0]])
     if len(overlapping):
         those = [
@@ -346,17 +329,14 @@ def _joined_coverage(layer: Layer, members: IntArray, limits: Limits) -> Overlay
     some = layer.arrays.take(members)
     with limits.budget() as budget:
         made = union_of_coverage(some, budget, is_claimed=True) if len(members) and limits.grid is None else None
-        if made is not None:
-            return made[0]
-        low, high = some.boxes(np.arange(len(members)))
-        for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
-            budget.check()
-            if len(clash := np.flatnonzero(_pairs_overlap(some, pairs, limits))):
-                i, j = pairs[clash[0]].tolist()
-                x, y = overlay(some.polygon(i), some.polygon(j), "intersection").vertices[0].tolist()
-                what = f"features {members[i]} and {members[j]} overlap at ({x!r}, {y!r})"
-                raise InvalidInputError(f"coverage: {what}; correct them, or leave coverage out", ("coverage",))
-        budget.check()
+    if made is not None:
+        return made[0]
+    pairs = limits.pairs_of_boxes(*some.boxes(np.arange(len(members))))
+    if len(clash := np.flatnonzero(_pairs_overlap(some, pairs, limits))):
+        i, j = pairs[clash[0]].tolist()
+        x, y = overlay(some.polygon(i), some.polygon(j), "intersection").vertices[0].tolist()
+        what = f"features {members[i]} and {members[j]} overlap at ({x!r}, {y!r})"
+        raise InvalidInputError(f"coverage: {what}; correct them, or leave coverage out", ("coverage",))
     polygons = list(PolygonSelection(some, np.arange(len(members))))
     return cast(Overlay, limits.record(union_all(polygons, grid=limits.grid, **limits.options())))
 
@@ -394,13 +374,16 @@ def locate_points_in_layer(points: PointsLike, layer: Layer, limits: Limits) -> 
     return first, features, on_boundary
 
 
-def with_unmatched_points(
-    n: int, first: IntArray, second: IntArray, on_boundary: BoolArray
-) -> tuple[IntArray, IntArray, BoolArray]:
-    """Return the rows (first, second, on_boundary) of `locate_points_in_layer` and, for each of n points without a row,
-    one more (point, `NONE`, False), sorted by point."""
-    alone = np.setdiff1d(np.arange(n), first)
-    rows = (first, alone), (second, np.full(len(alone), NONE)), (on_boundary, np.zeros(len(alone), np.bool_))
-    order = np.argsort(np.concatenate(rows[0]), kind="stable")
-    first, second, on_boundary = (np.concatenate(each)[order] for each in rows)
-    return first, second, on_boundary
+def with_unmatched(n: int, own: IntArray, others: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return (own, others, places) of sorted pairs (own[k], others[k]), k = places, and of each of n numbers that is in
+    no pair once more with `NONE` for the other and the place, sorted by own."""
+    alone = np.setdiff1d(np.arange(n), own)
+    none, every = np.full(len(alone), NONE), np.concatenate([own, alone])
+    order = np.argsort(every, kind="stable")
+    return every[order], np.append(others, none)[order], np.append(np.arange(len(own)), none)[order]
+
+
+def without_areas(left: IntArray, right: IntArray, touching: Touching) -> LayerRows:
+    """Return rows of lines and points alone."""
+    nothing = np.zeros(1, np.int64)
+    return LayerRows(left, right, np.zeros((0, 2)), nothing, nothing, np.zeros(len(left) + 1, np.int64), 0, touching)

@@ -8,7 +8,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.arrangement.simple_rings import BLOCK, fill_tree
-from engine.bounding.box_grid import pairs_of_boxes
 from engine.compiling.jit import allocating, allocating_kernel, entry_of
 from engine.errors import NotRepresentableError
 from engine.layers.limits import Limits
@@ -25,7 +24,6 @@ AREA: Final = 2
 _EXPONENT: Final = 480
 _SMALLEST, _LARGEST = 2.0**-_EXPONENT, 2.0**_EXPONENT
 """Range of nonzero coordinates in which signs of orientation are decided by expansions (simple_rings.py)."""
-_PAIR_BYTES: Final = 16
 
 
 class Paths(NamedTuple):
@@ -177,17 +175,9 @@ def pairs_between(left: Shapes, right: Shapes, reach: Any, limits: Limits) -> In
     grown = np.broadcast_to(np.asarray(reach, float), (len(left.dims),))[numbers, None]
     if (grown > 0.0).any():  # rounded outward
         low, high = np.nextafter(low - grown, -np.inf), np.nextafter(high + grown, np.inf)
-    n, blocks = len(numbers), [np.zeros((0, 2), np.int64)]
-    low, high = np.concatenate([low, their_low]), np.concatenate([high, their_high])
-    with limits.budget() as budget:
-        for pairs in pairs_of_boxes(low, high, budget.flag) if len(low) else ():
-            budget.check()
-            blocks.append(pairs[(pairs[:, 0] < n) & (pairs[:, 1] >= n)])
-            budget.take(_PAIR_BYTES * len(blocks[-1]))
-        budget.check()
-    both = np.concatenate(blocks)
-    pairs = np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
-    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))] if len(blocks) > 2 else pairs
+    n, low, high = len(numbers), np.concatenate([low, their_low]), np.concatenate([high, their_high])
+    both = limits.pairs_of_boxes(low, high, lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n))
+    return np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
 
 
 def no_paths(n: int) -> Paths:
