@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas,
 from engine.polygon_overlay.pair_arrays import arrays_of
 from engine.solids.checks import shown
 from engine.solids.ragged import summed, within
-from engine.types import BoolArray, Int8Array, read_only
+from engine.types import BoolArray, Int8Array, IntArray, read_only
 
 if TYPE_CHECKING:
     from geopandas import GeoDataFrame
@@ -73,9 +74,28 @@ def mixed_of(
     frame: GeoDataFrame, name: str, limits: Limits, kinds: tuple[int, ...] = (POINT, LINE, AREA)
 ) -> MixedLayer:
     """Return the geometry of a frame as a layer; raise for a GeometryCollection, a dimension not among `kinds`, or NaN.
-    name: of the argument, for messages. Altitudes are left out."""
+    name: of the argument, for messages. Altitudes are left out. The layer stays with the array of geometries, as the
+    index of geopandas does, and serves again while its elements are the same objects, which are immutable."""
+    geometries = frame.geometry.array
+    array = np.asarray(geometries)
+    known = getattr(geometries, "_exact_layer", None)
+    if known is not None and len(known[0]) == len(array) and (_addresses(known[0]) == _addresses(array)).all():
+        if np.isin(known[1].dims, (*kinds, -1)).all():
+            return cast(MixedLayer, known[1])
+    made = _mixed_of(frame, array, name, limits, kinds)
+    geometries._exact_layer = array.copy(), made
+    return made
+
+
+def _addresses(array: Any) -> IntArray:
+    """Return the addresses of the objects in an array."""
+    array = np.ascontiguousarray(array)
+    octets = (ctypes.c_char * array.nbytes).from_address(array.ctypes.data) if len(array) else b""
+    return np.frombuffer(octets, np.int64).copy()
+
+
+def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds: tuple[int, ...]) -> MixedLayer:
     _, shapely = geopandas_and_shapely()
-    array = np.asarray(frame.geometry.array)
     types, is_missing = shapely.get_type_id(array), shapely.is_missing(array)
     dims = dims_of(array)
     if len(wrong := np.flatnonzero(~is_missing & ~np.isin(dims, kinds))):

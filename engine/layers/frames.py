@@ -193,7 +193,8 @@ def clip(
     kinds = frozenset(sides[0].dims.tolist()) - {-1} if keep_geom_type else _EVERY
     rows = clip_mixed(*sides, limits, kinds, not keep_geom_type)
     frame = layer.iloc[rows.left].copy()
-    geometries = with_altitudes(_geometries(rows), [(layer, rows.left, None)])
+    geometries = _geometries(rows, source=np.asarray(layer.geometry.array))
+    geometries = with_altitudes(geometries, [(layer, rows.left, None)])
     frame[layer.geometry.name] = geopandas.array.GeometryArray(geometries, crs=layer.crs)
     return frame
 
@@ -292,9 +293,9 @@ def dissolve(
     return frame
 
 
-def _geometries(rows: LayerRows, empty: Any = None) -> Any:
+def _geometries(rows: LayerRows, empty: Any = None, source: Any = None) -> Any:
     """Return an array of the rows' geometries: Polygon for one piece, MultiPolygon for several, `empty` for none; with
-    the touching lines and points added."""
+    the touching lines and points added. source: the left geometries, of which Points are taken as they are."""
     _, shapely = geopandas_and_shapely()
     positions, (rings, pieces, ends) = rows.ragged
     single = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
@@ -305,7 +306,13 @@ def _geometries(rows: LayerRows, empty: Any = None) -> Any:
         owner = np.repeat(np.cumsum(several) - 1, np.where(several, sizes, 0))
         geometries[several] = shapely.multipolygons(single[np.repeat(several, sizes)], indices=owner)
     if rows.touching is not None and len(rows.touching.lines) + len(rows.touching.points):
-        _add_touching(geometries, rows.touching)
+        touching = rows.touching
+        if source is not None and len(touching.points):
+            is_whole = (shapely.get_type_id(source) == 0)[rows.left[touching.points]]
+            owners = touching.points[is_whole]
+            geometries[owners] = source[rows.left[owners]]
+            touching = touching._replace(points=touching.points[~is_whole], places=touching.places[~is_whole])
+        _add_touching(geometries, touching)
     return geometries
 
 
@@ -339,7 +346,8 @@ def _frame(left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str) -
     geopandas, _ = geopandas_and_shapely()
     import pandas
 
-    geometries = with_altitudes(_geometries(rows), [(left, rows.left, None), (right, rows.right, None)])
+    geometries = _geometries(rows, source=np.asarray(left.geometry.array))
+    geometries = with_altitudes(geometries, [(left, rows.left, None), (right, rows.right, None)])
     geometry = geopandas.array.GeometryArray(geometries, crs=left.crs)
     if how == "difference":
         frame = left.iloc[rows.left].copy()

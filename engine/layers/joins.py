@@ -101,7 +101,10 @@ def _boxes_allow(predicate: str, left: Shapes, right: Shapes, pairs: IntArray) -
 def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limits) -> tuple[Shapes, Shapes]:
     """Return two layers as edges in the range of exact signs. Raises: NotRepresentableError if there is no scale, or
     they need one where distances are measured."""
-    made = shapes_of(_cleaned(left, limits), limits), shapes_of(_cleaned(right, limits), limits)
+    for layer in (left, right):
+        if not layer.prepared:
+            layer.prepared.append(shapes_of(_cleaned(layer, limits), limits))
+    made = left.prepared[0], right.prepared[0]
     scaled = in_range(*made)
     if is_measured and scaled[0] is not made[0]:
         raise NotRepresentableError("distances need coordinates within 2^-480 .. 2^480; scale the layers", ())
@@ -161,7 +164,7 @@ def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
     places = np.arange(len(sizes))
     places[wrong] = len(sizes) + np.arange(len(wrong))
     united = [unite([arrays.polygon(k)], limits) for k in wrong.tolist()]
-    return layer._replace(areas=replace(layer.areas, arrays=concatenate_polygons([arrays, *united]).take(places)))
+    return replace(layer, areas=replace(layer.areas, arrays=concatenate_polygons([arrays, *united]).take(places)))
 
 
 def _of_areas(left: Layer, right: Layer, pairs: IntArray, has_detail: bool, limits: Limits) -> IntArray:

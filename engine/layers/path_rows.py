@@ -110,17 +110,19 @@ def path_rows(
 ) -> LayerRows:
     """Return the parts of points and lines within polygons, a row for each feature and key; or those outside of all.
     keys: by polygon its number in rows; equal ones are one region. kinds: dimensions of parts that stay."""
+    kinds_of = {POINT: _of_points, LINE: _of_lines}
     made = [
-        _of_points(paths, areas, keys, is_outside, limits),
-        _of_lines(paths, areas, keys, is_outside, limits),
+        parts_of(paths, areas, keys, is_outside, limits)
+        for dim, parts_of in kinds_of.items()
+        if (paths.dims == dim).any()
     ]
     pairs = np.concatenate([each[0] for each in made])
     sizes = np.concatenate([np.diff(each[1].offsets) for each in made])
     vertices = np.concatenate([each[1].vertices for each in made])
     stays = np.isin(np.minimum(sizes, 2) - 1, [*kinds])
-    names, rows = np.unique(pairs[stays], axis=0, return_inverse=True)
+    names, rows = _unique(*pairs[stays].T)
     owners = np.zeros(len(pairs), np.int64)
-    owners[stays] = rows.reshape(-1)
+    owners[stays] = rows
     offsets = summed(sizes)
     lines, points = np.flatnonzero(stays & (sizes > 1)), np.flatnonzero(stays & (sizes == 1))
     touching = Touching(
@@ -128,6 +130,13 @@ def path_rows(
         vertices[offsets[points]],
     )  # fmt: skip
     return without_areas(names[:, 0], np.full(len(names), NONE) if is_outside else names[:, 1], touching)
+
+
+def _unique(first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the distinct pairs of numbers that are not negative (n, 2), sorted, and the place of each pair in them."""
+    n = int(second.max(initial=0)) + 1
+    names, places = np.unique(first * n + second, return_inverse=True)
+    return np.column_stack(np.divmod(names, n)), places
 
 
 class _Parts(NamedTuple):
@@ -147,7 +156,7 @@ def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, lim
         first = np.setdiff1d(np.arange(len(vertices)), first)
         units = np.column_stack([first, np.zeros(len(first), np.int64)])
     else:
-        units = np.unique(np.column_stack([first, keys[second]]), axis=0)
+        units = _unique(first, keys[second])[0]
     pairs = np.column_stack([features[units[:, 0]], units[:, 1]])
     return pairs, _Parts(vertices[units[:, 0]], np.arange(len(units) + 1))
 

@@ -33,6 +33,8 @@ _MEET: Final = II | IB | BI | BB
 _UNKNOWN: Final = 0
 _WIDEST: Final = 6
 """Most marks that one contact leaves: four points and an overlap, whose ends are two."""
+_FEW: Final = 4 * BLOCK
+"""Edges of an area that are all looked at, without the tree."""
 _SLACK: Final = 2.0**-50
 
 PREDICATES: Final = (
@@ -90,13 +92,24 @@ def _relate_pairs(
     for item in range(len(pairs)):
         if flag[0] != 0:
             return
-        own, their = shape_of(left, pairs[item, 0]), shape_of(right, pairs[item, 1])
-        bits[item] = _relate(own, their, is_any, room, flag)
+        i, j = pairs[item, 0], pairs[item, 1]
+        n, m = left.firsts[i + 1] - left.firsts[i], right.firsts[j + 1] - right.firsts[j]
+        if left.dims[i] == POINT and right.dims[j] == AREA and n == 1 and m <= _FEW:
+            at, first = -1, right.firsts[j]
+            p = as_point2(left.vertices, left.firsts[i])
+            for edge in range(first, first + m):
+                c, d = as_point2(right.vertices, edge), as_point2(right.vertices, first + right.following[edge])
+                at = 0 if at == 0 else _passed(p, c, d, at)
+            bits[item] = _of_location(at, is_any)
+            continue
+        bits[item] = _relate(shape_of(left, i), shape_of(right, j), is_any, room, flag)
 
 
 @called
 def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: FlagArray) -> int:
     """Return the bits of two features; is_any, room: as `_half`."""
+    if own.dim == POINT and their.dim == AREA:
+        return _of_points(own, their, is_any, flag)
     bits = _half(own, their, is_any, room, flag)
     if is_any:
         if bits == 0 and their.dim == AREA and _has_path_inside(own, their):
@@ -135,8 +148,7 @@ def _half(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: FlagAr
         if is_any:
             continue
         if own.dim == POINT:
-            if n_marks == 0:
-                bits |= (II if _is_inside(a, a, their) else IE) if their.dim == AREA else IE
+            bits |= IE if n_marks == 0 else 0
         elif a.x != b.x or a.y != b.y:
             needed = IE if their.dim != AREA else II | IE
             if bits & needed != needed:
@@ -267,19 +279,31 @@ def _is_end(ends: FloatArray, p: Point2) -> bool:
 
 
 @called
+def _of_points(own: Shape, their: Shape, is_any: bool, flag: FlagArray) -> int:
+    """Return the bits of points to an area; is_any, flag: as `_half`."""
+    bits = 0
+    for vertex in range(len(own.following)):
+        bits |= _of_location(_locate(as_point2(own.points, vertex), their), is_any)
+        if flag[0] != 0 or (is_any and bits != 0):
+            return bits
+    return bits
+
+
+@inline
+def _of_location(at: int, is_any: bool) -> int:
+    """Return the bits of a point to an area, as `_locate` has it."""
+    bits = II if at > 0 else IB if at == 0 else 0 if is_any else IE
+    return bits if is_any else bits | EI | EB
+
+
+@called
 def _of_ends(own: Shape, their: Shape) -> int:
     """Return the bits of the boundary points of a line that lie on no edge of the other feature."""
-    bits, leaves, m = 0, len(their.boxes) // 2, len(their.following)
+    bits = 0
     for row in range(len(own.ends)):
-        p, is_on = as_point2(own.ends, row), False
-        leaf = next_leaf(their.boxes, 1, p.x, p.y, p.x, p.y)
-        while leaf > 0 and not is_on:  # bound: each leaf once
-            for other in range(BLOCK * (leaf - leaves), min(BLOCK * (leaf - leaves + 1), m)):
-                c, d = as_point2(their.points, other), as_point2(their.points, their.following[other])
-                is_on |= _is_between(c, d, p) and orient2d(c, d, p) == 0
-            leaf = next_leaf(their.boxes, after(leaf), p.x, p.y, p.x, p.y)
-        if not is_on:
-            bits |= BI if their.dim == AREA and _is_inside(p, p, their) else BE
+        at = _locate(as_point2(own.ends, row), their)
+        if at != 0:
+            bits |= BI if at > 0 and their.dim == AREA else BE
     return bits
 
 
@@ -287,11 +311,37 @@ def _of_ends(own: Shape, their: Shape) -> int:
 def _has_path_inside(own: Shape, their: Shape) -> bool:
     """Return whether a path of a feature that meets no edge of an area lies in it."""
     for edge in range(len(own.following)):
-        if own.following[edge] <= edge:
-            p = as_point2(own.points, edge)
-            if _is_inside(p, p, their):
-                return True
+        if own.following[edge] <= edge and _locate(as_point2(own.points, edge), their) > 0:
+            return True
     return False
+
+
+@inline
+def _passed(p: Point2, c: Point2, d: Point2, at: int) -> int:
+    """Return 0 for a point on the edge cd, else -at if the ray from it to the right crosses the edge, or at."""
+    if (c.x < p.x and d.x < p.x) or (c.y < p.y and d.y < p.y) or (c.y > p.y and d.y > p.y):
+        return at
+    is_up = d.y > p.y
+    side = (1 if is_up else -1) if c.x > p.x and d.x > p.x else orient2d(c, d, p)
+    if side == 0:
+        return 0  # the box of the edge contains the point
+    return -at if (c.y > p.y) != is_up and side == (1 if is_up else -1) else at
+
+
+@called
+def _locate(p: Point2, their: Shape) -> int:
+    """Return 0 for a point on an edge, else 1 if a ray from it to the right crosses an odd number of edges, -1 if an
+    even one."""
+    at, leaves, m = -1, len(their.boxes) // 2, len(their.following)
+    leaf = next_leaf(their.boxes, 1, p.x, p.y, np.inf, p.y)
+    while leaf > 0:  # bound: each leaf once
+        for other in range(BLOCK * (leaf - leaves), min(BLOCK * (leaf - leaves + 1), m)):
+            c, d = as_point2(their.points, other), as_point2(their.points, their.following[other])
+            at = _passed(p, c, d, at)
+            if at == 0:
+                return 0
+        leaf = next_leaf(their.boxes, after(leaf), p.x, p.y, np.inf, p.y)
+    return at
 
 
 @called

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
+from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -41,11 +42,14 @@ class Paths(NamedTuple):
         return paths, np.repeat(np.arange(len(self.dims)), np.diff(self.path_offsets))[paths]
 
 
-class MixedLayer(NamedTuple):
-    """A layer with features of any kind: its polygons (empty for other features), and its points and lines."""
+@dataclass(frozen=True, slots=True, eq=False)
+class MixedLayer:
+    """A layer with features of any kind: its polygons (empty for other features), and its points and lines; prepared:
+    its `Shapes`, once they are made."""
 
     areas: Layer
     paths: Paths
+    prepared: list[Shapes] = field(default_factory=list, init=False)
 
     @property
     def dims(self) -> Int8Array:
