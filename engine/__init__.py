@@ -44,6 +44,7 @@ from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.compiled.workspace import release
 from engine.polygon_overlay.overlay import filled, overlay, union_all
 from engine.polygon_overlay.result import Collapse, Overlay, OverlayPiece
+from engine.polygon_overlay.split import split
 from engine.registry import ROWS as _ROWS  # noqa: F401 (fills the table of solids)
 from engine.running.budget import Cancel
 from engine.running.parallel import default_workers
@@ -93,7 +94,7 @@ __all__ = [
     "clip_segments", "collide", "collide_poses", "collide_scene", "collide_triangles", "compare", "contains", "cut",
     "default_workers", "distances", "filled", "hits", "inspect", "iou", "layers", "locate", "locate_scene",
     "overlap_volume", "overlay", "overlay_batch", "polygons", "read_layer", "read_mesh", "release", "section",
-    "solid_types", "union_all", "volume", "warm",
+    "solid_types", "split", "union_all", "volume", "warm",
 ]  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from engine.distance.clearance import clearance
 from engine.distance.distances import distances
 from engine.errors import InvalidInputError
 from engine.layers.geojson import EVERY, collection_of, mixed_of
-from engine.layers.joins import nearest_features, related_pairs
+from engine.layers.joins import nearest_of, related_pairs
 from engine.layers.limits import Limits
 from engine.polygon_clipping.clip_polygons import clip_polygons
 from engine.polygon_clipping.planes import orientations
@@ -288,7 +288,7 @@ def _warm_layers() -> None:
     )
     related_pairs(layer, layer, "within", 0.0, limits)
     related_pairs(layer, layer, "dwithin", 0.25, limits)
-    nearest_features(layer, others, np.inf, False, limits)  # two are as near as each other
+    nearest_of(layer, others, np.inf, False, limits)  # two are as near as each other
 
 
 def _warm_distances() -> None:

@@ -7,6 +7,7 @@ from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
+from engine.distance.clearance import checked_distance
 from engine.errors import CancelledError, DeadlineExceededError, EngineError
 from engine.layers.feature_rows import ROW, FeatureRows
 from engine.layers.features import Answer
@@ -21,7 +22,8 @@ from engine.layers.geojson import (
     polygons_of,
     texts_of,
 )
-from engine.layers.joins import check_predicate, related_pairs
+from engine.layers.joins import check_predicate, nearest_of, related_pairs
+from engine.layers.json_text import text_of
 from engine.layers.limits import Limits, TimeOptions
 from engine.layers.rows import NONE, locate_points_in_layer, with_unmatched
 from engine.running.budget import Cancel
@@ -103,6 +105,71 @@ def join_features(
     write = _writer(sides, ("left", "right"), limits)
     layers = [mixed_of(side, limits) for side in sides]
     made = write(related_pairs(layers[0], layers[1], predicate, reach, limits), outside, None)
+    return (made, limits.accuracy) if report else made
+
+
+@overload
+def nearest_features(
+    left: Any, right: Any, *, max_distance: float | None = None, exclusive: bool = False, outside: bool = False,
+    report: Literal[False] = False, **options: Unpack[TimeOptions],
+) -> FeatureRows: ...  # fmt: skip
+@overload
+def nearest_features(
+    left: Any, right: Any, *, max_distance: float | None = None, exclusive: bool = False, outside: bool = False,
+    report: Literal[True], **options: Unpack[TimeOptions],
+) -> tuple[FeatureRows, Accuracy]: ...  # fmt: skip
+def nearest_features(
+    left: Any, right: Any, *, max_distance: float | None = None, exclusive: bool = False, outside: bool = False,
+    deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
+) -> Answer:  # fmt: skip
+    """Join each feature to all features that are nearest to it.
+
+    Parameters
+    ----------
+    left, right : dict
+        GeoJSON FeatureCollections of any geometries but collections.
+    max_distance, exclusive
+        As for `engine.layers.sjoin_nearest`.
+    outside : bool, default False
+        Also a row for each left feature without one.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        A row for each pair, with the left geometry, the properties of both, and the member `distance`. With
+        ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`.
+
+    Notes
+    -----
+    Boundary, accuracy and cost: as `engine.layers.sjoin_nearest`: all of several that are as near, decided exactly.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers, read_layer
+    >>> triangle = read_layer(b'{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [0, 2], [0, 0]]]}')
+    >>> point = read_layer(b'{"type": "Point", "coordinates": [5, 0]}')
+    >>> layers.nearest_features(point, triangle).make(0, 1)[0]["distance"]
+    3.0
+    """
+    check_options(None, None, report=report, outside=outside, exclusive=exclusive)
+    most = np.inf if max_distance is None else checked_distance(max_distance, "max_distance")
+    limits = Limits(deadline, cancel)
+    sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits, EVERY)]
+    write = _writer(sides, ("left", "right"), limits)
+    layers = [mixed_of(side, limits) for side in sides]
+    pairs, distances = nearest_of(layers[0], layers[1], most, bool(exclusive), limits)
+    made = write(pairs, outside, lambda pair: b',"distance":%b' % text_of(float(distances[pair])))
     return (made, limits.accuracy) if report else made
 
 

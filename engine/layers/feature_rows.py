@@ -10,8 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from engine.layers.altitudes import heights_at
 from engine.layers.json_text import text_of
 from engine.layers.rows import LayerRows
+from engine.polygon_overlay.touching import Touching
 from engine.solids.ragged import summed
 from engine.types import FloatArray, IntArray, read_only
 
@@ -33,6 +35,8 @@ class FeatureRows:
         How many vertices stand before each feature.
     collapsed : int
         Rows that rounding left nothing of.
+    slivers : tuple or None
+        With `min_width`: feature, piece of it, and width of each piece that is narrower.
     crs_text : str
         The collection's `crs` as JSON.
     n_bytes : ndarray of int64, shape (n + 1,)
@@ -51,6 +55,7 @@ class FeatureRows:
     areas: tuple[FloatArray, tuple[IntArray, IntArray, IntArray]] | None = None
     geometry: Callable[[int], bytes | None] = lambda row: None
     collapsed: int = 0
+    slivers: tuple[tuple[int, int, float], ...] | None = None
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -98,37 +103,54 @@ class FeatureRows:
 
 
 def with_geometries(
-    rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None
-) -> FeatureRows:
+    rows: LayerRows, members: Callable[[int], bytes], n_bytes: IntArray, crs: bytes | None,
+    sources: list[tuple[FloatArray, IntArray]],
+) -> FeatureRows:  # fmt: skip
     """Return the features of rows. members(row): JSON bytes of a row's members besides type and geometry; n_bytes:
-    lower bound on the bytes of JSON of each row but for the geometry; crs: the common member of the layers as JSON."""
+    lower bound on the bytes of JSON of each row but for the geometry; crs: the common member of the layers as JSON;
+    sources: altitudes, as `heights_at` has them."""
     positions, (rings, pieces, ends) = rows.ragged
     offsets, areas = rings[pieces[ends]], (positions, (rings, pieces, ends))
-    touching = rows.touching
-    if touching is None or not len(touching.lines) + len(touching.points):
-        n_bytes = summed(ROW + n_bytes) + _POSITION * offsets
+    none = Touching(offsets[:0], positions[:0], offsets[:1] * 0, offsets[:0], positions[:0])
+    touching = none if rows.touching is None else rows.touching
+    of_lines = np.repeat(touching.lines, np.diff(touching.offsets))
+    owners = np.concatenate([np.repeat(np.arange(len(rows)), np.diff(offsets)), of_lines, touching.points])
+    heights = heights_at(np.concatenate([positions, touching.vertices, touching.places]), owners, sources)
+    offsets = read_only(summed(np.bincount(owners, minlength=len(rows))))
+    n_bytes = summed(ROW + n_bytes) + _POSITION * offsets
+    if heights is None and not len(touching.lines) + len(touching.points):
         return FeatureRows(members, offsets, n_bytes, crs, areas, collapsed=rows.n_collapsed)
+    firsts = np.cumsum([len(positions), len(touching.vertices)]).tolist()
+
+    def listed(places: FloatArray, start: int, stop: int, first: int = 0) -> list[Any]:
+        flat = places[start:stop].tolist()
+        if heights is None:
+            return flat
+        own = heights[first + start : first + stop].tolist()
+        return [[*place, z] if z == z else place for place, z in zip(flat, own)]
+
     lines, points = ({row: list[Any]() for row in numbers.tolist()} for numbers in (touching.lines, touching.points))
     for row, start, stop in zip(touching.lines.tolist(), touching.offsets.tolist(), touching.offsets[1:].tolist()):
         lines[row].append((start, stop))
     for place, row in enumerate(touching.points.tolist()):
-        points[row].append(touching.places[place].tolist())
-    sizes = np.bincount(touching.lines, np.diff(touching.offsets), minlength=len(rows)).astype(np.int64)
-    offsets = read_only(offsets + summed(sizes + np.bincount(touching.points, minlength=len(rows))))
+        points[row].append(place)
 
     def geometry(row: int) -> bytes | None:
-        made = [("LineString", [touching.vertices[i:j].tolist() for i, j in lines.get(row, ())])]
-        made.append(("Point", points.get(row, [])))
+        made: dict[str, list[Any]] = {"Polygon": [], "LineString": [], "Point": []}
+        if heights is not None:
+            made["Polygon"] = [
+                [listed(positions, i, j) for i, j in pairwise(rings[first : last + 1].tolist())]
+                for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
+            ]
+        made["LineString"] = [listed(touching.vertices, i, j, firsts[0]) for i, j in lines.get(row, ())]
+        made["Point"] = [listed(touching.places, k, k + 1, firsts[1])[0] for k in points.get(row, ())]
         parts = [
-            {"type": kind, "coordinates": given[0]}
-            if len(given) == 1
-            else {"type": f"Multi{kind}", "coordinates": given}
-            for kind, given in made
+            {"type": f"Multi{kind}" if len(given) > 1 else kind, "coordinates": given if len(given) > 1 else given[0]}
+            for kind, given in made.items()
             if given
         ]
         if not parts:
             return None
         return text_of(parts[0] if len(parts) == 1 else {"type": "GeometryCollection", "geometries": parts})
 
-    n_bytes = summed(ROW + n_bytes) + _POSITION * offsets
     return FeatureRows(members, offsets, n_bytes, crs, areas, geometry, rows.n_collapsed)

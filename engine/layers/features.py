@@ -8,17 +8,33 @@ and `right` are the numbers of these features.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Literal, Unpack, overload
 
 import numpy as np
 
 from engine.errors import InvalidInputError
 from engine.layers.feature_rows import FeatureRows, with_geometries
-from engine.layers.geojson import EVERY, collection_of, crs_of, groups_of, members_of, mixed_of, texts_of
+from engine.layers.gaps import check_gaps
+from engine.layers.geojson import (
+    EVERY,
+    LINES,
+    Collection,
+    collection_of,
+    crs_of,
+    groups_of,
+    members_of,
+    mixed_of,
+    texts_of,
+)  # fmt: skip
 from engine.layers.json_text import text_of
-from engine.layers.limits import GridOptions, Limits, UnionOptions
+from engine.layers.limits import ClipOptions, GridOptions, Limits, TimeOptions, UnionOptions
 from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
-from engine.layers.rows import NONE
+from engine.layers.rows import NONE, LayerRows
+from engine.layers.shapes import MixedLayer
+from engine.layers.splits import split_rows
+from engine.layers.widths import slivers_of
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
 from engine.solids.checks import shown
@@ -36,8 +52,8 @@ def overlay_features(
     left: Any, right: Any, how: str = "intersection", *, report: Literal[True], **options: Unpack[GridOptions]
 ) -> tuple[FeatureRows, Accuracy]: ...
 def overlay_features(
-    left: Any, right: Any, how: str = "intersection", *, grid: float | None = None, deadline: float | None = None,
-    cancel: Cancel | None = None, report: bool = False,
+    left: Any, right: Any, how: str = "intersection", *, grid: float | None = None, min_width: float | None = None,
+    wrap: float | None = None, deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
 ) -> Answer:  # fmt: skip
     """Overlay a FeatureCollection with one of polygons.
 
@@ -50,6 +66,11 @@ def overlay_features(
         As `engine.layers.overlay`.
     grid : float, optional
         As for `engine.layers.overlay`.
+    min_width : float, optional
+        List the pieces that are narrower, as `engine.layers.slivers` says: in `FeatureRows.slivers`.
+    wrap : 180, optional
+        Coordinates are longitudes and latitudes; polygons with a step of more than 180 degrees between two positions
+        cross the antimeridian. They are cut there first, and joined in the answer.
     deadline, cancel, report
         As for `engine.locate`.
 
@@ -65,6 +86,9 @@ def overlay_features(
 
     Notes
     -----
+    Altitudes: positions that stay keep theirs, new ones have none; the report counts both. Edges are straight in the
+    plane of the coordinates, in degrees too: no great circles.
+
     Boundary, degenerate input, accuracy and cost: as `engine.layers.overlay`.
 
     References
@@ -82,29 +106,30 @@ def overlay_features(
     [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0]]
     """
     check_options(None, None, report=report)
-    limits = Limits(deadline, cancel, grid=grid)
+    limits = Limits(deadline, cancel, grid=grid, wrap=wrap)
     sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits)]
     crs = crs_of(sides, limits)
     write_members, n_bytes = members_of(sides, ("left", "right"), limits)
     layers = [mixed_of(side, limits) for side in sides]
     rows = overlay_mixed(layers[0], layers[1], how, limits, frozenset(layers[0].dims.tolist()) - {-1}, False)
     made = with_geometries(
-        rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs
-    )
-    return (made, limits.accuracy) if report else made
+        rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs,
+        [(sides[0].known, rows.left), (sides[1].known, rows.right)],
+    )  # fmt: skip
+    return _finished(made, rows, min_width, limits, report)
 
 
 @overload
 def clip_features(
-    layer: Any, mask: Any, *, report: Literal[False] = False, **options: Unpack[GridOptions]
+    layer: Any, mask: Any, *, report: Literal[False] = False, **options: Unpack[ClipOptions]
 ) -> FeatureRows: ...
 @overload
 def clip_features(
-    layer: Any, mask: Any, *, report: Literal[True], **options: Unpack[GridOptions]
+    layer: Any, mask: Any, *, report: Literal[True], **options: Unpack[ClipOptions]
 ) -> tuple[FeatureRows, Accuracy]: ...
 def clip_features(
-    layer: Any, mask: Any, *, grid: float | None = None, deadline: float | None = None, cancel: Cancel | None = None,
-    report: bool = False,
+    layer: Any, mask: Any, *, keep: str = "inside", grid: float | None = None, min_width: float | None = None,
+    wrap: float | None = None, deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
 ) -> Answer:  # fmt: skip
     """Cut the features of a FeatureCollection to the union of some polygons.
 
@@ -112,8 +137,10 @@ def clip_features(
     ----------
     layer, mask : dict
         GeoJSON FeatureCollections, the mask of polygons.
-    grid : float, optional
-        As for `engine.layers.overlay`.
+    keep : {"inside", "outside"}
+        What is within the mask, or what is outside of it.
+    grid, min_width, wrap
+        As for `overlay_features`.
     deadline, cancel, report
         As for `engine.locate`.
 
@@ -145,16 +172,13 @@ def clip_features(
     [[0.0, 1.0], [1.0, 1.0]]
     """
     check_options(None, None, report=report)
-    limits = Limits(deadline, cancel, grid=grid)
+    limits = Limits(deadline, cancel, grid=grid, wrap=wrap, keep=keep)
     sides = [collection_of(layer, ("layer",), limits, EVERY), collection_of(mask, ("mask",), limits)]
-    crs = crs_of(sides, limits)
-    write_members, n_bytes = members_of(sides[:1], ("layer", "mask"), limits)
-    features, region = (mixed_of(side, limits) for side in sides)
-    rows = clip_mixed(features, region, limits, frozenset(features.dims.tolist()) - {-1}, False)
-    made = with_geometries(
-        rows, lambda row: write_members(int(rows.left[row]), NONE), n_bytes(rows.left, np.full(len(rows), NONE)), crs
-    )
-    return (made, limits.accuracy) if report else made
+
+    def clipped(layers: list[MixedLayer]) -> LayerRows:
+        return clip_mixed(layers[0], layers[1], limits, frozenset(layers[0].dims.tolist()) - {-1}, False)
+
+    return _of_left(sides, clipped, min_width, limits, report)
 
 
 @overload
@@ -166,8 +190,9 @@ def dissolve_features(
     layer: Any, by: list[str] | None = None, *, report: Literal[True], **options: Unpack[UnionOptions]
 ) -> tuple[FeatureRows, Accuracy]: ...
 def dissolve_features(
-    layer: Any, by: list[str] | None = None, *, coverage: bool = False, grid: float | None = None,
-    deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
+    layer: Any, by: list[str] | None = None, *, coverage: bool = False, gaps: str = "keep", grid: float | None = None,
+    min_width: float | None = None, wrap: float | None = None, deadline: float | None = None,
+    cancel: Cancel | None = None, report: bool = False,
 ) -> Answer:  # fmt: skip
     """Unite the features of a FeatureCollection that agree in the properties `by`; all of them by default.
 
@@ -177,8 +202,10 @@ def dissolve_features(
         A GeoJSON FeatureCollection of polygons, of lines, or of points.
     by : list of str, optional
         Names of properties.
-    coverage, grid
+    coverage, gaps, grid
         As for `engine.layers.dissolve`.
+    min_width, wrap
+        As for `overlay_features`.
     deadline, cancel, report
         As for `engine.locate`.
 
@@ -211,7 +238,8 @@ def dissolve_features(
     {'owner': 'Ada', 'count': 2}
     """
     check_options(None, None, report=report, coverage=coverage)
-    limits = Limits(deadline, cancel, grid=grid)
+    limits = Limits(deadline, cancel, grid=grid, wrap=wrap)
+    check_gaps(gaps, coverage, grid)
     side = collection_of(layer, ("layer",), limits, EVERY)
     crs = crs_of([side], limits)
     names = _checked_names(by)
@@ -220,7 +248,7 @@ def dissolve_features(
         limits.budget().take(-sum(map(len, checked)))
         del checked
     groups, values = groups_of(side, names, limits)
-    rows = dissolve_mixed(mixed_of(side, limits), groups, len(values), limits, coverage)
+    rows = dissolve_mixed(mixed_of(side, limits), groups, len(values), limits, coverage, gaps)
     counts = np.bincount(groups, minlength=len(rows)).tolist()
     texts = [b"%b:null" % text_of(name) for name in names]
 
@@ -231,7 +259,90 @@ def dissolve_features(
         return b'"properties":{%b}' % b",".join([*own, b'"count":%d' % counts[row]])
 
     lengths = [sum(len(value) - 4 for value in each.values()) for each in polled(values)]
-    made = with_geometries(rows, write_members, np.array(lengths, np.int64) + sum(map(len, texts)), crs)
+    known = side.known
+    known[:, 0] = groups[known[:, 0].astype(np.int64)]
+    n_bytes = np.array(lengths, np.int64) + sum(map(len, texts))
+    made = with_geometries(rows, write_members, n_bytes, crs, [(known, np.arange(len(rows)))])
+    return _finished(made, rows, min_width, limits, report)
+
+
+@overload
+def split_features(
+    layer: Any, lines: Any, *, report: Literal[False] = False, **options: Unpack[TimeOptions]
+) -> FeatureRows: ...
+@overload
+def split_features(
+    layer: Any, lines: Any, *, report: Literal[True], **options: Unpack[TimeOptions]
+) -> tuple[FeatureRows, Accuracy]: ...
+def split_features(
+    layer: Any, lines: Any, *, min_width: float | None = None, deadline: float | None = None,
+    cancel: Cancel | None = None, report: bool = False,
+) -> Answer:  # fmt: skip
+    """Split the polygons of a FeatureCollection by the lines of another, a row for each piece.
+
+    Parameters
+    ----------
+    layer, lines : dict
+        GeoJSON FeatureCollections, of polygons and of lines.
+    min_width
+        As for `overlay_features`.
+    deadline, cancel, report
+        As for `engine.locate`.
+
+    Returns
+    -------
+    FeatureRows
+        The pieces of each feature, with its properties; one that no line splits is a row for each of its parts. With
+        ``report=True`` a pair of it and an `Accuracy`.
+
+    Raises
+    ------
+    EngineError
+        As `engine.layers.overlay`.
+
+    Notes
+    -----
+    Boundary, accuracy and cost: as `engine.split`.
+
+    References
+    ----------
+    RFC 7946 (GeoJSON).
+
+    Examples
+    --------
+    >>> from engine import layers, read_layer
+    >>> triangle = read_layer(b'{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [0, 2], [0, 0]]]}')
+    >>> line = read_layer(b'{"type": "LineString", "coordinates": [[-1, 1], [9, 1]]}')
+    >>> len(layers.split_features(triangle, line))
+    2
+    """
+    check_options(None, None, report=report)
+    limits = Limits(deadline, cancel)
+    sides = [collection_of(layer, ("layer",), limits), collection_of(lines, ("lines",), limits, LINES)]
+    return _of_left(sides, lambda layers: split_rows(layers[0], layers[1], limits), min_width, limits, report)
+
+
+def _of_left(
+    sides: list[Collection], function: Callable[[list[MixedLayer]], LayerRows], min_width: float | None,
+    limits: Limits, report: bool,
+) -> Answer:  # fmt: skip
+    """Return rows, a function of two layers, with the members and altitudes of the first."""
+    crs = crs_of(sides, limits)
+    write_members, n_bytes = members_of(sides[:1], ("layer", ""), limits)
+    rows, none = function([mixed_of(side, limits) for side in sides]), NONE
+    sizes = n_bytes(rows.left, np.full(len(rows), NONE))
+    made = with_geometries(
+        rows, lambda row: write_members(int(rows.left[row]), none), sizes, crs, [(sides[0].known, rows.left)]
+    )
+    return _finished(made, rows, min_width, limits, report)
+
+
+def _finished(made: FeatureRows, rows: LayerRows, min_width: float | None, limits: Limits, report: bool) -> Answer:
+    """Return an answer, with slivers if they are requested."""
+    if min_width is not None:
+        if limits.wrap:
+            raise InvalidInputError("min_width measures in the plane; leave it or wrap out", ("min_width",))
+        made = replace(made, slivers=slivers_of(rows, min_width, limits))
     return (made, limits.accuracy) if report else made
 
 

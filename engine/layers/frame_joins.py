@@ -9,7 +9,7 @@ import numpy as np
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidInputError, InvalidOperationError
 from engine.layers.frame_reading import check_frames, geopandas_and_shapely, mixed_of
-from engine.layers.joins import check_predicate, nearest_features, related_pairs
+from engine.layers.joins import check_predicate, nearest_of, related_pairs
 from engine.layers.limits import Limits
 from engine.layers.rows import NONE, with_unmatched
 from engine.running.budget import Cancel
@@ -169,7 +169,7 @@ def sjoin_nearest(
         raise InvalidInputError(f"distance_col must be a name, got {shown(distance_col)}", ("distance_col",))
     limits = Limits(deadline, cancel, workers)
     sides = mixed_of(left, "left", limits), mixed_of(right, "right", limits)
-    pairs, distances = nearest_features(*(sides[::-1] if how == "right" else sides), most, bool(exclusive), limits)
+    pairs, distances = nearest_of(*(sides[::-1] if how == "right" else sides), most, bool(exclusive), limits)
     pairs = pairs[:, ::-1] if how == "right" else pairs
     return _joined(left, right, pairs, how, (lsuffix, rsuffix), distances, distance_col)
 

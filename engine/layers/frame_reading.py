@@ -78,12 +78,13 @@ def mixed_of(
     index of geopandas does, and serves again while its elements are the same objects, which are immutable."""
     geometries = frame.geometry.array
     array = np.asarray(geometries)
-    known = getattr(geometries, "_exact_layer", None)
+    known = None if limits.wrap else getattr(geometries, "_exact_layer", None)
     if known is not None and len(known[0]) == len(array) and (_addresses(known[0]) == _addresses(array)).all():
         if np.isin(known[1].dims, (*kinds, -1)).all():
             return cast(MixedLayer, known[1])
     made = _mixed_of(frame, array, name, limits, kinds)
-    geometries._exact_layer = array.copy(), made
+    if not limits.wrap:
+        geometries._exact_layer = array.copy(), made
     return made
 
 
@@ -120,7 +121,13 @@ def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds:
         raise refused(NotFiniteError, frame, (name, int(owner[0])), f"holds {positions[broken[0]].tolist()}")
     counts = np.zeros(len(array), np.int64)
     counts[there] = np.diff(ends)
-    areas = layer_of(arrays_of(positions, rings, parts_of), np.append(0, np.cumsum(counts)), is_missing, limits)
+    areas = layer_of(
+        arrays_of(positions, rings, parts_of),
+        np.append(0, np.cumsum(counts)),
+        is_missing,
+        limits,
+        bool(frame.crs and frame.crs.is_geographic),
+    )
     return MixedLayer(areas, paths)
 
 

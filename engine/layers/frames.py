@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.errors import InvalidInputError
-from engine.layers.altitudes import with_altitudes
+from engine.layers.altitudes import heights_at
 from engine.layers.frame_reading import check_frames, dims_of, geopandas_and_shapely, mixed_of
+from engine.layers.gaps import check_gaps
 from engine.layers.limits import Limits
 from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
 from engine.layers.rows import NONE, LayerRows, check_how
@@ -18,6 +19,7 @@ from engine.polygon_overlay.touching import Touching
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
 from engine.solids.checks import shown
+from engine.types import IntArray
 
 if TYPE_CHECKING:
     from geopandas import GeoDataFrame
@@ -36,6 +38,7 @@ def overlay(
     keep_geom_type: bool | None = None,
     *,
     grid: float | None = None,
+    wrap: float | None = None,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -57,6 +60,9 @@ def overlay(
         and those to which rounding collapses an area. With True rows have the dimensions that the left layer has.
     grid : float, optional
         As for `engine.overlay`, of which each row then is one; `grid_size` is the same. For polygons alone.
+    wrap : 180, optional
+        Coordinates are longitudes and latitudes; polygons with a step of more than 180 degrees between two positions
+        cross the antimeridian. They are cut there first, and joined in the answer; a warning counts them.
     workers, deadline, cancel
         As for `engine.locate`.
     **others
@@ -107,7 +113,7 @@ def overlay(
         check_options(workers, None, keep_geom_type=keep_geom_type)
     if left.crs is not None and right.crs is not None and left.crs != right.crs:
         warnings.warn("the layers have different CRS; coordinates are taken as they are", UserWarning, stacklevel=2)
-    limits = Limits(deadline, cancel, workers, grid)
+    limits = Limits(deadline, cancel, workers, grid, wrap)
     layers = mixed_of(left, "left", limits), mixed_of(right, "right", limits, (AREA,))
     keeps_all = keep_geom_type is not None and not keep_geom_type
     kinds = _EVERY if keeps_all else frozenset(layers[0].dims.tolist()) - {-1}
@@ -130,7 +136,9 @@ def clip(
     keep_geom_type: bool = False,
     sort: bool = False,
     *,
+    keep: str = "inside",
     grid: float | None = None,
+    wrap: float | None = None,
     workers: int | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
@@ -148,7 +156,9 @@ def clip(
         Leave out lines and points in which a feature of more dimensions touches the mask.
     sort : bool, default False
         Accepted: rows are in the order of the layer anyway.
-    grid, workers, deadline, cancel, **others
+    keep : {"inside", "outside"}
+        What is within the mask, or what is outside of it: of each feature its difference with the mask.
+    grid, wrap, workers, deadline, cancel, **others
         As for `overlay`.
 
     Returns
@@ -188,13 +198,19 @@ def clip(
     if isinstance(region, geopandas.GeoSeries):
         region = geopandas.GeoDataFrame(geometry=region)
     check_frames("clip", others, layer=layer, mask=region)
-    limits = Limits(deadline, cancel, workers, grid)
+    limits = Limits(deadline, cancel, workers, grid, wrap, keep)
     sides = mixed_of(layer, "layer", limits), mixed_of(region, "mask", limits, (AREA,))
     kinds = frozenset(sides[0].dims.tolist()) - {-1} if keep_geom_type else _EVERY
     rows = clip_mixed(*sides, limits, kinds, not keep_geom_type)
+    return frame_of_left(layer, rows)
+
+
+def frame_of_left(layer: GeoDataFrame, rows: LayerRows) -> GeoDataFrame:
+    """Return rows with the index and attributes of their left features."""
+    geopandas, _ = geopandas_and_shapely()
     frame = layer.iloc[rows.left].copy()
     geometries = _geometries(rows, source=np.asarray(layer.geometry.array))
-    geometries = with_altitudes(geometries, [(layer, rows.left, None)])
+    geometries = _with_altitudes(geometries, [(layer, rows.left, None)])
     frame[layer.geometry.name] = geopandas.array.GeometryArray(geometries, crs=layer.crs)
     return frame
 
@@ -213,7 +229,9 @@ def dissolve(
     aggfunc: Any = "first",
     *,
     coverage: bool = False,
+    gaps: str = "keep",
     grid: float | None = None,
+    wrap: float | None = None,
     deadline: float | None = None,
     cancel: Cancel | None = None,
     **options: Any,
@@ -228,8 +246,11 @@ def dissolve(
         As GeoDataFrame.dissolve.
     coverage : bool, default False
         The polygons of a group do not overlap: verified exactly, and refused with the place of an overlap. Sides that
-        they share then vanish without an arrangement. What lies between polygons stays a hole.
-    grid : float, optional
+        they share then vanish without an arrangement. What several polygons enclose, and none has as a hole of its own,
+        is a gap: a warning lists their places.
+    gaps : {"keep", "refuse"}
+        With coverage: gaps stay holes, or are refused. No tolerance tells a gap from a lake between polygons.
+    grid, wrap
         As for `overlay`.
     deadline, cancel
         As for `engine.locate`.
@@ -270,7 +291,8 @@ def dissolve(
     check_frames("dissolve", options, _ABOUT_ATTRIBUTES, layer=layer)
     geopandas, shapely = geopandas_and_shapely()
     check_options(None, None, coverage=coverage)
-    limits = Limits(deadline, cancel, grid=grid)
+    limits = Limits(deadline, cancel, grid=grid, wrap=wrap)
+    check_gaps(gaps, coverage, grid)
     name = layer.geometry.name
     features = mixed_of(layer, "layer", limits)
     points = geopandas.points_from_xy(np.arange(len(layer)), np.zeros(len(layer)), crs=layer.crs)
@@ -286,9 +308,9 @@ def dissolve(
     at, group = shapely.get_coordinates(np.asarray(frame.geometry.array), return_index=True)
     groups = np.full(len(layer), NONE)
     groups[at[:, 0].astype(int)] = group
-    rows = dissolve_mixed(features, groups, len(frame), limits, coverage)
+    rows = dissolve_mixed(features, groups, len(frame), limits, coverage, gaps)
     empty = shapely.GeometryCollection() if (features.paths.dims >= 0).any() else shapely.Polygon()
-    geometries = with_altitudes(_geometries(rows, empty), [(layer, np.arange(len(frame)), groups)])
+    geometries = _with_altitudes(_geometries(rows, empty), [(layer, np.arange(len(frame)), groups)])
     frame[name] = geopandas.array.GeometryArray(geometries, crs=layer.crs)
     return frame
 
@@ -314,6 +336,28 @@ def _geometries(rows: LayerRows, empty: Any = None, source: Any = None) -> Any:
             touching = touching._replace(points=touching.points[~is_whole], places=touching.places[~is_whole])
         _add_touching(geometries, touching)
     return geometries
+
+
+def _with_altitudes(geometries: Any, sources: list[tuple[GeoDataFrame, IntArray, IntArray | None]]) -> Any:
+    """Return the geometries of rows with the altitudes of their features, as `heights_at` has them. sources: layers; by
+    row the feature, or the group, that it comes from; by feature its group, None where rows are of features."""
+    _, shapely = geopandas_and_shapely()
+    known = []
+    for frame, of_rows, groups in sources:
+        array = np.asarray(frame.geometry.array)
+        if shapely.has_z(array).any():
+            places, feature = shapely.get_coordinates(array, include_z=True, return_index=True)
+            known.append((np.column_stack([feature if groups is None else groups[feature], places]), of_rows))
+    flat, row = (
+        shapely.get_coordinates(geometries, return_index=True) if known else (np.zeros((0, 2)), np.zeros(0, np.int64))
+    )
+    heights = heights_at(flat, row, known)
+    if heights is None:
+        return geometries
+    made, there = np.array(geometries, object), ~shapely.is_missing(geometries)
+    solid = shapely.force_3d(geometries[there])
+    made[there] = shapely.set_coordinates(solid, np.column_stack([flat, heights]))
+    return made
 
 
 def _add_touching(geometries: Any, touching: Touching) -> None:
@@ -346,13 +390,11 @@ def _frame(left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str) -
     geopandas, _ = geopandas_and_shapely()
     import pandas
 
-    geometries = _geometries(rows, source=np.asarray(left.geometry.array))
-    geometries = with_altitudes(geometries, [(left, rows.left, None), (right, rows.right, None)])
-    geometry = geopandas.array.GeometryArray(geometries, crs=left.crs)
     if how == "difference":
-        frame = left.iloc[rows.left].copy()
-        frame[left.geometry.name] = geometry
-        return frame
+        return frame_of_left(left, rows)
+    geometries = _geometries(rows, source=np.asarray(left.geometry.array))
+    geometries = _with_altitudes(geometries, [(left, rows.left, None), (right, rows.right, None)])
+    geometry = geopandas.array.GeometryArray(geometries, crs=left.crs)
     sides = [side.drop(columns=side.geometry.name) for side in (left, right)]
     shared = set(sides[0].columns) & set(sides[1].columns)
     first, second = (

@@ -6,7 +6,7 @@ What rows copy of features (properties, ids, the `crs`) is written as JSON once;
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any, Final
 
@@ -192,18 +192,25 @@ def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntAr
 
 AREAS: Final = ("Polygon", "MultiPolygon")
 POINTS: Final = ("Point", "MultiPoint")
-EVERY: Final = (*POINTS, "LineString", "MultiLineString", *AREAS)
+LINES: Final = ("LineString", "MultiLineString")
+EVERY: Final = (*POINTS, *LINES, *AREAS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collection:
     """A FeatureCollection whose geometries are of one kind: its features, the properties of each (empty for null), its
-    `crs`, and the path of the argument, for messages."""
+    `crs`, and the path of the argument, for messages. altitudes: of vertices, once they are read."""
 
     features: list[dict[str, Any]]
     properties: list[dict[str, Any]]
     crs: Any
     where: Where
+    altitudes: list[FloatArray] = field(default_factory=lambda: [np.zeros((0, 4))])
+
+    @property
+    def known(self) -> FloatArray:
+        """The vertices that have an altitude: feature, x, y, altitude."""
+        return np.concatenate(self.altitudes)
 
 
 def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ...] = AREAS) -> Collection:
@@ -248,7 +255,8 @@ def refused(
 
 def polygons_of(side: Collection, limits: Limits) -> Layer:
     """Return the polygons of a collection as a `Layer`; overlapping parts of a feature are united."""
-    return layer_of(*_parts_of(side, limits), limits)
+    with limits.budget():
+        return layer_of(*_parts_of(side, limits), limits, side.crs is None)
 
 
 def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
@@ -262,7 +270,8 @@ def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
                 paths = check_each([number], side, _paths_in, is_array=False)[0]
                 counts[number] = len(paths)
                 sizes += map(len, paths)
-                positions += paths
+                positions += [path[:, :2] for path in paths]
+                side.altitudes.extend(_known(number, path) for path in paths if path.shape[1] == 3)
                 dims[number] = (POINT if geometry["type"] in POINTS else LINE) if paths else -1
     vertices = np.concatenate([np.zeros((0, 2)), *positions])
     return MixedLayer(polygons_of(side, limits), Paths(dims, read_only(vertices), summed(sizes), summed(counts)))
@@ -272,8 +281,8 @@ def _paths_in(geometry: dict[str, Any]) -> list[FloatArray]:
     """Return the positions of each point or line of a geometry."""
     kind, given = geometry["type"], geometry["coordinates"]
     if kind in POINTS:
-        return [as_points([place], 2) for place in ([given] if kind == "Point" and len(given) else given)]
-    lines = [as_points(line, 2) for line in ([given] if kind == "LineString" else given) if len(line)]
+        return [_positions([[place]]) for place in ([given] if kind == "Point" and len(given) else given)]
+    lines = [_positions([line]) for line in ([given] if kind == "LineString" else given) if len(line)]
     for line in lines:
         if len(line) == 1:
             raise InvalidArrayError("a line of one position; a line needs 2", ())
@@ -301,7 +310,10 @@ def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray
                     rings.extend(part)
             positions = _positions(rings)
             offsets = summed(np.fromiter(map(len, polled(rings)), np.int64)), summed(part_sizes)
-            arrays = arrays_of(positions, *offsets)
+            if positions.shape[1] == 3:
+                owners = np.repeat(np.repeat(np.arange(len(counts)), counts), np.diff(offsets[0][offsets[1]]))
+                side.altitudes.append(_known(owners, positions))
+            arrays = arrays_of(np.ascontiguousarray(positions[:, :2]), *offsets)
         except (DeadlineExceededError, CancelledError):
             raise
         except (EngineError, TypeError, ValueError, KeyError):
@@ -311,10 +323,25 @@ def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray
 
 
 def _positions(rings: list[Any]) -> FloatArray:
-    """Return the positions of all rings, one after another, in one array (n, 2)."""
+    """Return the positions of all rings, one after another, in one array (n, 2), or (n, 3) where some have an altitude,
+    NaN for others."""
     if not any(isinstance(ring, np.ndarray) for ring in rings):
-        return as_points(list(chain.from_iterable(polled(rings))), 2)
-    return np.concatenate([as_points(ring, 2) for ring in polled(rings)])
+        places = list(chain.from_iterable(polled(rings)))
+        has_altitude = np.fromiter(map(len, places), np.int64) == 3 if places else np.zeros(0, np.bool_)
+        if not has_altitude.any():
+            return as_points(places, 2)
+        made = as_points([place if len(place) == 3 else [*place, 0.0] for place in polled(places)], 3)
+        return np.where(has_altitude[:, None] | (np.arange(3) < 2), made, np.nan)
+    parts = [_positions([ring.tolist()]) if isinstance(ring, np.ndarray) and ring.ndim == 2 and ring.shape[1] == 3
+             else as_points(ring, 2) for ring in polled(rings)]  # fmt: skip
+    if any(part.shape[1] == 3 for part in parts):
+        parts = [part if part.shape[1] == 3 else np.insert(part, 2, np.nan, axis=1) for part in parts]
+    return np.concatenate(parts)
+
+
+def _known(owners: Any, positions: FloatArray) -> FloatArray:
+    """Return positions (n, 3) as rows (feature, x, y, altitude)."""
+    return np.insert(positions, 0, owners, axis=1)
 
 
 def _check_rings(geometry: dict[str, Any]) -> None:
@@ -322,7 +349,7 @@ def _check_rings(geometry: dict[str, Any]) -> None:
     coordinates = geometry["coordinates"]
     for part in [coordinates] if geometry["type"] == "Polygon" else polled(coordinates):
         for ring in polled(part):
-            if len(as_points(ring, 2, ("its ring",))) == 1:
+            if len(_positions([ring])) == 1:
                 raise RingTooShortError("a ring of one position; a ring needs 3", ())
 
 
@@ -341,7 +368,7 @@ def check_each(
         except WrongDimensionError:
             kind, what = (
                 WrongDimensionError,
-                "has positions of other than two numbers; layers are plane: leave the z out",
+                "has positions of other than two numbers, or three with an altitude",
             )
         except EngineError as error:
             kind, what = type(error), f"is wrong: {error.message}"  # type: ignore[assignment]

@@ -111,7 +111,7 @@ def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limi
     return scaled
 
 
-def nearest_features(
+def nearest_of(
     left: MixedLayer, right: MixedLayer, most: float, is_exclusive: bool, limits: Limits
 ) -> tuple[IntArray, FloatArray]:
     """Return (n, 2) pairs of each left feature and all right ones nearest to it, sorted, and their distances.

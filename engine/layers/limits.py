@@ -8,8 +8,10 @@ from typing import Any, TypedDict
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
+from engine.errors import InvalidInputError
 from engine.polygon_overlay.grid import grid_of
 from engine.running.budget import Budget, Cancel
+from engine.solids.checks import shown
 from engine.types import Accuracy, FloatArray, IntArray
 
 
@@ -24,24 +26,39 @@ class GridOptions(TimeOptions, total=False):
     """Those where new coordinates are made."""
 
     grid: float | None
+    min_width: float | None
+    wrap: float | None
+
+
+class ClipOptions(GridOptions, total=False):
+    """Those of clips."""
+
+    keep: str
 
 
 class UnionOptions(GridOptions, total=False):
     """Those of unions."""
 
     coverage: bool
+    gaps: str
 
 
 class Limits:
     """Remaining time of one public call for the calls of which it consists, and the sum of their accuracy reports;
-    grid: the spacing to which areas are snapped, None for no grid."""
+    grid: the spacing to which areas are snapped, None for no grid; wrap: 180 where polygons are cut at that meridian;
+    is_outside: whether a clip returns what is outside."""
 
     def __init__(
-        self, deadline: float | None, cancel: Cancel | None, workers: int | None = None, grid: float | None = None
-    ) -> None:
+        self, deadline: float | None, cancel: Cancel | None, workers: int | None = None, grid: float | None = None,
+        wrap: float | None = None, keep: str = "inside",
+    ) -> None:  # fmt: skip
         if grid is not None:
             grid_of(grid)  # checks it
-        self.grid = grid
+        if wrap is not None and (isinstance(wrap, bool) or not isinstance(wrap, (int, float)) or wrap != 180):
+            raise InvalidInputError(f"wrap must be 180, the meridian to cut at, got {shown(wrap)}", ("wrap",))
+        if not isinstance(keep, str) or keep not in ("inside", "outside"):
+            raise InvalidInputError(f"keep must be inside or outside, got {shown(keep)}", ("keep",))
+        self.grid, self.wrap, self.is_outside = grid, wrap is not None, keep == "outside"
         seconds = Budget(deadline, cancel).deadline  # checks both
         self._end = None if seconds is None else time.monotonic() + seconds
         self._cancel, self.workers = cancel, workers

@@ -31,6 +31,7 @@ from engine.layers.rows import (
 )  # fmt: skip
 from engine.layers.rows import overlay_rows as overlay_areas
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
+from engine.layers.wrapped_rows import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
 from engine.polygon_overlay.touching import Place, Touching, concatenate_touching, join_edges
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -61,14 +62,14 @@ def overlay_mixed(
     check_how(how)
     areas = overlay_areas(left.areas, right.areas, how, limits, with_touching)
     if (left.paths.dims < 0).all():
-        return areas
+        return joined_rows(areas, limits)
     of_pairs, of_left, _ = HOWS[how]
     parts = [areas]
     if of_pairs:
         parts.append(path_rows(left.paths, right.areas, np.arange(len(right.areas)), False, limits, kinds))
     if of_left:
         parts.append(path_rows(left.paths, right.areas, np.zeros(len(right.areas), np.int64), True, limits, kinds))
-    return sorted_rows(parts)
+    return joined_rows(sorted_rows(parts), limits)
 
 
 def clip_mixed(
@@ -76,6 +77,10 @@ def clip_mixed(
 ) -> LayerRows:
     """Cut a layer to the union of polygons, a row for each feature that is left; kinds, with_touching: as
     `overlay_mixed`."""
+    if limits.is_outside:
+        rows = overlay_mixed(layer, mask, "difference", limits, kinds, False)
+        stays = (np.diff(rows.row_offsets) > 0) | (layer.paths.dims[rows.left] >= 0)  # not those without geometry
+        return rows if stays.all() else replace(rows.take(np.flatnonzero(stays)), touching=None)
     there = np.flatnonzero(mask.areas.arrays.sizes())
     arrays = unite(PolygonSelection(mask.areas.arrays, there), limits)
     none = np.zeros(0, np.int64)
@@ -84,7 +89,7 @@ def clip_mixed(
     if (layer.paths.dims >= 0).any():
         zeros = np.zeros(len(mask.areas), np.int64)
         parts.append(path_rows(layer.paths, mask.areas, zeros, False, limits, kinds))
-    return sorted_rows(parts)
+    return joined_rows(sorted_rows(parts), limits)
 
 
 def sorted_rows(parts: list[LayerRows]) -> LayerRows:
@@ -289,16 +294,17 @@ def _between(inside: _Intervals, segments: FloatArray) -> _Intervals:
 
 
 def dissolve_mixed(
-    layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False
+    layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False, gaps: str = "keep"
 ) -> LayerRows:
-    """Return one row for each group, the union of its features, all of one dimension; is_coverage: as `dissolve_rows`.
+    """Return one row for each group, the union of its features, all of one dimension; is_coverage, gaps: as
+    `dissolve_rows`.
     Raises: UnsupportedSolidError for a layer of several dimensions."""
     kinds = np.setdiff1d(layer.dims, [-1])
     if len(kinds) > 1:
         raise UnsupportedSolidError("layer has features of several dimensions; dissolve each alone", ("layer",))
     if len(kinds) and kinds[0] < AREA:
         return _dissolve_paths(layer.paths, groups, n_groups, limits)
-    return dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage)
+    return joined_rows(dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage, gaps), limits)
 
 
 def _dissolve_paths(paths: Paths, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:

@@ -15,7 +15,9 @@ from typing import Any, Final, cast
 import numpy as np
 
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
+from engine.layers.gaps import Place, gaps_of, report_gaps
 from engine.layers.limits import Limits
+from engine.layers.wrapping import cut_parts, note_steps
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.coverage import union_of_coverage
 from engine.polygon_overlay.overlay import less_all, overlay, union_all
@@ -120,7 +122,7 @@ def overlay_rows(left: Layer, right: Layer, how: str, limits: Limits, with_touch
     parts = []
     if of_pairs:
         sides = PolygonSelection(left.arrays, pairs[:, 0]), PolygonSelection(right.arrays, pairs[:, 1])
-        parts.append(_pair_rows(*sides, "intersection", pairs[:, 0], pairs[:, 1], limits, with_touching))
+        parts.append(rows_of_pairs(*sides, "intersection", pairs[:, 0], pairs[:, 1], limits, with_touching))
     if of_left:
         parts.append(_difference_rows(left, right, pairs, rivals[1], limits))
     if of_right:
@@ -162,7 +164,7 @@ def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntAr
     clips, is_there = others.arrays.take(seconds).merged(groups), layer.arrays.sizes() > 0
     jointly, singly = np.flatnonzero(is_there & ~overlap), np.flatnonzero(is_there & overlap)
     sides = PolygonSelection(layer.arrays, jointly), PolygonSelection(clips, jointly)
-    rows = _pair_rows(*sides, "difference", jointly, np.full(len(jointly), NONE), limits)
+    rows = rows_of_pairs(*sides, "difference", jointly, np.full(len(jointly), NONE), limits)
     if len(singly):
         rests = []
         for k in singly.tolist():
@@ -176,7 +178,7 @@ def _difference_rows(layer: Layer, others: Layer, pairs: IntArray, rivals: IntAr
                     continue
                 clip = Polygon(limits.record(union_all(rest, **limits.options())).rings)
                 rests.append(limits.record(overlay(own, clip, "difference", grid=limits.grid, **limits.options())))
-        rows = concatenate_rows([rows, _rows_of(rests, singly)])
+        rows = concatenate_rows([rows, rows_of(rests, singly)])
     missing = np.flatnonzero(layer.is_missing)
     stays = np.flatnonzero(np.append(np.diff(rows.row_offsets) > 0, np.ones(len(missing), np.bool_)))
     offsets = np.append(rows.row_offsets, np.full(len(missing), rows.row_offsets[-1]))
@@ -210,9 +212,14 @@ def unite(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
     return PolygonArrays(union.vertices, union.ring_offsets, np.array([0, len(union.ring_offsets) - 1]))
 
 
-def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits) -> Layer:
+def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits, in_degrees: bool) -> Layer:
     """Return the `Layer` whose feature k has the polygons offsets[k] .. offsets[k + 1] - 1 of parts; overlapping ones
-    of a feature are united."""
+    of a feature are united. With `limits.wrap` parts are cut at the antimeridian first. in_degrees: whether coordinates
+    are longitudes and latitudes, as far as is known."""
+    if limits.wrap:
+        parts, offsets = cut_parts(parts, offsets, limits)
+    elif in_degrees:
+        note_steps(*parts[:2])
     owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     arrays = parts.merged(offsets)
     filled = np.flatnonzero(parts.sizes())
@@ -239,7 +246,7 @@ def _overlay_batch(
     return cast(OverlayBatch, limits.record(batch))
 
 
-def _pair_rows(
+def rows_of_pairs(
     firsts: PolygonSelection, seconds: PolygonSelection, operation: Operation, left: IntArray, right: IntArray,
     limits: Limits, with_touching: bool = False,
 ) -> LayerRows:  # fmt: skip
@@ -251,7 +258,7 @@ def _pair_rows(
         return _rows(batch, left, right, more)
     options = {"grid": limits.grid, **limits.options()}
     made = [limits.record(overlay(one, other, operation, **options)) for one, other in zip(polled(firsts), seconds)]
-    rows = _rows_of(made, left)
+    rows = rows_of(made, left)
     stays = np.diff(rows.row_offsets) > 0
     offsets = np.append(rows.row_offsets[:1], rows.row_offsets[1:][stays])
     return replace(rows, left=left[stays], right=right[stays], row_offsets=offsets)
@@ -309,18 +316,24 @@ def concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
 
 
 def dissolve_rows(
-    layer: Layer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False
+    layer: Layer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False, gaps: str = "keep"
 ) -> LayerRows:
     """Return one row for each group, the union of its features; groups: group of each feature, -1 for none.
-    is_coverage: features of a group must not overlap."""
+    is_coverage: features of a group must not overlap; gaps: keep, or refuse holes that several of them enclose."""
     order = np.argsort(groups, kind="stable")
     ends = np.searchsorted(groups[order], np.arange(n_groups + 1)).tolist()
     if is_coverage:
-        parts = [_joined_coverage(layer, order[start:stop], limits) for start, stop in pairwise(ends)]
-        return _rows_of(parts, np.arange(n_groups))
+        parts, places = [], list[Place]()
+        for start, stop in pairwise(ends):
+            some = order[start:stop]
+            parts.append(_joined_coverage(layer, some, limits))
+            with limits.budget():
+                places += gaps_of(parts[-1], layer.arrays.take(some)) if limits.grid is None else []
+        report_gaps(places, gaps == "refuse")
+        return rows_of(parts, np.arange(n_groups))
     members = (list(PolygonSelection(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
     unions = [limits.record(union_all(some, grid=limits.grid, **limits.options())) for some in members]
-    return _rows_of(unions, np.arange(n_groups))
+    return rows_of(unions, np.arange(n_groups))
 
 
 def _joined_coverage(layer: Layer, members: IntArray, limits: Limits) -> Overlay:
@@ -341,7 +354,7 @@ def _joined_coverage(layer: Layer, members: IntArray, limits: Limits) -> Overlay
     return cast(Overlay, limits.record(union_all(polygons, grid=limits.grid, **limits.options())))
 
 
-def _rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
+def rows_of(overlays: Sequence[Overlay], left: IntArray) -> LayerRows:
     """Return one row for each overlay, even without pieces; left: the feature of each."""
     return LayerRows(
         left, np.full(len(left), NONE), np.concatenate([np.zeros((0, 2)), *(each.vertices for each in overlays)]),

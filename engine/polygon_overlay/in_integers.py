@@ -39,8 +39,15 @@ def overlay_exactly(
     nesting: fill rule, if not that of two polygons. is_on_grid: coordinates are in units of a grid; snap the result to
     integer points."""
     subdivision, inside = _label_arrangement(subject, clip, SELECTED[operation], budget, nesting)
-    arrangement = subdivision.arrangement
     pieces = trace_pieces(subdivision, inside, [frozenset()] * subdivision.n_faces)
+    result = valid_overlay(subdivision.arrangement, pieces, budget, is_on_grid)
+    return replace(result, _starts=np.array([len(subject.vertices)])), subdivision.arrangement.n_exact
+
+
+def valid_overlay(
+    arrangement: Arrangement, pieces: Sequence[Piece], budget: Budget, is_on_grid: bool = False
+) -> Overlay:
+    """Return pieces of an arrangement, rounded and valid; is_on_grid: as for `overlay_exactly`."""
     nodes = arrangement.nodes
     corners = [[arrangement.origin(half_edge) for half_edge in ring] for ring in rings_of(pieces)]
     exact = ExactRings(tuple(tuple(nodes.points[node] for node in ring) for ring in corners), nodes.exponent)
@@ -52,7 +59,7 @@ def overlay_exactly(
     )
     if result is None:
         raise TooComplexError("snap rounding left a vertex off its lattice; please report this input")
-    return replace(result, _starts=np.array([len(subject.vertices)])), arrangement.n_exact
+    return result
 
 
 def parts_exactly(subject: RingArrays, clip: RingArrays, budget: Budget) -> tuple[PairResults, IntArray]:

@@ -1,0 +1,114 @@
+"""Polygons in longitude and latitude that cross the antimeridian: cut there before a question, joined after it.
+
+A step of more than 180 degrees between two vertices of a ring crosses the antimeridian. Counting these steps makes the
+ring continuous: longitudes x + 360 k, exact as fractions. It is then split by the lines x = 180 + 360 j, and each piece
+is moved back by 360 j: vertices of the input are the doubles that they were, and the latitude of a cut is rounded once,
+the same for two features that share the edge. Edges stay straight in longitude and latitude, as RFC 7946 has them.
+
+Source: RFC 7946, 3.1.9 (Antimeridian Cutting).
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+from math import floor
+
+import numpy as np
+
+from engine.arrangement.nodes import rational_nodes
+from engine.errors import InvalidInputError
+from engine.layers.limits import Limits
+from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of, concatenate_polygons
+from engine.polygon_overlay.split import pieces_between
+from engine.running.budget import Budget, note
+from engine.solids.ragged import next_in_rings, summed
+from engine.types import BoolArray, FloatArray, IntArray
+
+Exact = tuple[Fraction, Fraction]
+
+
+def steps_of(vertices: FloatArray, ring_offsets: IntArray) -> IntArray:
+    """Return for the edge that begins at each vertex by how many turns the longitudes after it grow: -1, 0 or 1."""
+    x, following = vertices[:, 0], vertices[next_in_rings(ring_offsets), 0]
+    with np.errstate(all="ignore"):
+        step = following - x
+        rest = (following - (step - (step - following))) - (x + (step - following))  # what rounding took of it
+    is_east, is_west = (step > 180) | ((step == 180) & (rest > 0)), (step < -180) | ((step == -180) & (rest < 0))
+    return is_west.astype(np.int64) - is_east
+
+
+def note_steps(vertices: FloatArray, ring_offsets: IntArray) -> None:
+    """Warn of rings in longitude and latitude with steps of more than 180 degrees, which are taken as they are."""
+    x, y = vertices.T
+    if not len(x) or not (x.max() - x.min() > 180 and np.abs(x).max() <= 180 and np.abs(y).max() <= 90):
+        return
+    n = len(np.unique(np.searchsorted(ring_offsets, np.flatnonzero(steps_of(vertices, ring_offsets)), side="right")))
+    if n:
+        note(f"{n} rings have steps of more than 180 degrees, taken as they are; wrap=180 cuts at the antimeridian")
+
+
+def cut_parts(parts: PolygonArrays, offsets: IntArray, limits: Limits) -> tuple[PolygonArrays, IntArray]:
+    """Return the polygons of features, feature k has offsets[k] .. offsets[k + 1] - 1, cut at the antimeridian. Raises:
+    InvalidInputError for a ring around a pole."""
+    steps = steps_of(parts.vertices, parts.ring_offsets)
+    ends = parts.ring_offsets[parts.polygon_offsets]
+    is_cut: BoolArray = np.array(
+        [bool(steps[i:j].any() or (np.abs(parts.vertices[i:j, 0]) > 180).any()) for i, j in pairwise(ends.tolist())],
+        np.bool_,
+    )
+    if not is_cut.any():
+        return parts, offsets
+    made, numbers, n_made = [parts], [np.array([k]) for k in range(len(is_cut))], len(is_cut)
+    with limits.budget() as budget:
+        for k in np.flatnonzero(is_cut).tolist():
+            rings = parts.ring_offsets[parts.polygon_offsets[k] : parts.polygon_offsets[k + 1] + 1].tolist()
+            around = [_unwrapped(parts.vertices[i:j], steps[i:j]) for i, j in pairwise(rings)]
+            if None in around:
+                feature = int(np.searchsorted(offsets, k, side="right")) - 1
+                what = f"feature {feature} has a ring that goes around a pole: add the pole, and the antimeridian twice"
+                raise InvalidInputError(f"wrap: {what}", ("wrap",))
+            pieces = _cut([each for each in around if each is not None], budget)
+            numbers[k] = np.arange(n_made, n_made + len(pieces))
+            n_made += len(pieces)
+            made += [_polygon(piece) for piece in pieces]
+    note(f"wrap: {int(is_cut.sum())} polygons cross the antimeridian, are cut there, and joined in the answer")
+    sizes = [len(each) for each in numbers]
+    counts = [sum(sizes[i:j]) for i, j in pairwise(offsets.tolist())]
+    return concatenate_polygons(made).take(np.concatenate(numbers)), summed(np.array(counts, np.int64))
+
+
+def _unwrapped(vertices: FloatArray, steps: IntArray) -> list[Exact] | None:
+    """Return the vertices of a ring with continuous longitudes; None if they do not come back."""
+    if steps.sum():
+        return None
+    turns = np.cumsum(np.append(0, steps[:-1])).tolist()
+    return [(Fraction(x) + 360 * turn, Fraction(y)) for (x, y), turn in zip(vertices.tolist(), turns)]
+
+
+def _cut(rings: list[list[Exact]], budget: Budget) -> list[list[list[Exact]]]:
+    """Return the pieces between the meridians 180 + 360 j of a shell with holes, each moved to -180 .. 180."""
+    low, high = min(x for x, _ in rings[0]), max(x for x, _ in rings[0])
+    for k, ring in enumerate(rings[1:], 1):  # a hole may be written a turn beside its shell
+        shift = next((n for n in (0, 360, -360) if all(low <= x + n <= high for x, _ in ring)), 0)
+        rings[k] = [(x + shift, y) for x, y in ring]
+    bottom, top = min(y for ring in rings for _, y in ring), max(y for ring in rings for _, y in ring)
+    meridians = [Fraction(180 + 360 * j) for j in range(floor((low - 180) / 360), floor((high - 180) / 360) + 1)]
+    flat = [place for ring in rings for place in ring]
+    flat += [(x, y) for x in meridians for y in (bottom - 1, top + 1)]
+    nodes, numbers = rational_nodes(flat, budget)
+    ends = np.cumsum([0, *map(len, rings)]).tolist()
+    cuts = list(zip(numbers[ends[-1] :: 2], numbers[ends[-1] + 1 :: 2]))
+    arrangement, pieces = pieces_between(nodes, [numbers[i:j] for i, j in pairwise(ends)], cuts, budget)
+    made = []
+    for piece in pieces:
+        exact = [[nodes.exact(arrangement.origin(edge)) for edge in ring] for ring in (piece.shell, *piece.holes)]
+        turn = 360 * floor((min(x for x, _ in exact[0]) + 180) / 360)
+        made.append([[(x - turn, y) for x, y in ring] for ring in exact])
+    return made
+
+
+def _polygon(rings: list[list[Exact]]) -> PolygonArrays:
+    """Return a piece with nearest doubles."""
+    places = np.array([(float(x), float(y)) for ring in rings for x, y in ring])
+    return arrays_of(places, summed(np.array([*map(len, rings)], np.int64)), np.array([0, len(rings)]))
