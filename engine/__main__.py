@@ -1,5 +1,5 @@
 """The command line ``python -m engine contains | collide | clearance | distances | clip | hits | bounds | volume |
-section | cut | overlay | union | join | crop | relate``: for files; the last five are for layers.
+section | cut | overlay | union | join | crop | relate | nearest | split``: for files; the last seven are for layers.
 
 ``python -m engine warm`` compiles all kernels before they are needed, here or for other machines (``--into``);
 ``python -m engine audit`` compares other packages with the exact answers on your data.
@@ -15,9 +15,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import import_module
+from itertools import islice
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -27,20 +29,21 @@ from engine.containment.locate import locate
 from engine.distance.clearance import clearance_poses
 from engine.distance.distances import Distances, distances
 from engine.errors import EngineError, InvalidInputError
+from engine.files.layers import SEQUENCES, feature_in, write_geojson, write_layer
 from engine.files.octets import in_words
 from engine.files.solids import (
     read_features,
     read_rows,
     read_solid,
     read_solids,
-    write_geojson,
     write_mesh,
     write_table,
 )
-from engine.layers.feature_joins import join_features, locate_features
-from engine.layers.features import clip_features, dissolve_features, overlay_features
+from engine.layers.feature_joins import join_features, locate_features, nearest_features
+from engine.layers.features import clip_features, dissolve_features, overlay_features, split_features
 from engine.layers.relate import PREDICATES
 from engine.layers.rows import HOWS
+from engine.layers.streams import FeatureStream
 from engine.polygon_clipping.clip_polygons import PolygonStatus, clip_polygons
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.hits import HitKind, hits
@@ -186,21 +189,42 @@ def _clipped(rings: Any, item: int) -> dict[str, Any]:
 
 def _overlay(options: Options) -> None:
     left, right = read_features(options.left), read_features(options.right)
-    more = {"grid": options.grid, "deadline": options.deadline}
+    more = _of_areas(options)
     _write_features(overlay_features(left, right, options.operation, **more), options)
 
 
 def _union(options: Options) -> None:
-    more = {"grid": options.grid, "coverage": options.coverage, "deadline": options.deadline}
+    more = {"coverage": options.coverage, "gaps": options.gaps, **_of_areas(options)}
     _write_features(dissolve_features(read_features(options.layer), options.by, **more), options)
 
 
 def _crop(options: Options) -> None:
+    if _stream(options, "clip", options.layer, options.mask, keep=options.keep, grid=options.grid, wrap=options.wrap):
+        return
     layer, mask = read_features(options.layer), read_features(options.mask)
-    _write_features(clip_features(layer, mask, grid=options.grid, deadline=options.deadline), options)
+    _write_features(clip_features(layer, mask, keep=options.keep, **_of_areas(options)), options)
+
+
+def _of_areas(options: Options) -> dict[str, Any]:
+    names = "grid", "min_width", "wrap", "deadline"
+    return {name: getattr(options, name) for name in names}
+
+
+def _split(options: Options) -> None:
+    layer, lines = read_features(options.layer), read_features(options.lines)
+    _write_features(split_features(layer, lines, min_width=options.min_width, deadline=options.deadline), options)
+
+
+def _nearest(options: Options) -> None:
+    left, right = read_features(options.left), read_features(options.right)
+    more = {name: getattr(options, name) for name in ("max_distance", "exclusive", "outside", "deadline")}
+    _write_features(nearest_features(left, right, **more), options)
 
 
 def _relate(options: Options) -> None:
+    asked = {name: getattr(options, name) for name in ("predicate", "distance", "outside")}
+    if _stream(options, "join", options.left, options.right, **asked):
+        return
     left, right = read_features(options.left), read_features(options.right)
     more = {"distance": options.distance, "outside": options.outside, "deadline": options.deadline}
     _write_features(join_features(left, right, options.predicate, **more), options)
@@ -211,8 +235,27 @@ def _join(options: Options) -> None:
     _write_features(locate_features(points, polygons, outside=options.outside, deadline=options.deadline), options)
 
 
+def _stream(options: Options, operation: str, source: str, layer: str, **more: Any) -> bool:
+    """Answer the features of a file with one a line part by part into such a file; return whether both are."""
+    if not (source.endswith(SEQUENCES) and str(options.output or "").endswith(SEQUENCES)):
+        return False
+    stream = FeatureStream(operation, read_features(layer), deadline=options.deadline, **more)
+
+    def rows() -> Iterator[dict[str, Any]]:
+        with Path(source).open(encoding="utf-8") as file:
+            lines = ((number, line.strip().removeprefix("\x1e")) for number, line in enumerate(file, 1))
+            features = (feature_in(number, line, source) for number, line in lines if line)
+            while some := [*islice(features, _PART)]:
+                yield from stream.rows(some, options.deadline)
+
+    write_layer(options.output, rows(), None)
+    return True
+
+
 def _write_features(rows: Any, options: Options) -> None:
-    write_geojson(options.output, rows, rows.crs)
+    write_layer(options.output, rows, rows.crs)
+    for row, piece, width in rows.slivers or ():
+        print(f"feature {row}, piece {piece}: {width!r} wide", file=sys.stderr)
     if rows.collapsed and not options.quiet:
         print(f"rounding left nothing of {rows.collapsed} rows", file=sys.stderr)
 
@@ -256,6 +299,8 @@ def _audit(words: Sequence[str]) -> int:
     return int((audit.main if "--asked" in words else audit.watched)(words))
 
 
+_PART: Final = 2_000
+"""Features of a stream in memory at a time."""
 FORMATS: Final = "mesh file (.stl, .obj, .ply, .off, .glb), .npz, .json, .geojson, or the JSON of a solid"
 SOLID: Final = {"solid": FORMATS}
 POSES: Final = "file with rows [R | t], the poses of the second: 12 numbers in 3D, 6 in 2D; the identity by default"
@@ -284,6 +329,10 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
              {"layer": ANY + ATTRIBUTES, "mask": LAYER}),
     "relate": (_relate, "join the features of two layers that have a relation: they meet, one is within the other, ...",
                {"left": ANY + ATTRIBUTES, "right": ANY}),
+    "nearest": (_nearest, "join the features of a layer to the nearest ones of another, with the distance",
+                {"left": ANY + ATTRIBUTES, "right": ANY}),
+    "split": (_split, "split polygons by lines, a feature for each piece",
+              {"layer": LAYER + ATTRIBUTES, "lines": LAYER.replace("polygons", "lines")}),
     "bounds": (_bounds, "smallest box and smallest sphere of a solid", SOLID),
     "volume": (_volume, "volume, area and centroid of a solid", SOLID),
     "section": (_section, "sections of a mesh at heights, as rows of plane, piece, ring and position", SOLID),
@@ -327,6 +376,16 @@ def _parser() -> argparse.ArgumentParser:
     made["overlay"].add_argument("--operation", choices=HOWS, default="intersection")
     for name in ("overlay", "union", "crop"):
         made[name].add_argument("--grid", type=float, metavar="SPACING", help="snap polygons to multiples of this")
+        made[name].add_argument(
+            "--wrap", type=float, metavar="180", help="cut polygons at the antimeridian, join after"
+        )
+    for name in ("overlay", "union", "crop", "split"):
+        made[name].add_argument("--min-width", type=float, metavar="DISTANCE", help="list pieces that are narrower")
+    made["union"].add_argument("--gaps", choices=("keep", "refuse"), default="keep", help="with --coverage")
+    made["crop"].add_argument("--keep", choices=("inside", "outside"), default="inside")
+    made["nearest"].add_argument("--max-distance", type=float, metavar="DISTANCE", help="the largest, which counts")
+    made["nearest"].add_argument("--exclusive", action="store_true", help="equal features are not the nearest")
+    made["nearest"].add_argument("--outside", action="store_true", help="also write features without one so near")
     made["union"].add_argument("--coverage", action="store_true", help="refuse polygons that overlap")
     made["relate"].add_argument("--predicate", choices=(*PREDICATES, "dwithin"), default="intersects")
     made["relate"].add_argument("--distance", type=float, help="with dwithin: the largest distance")

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields
 from functools import partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import dask.config
 import numpy as np
@@ -27,6 +27,8 @@ from engine.distance import clearance as clearances
 from engine.distance import distances as point_distances
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
+from engine.layers import frame_joins as joins
+from engine.layers.joins import check_predicate
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
 from engine.polygon_overlay.run import Operation
@@ -40,6 +42,9 @@ from engine.segment_clipping.hits import Hits
 from engine.solids.base import Solid
 from engine.solids.checks import as_point_groups, as_points, shown
 from engine.types import BoolArray, FloatArray, Int8Array
+
+if TYPE_CHECKING:
+    from geopandas import GeoDataFrame
 
 PARTS_PER_THREAD = 3
 """Parts sent out at a time for each thread: enough to hide the network, few enough for batches larger than a worker's
@@ -143,6 +148,54 @@ def overlay_batch(
     function = partial(_about_rows, overlay_pairs, operation=operation)
     parts_done = _in_order(_answers(client, function, (), (subjects, clips), part, progress))
     return join_batches([none, *(batch for _, batch in parts_done)])
+
+
+def sjoin(
+    client: Client, left: GeoDataFrame, right: GeoDataFrame, how: joins.How = "inner", predicate: str = "intersects", *,
+    distance: float | None = None, lsuffix: str = "left", rsuffix: str = "right", part: int = 20_000,
+    progress: Progress | None = None,
+) -> GeoDataFrame:  # fmt: skip
+    """Join layers, see `engine.layers.sjoin`: parts of the left layer along a curve that fills the plane, each sent
+    with the features of the right that are near it."""
+    joins.check_join("sjoin", left, right, how, lsuffix, rsuffix, {})
+    reach = check_predicate(predicate, distance)
+    order = np.argsort(left.geometry.hilbert_distance().to_numpy(), kind="stable") if len(left) else np.zeros(0, int)
+    tasks = _Tiles(left, right, order, reach)
+    function = partial(_related, predicate=predicate, distance=distance)
+    pairs = [
+        np.zeros((0, 2), np.int64),
+        *(made for _, made in _answers(client, function, (), (tasks,), part, progress)),
+    ]
+    both = np.concatenate(pairs)
+    return joins.joined(left, right, both[np.lexsort((both[:, 1], both[:, 0]))], how, (lsuffix, rsuffix))
+
+
+class _Tiles:
+    """Parts of a layer in an order, with the features of another one within a distance of their boxes."""
+
+    def __init__(self, left: GeoDataFrame, right: GeoDataFrame, order: Any, reach: float) -> None:
+        self._sides, self._order, self._reach = (left, right), order, reach
+        self._boxes = [side.geometry.bounds.to_numpy() for side in (left, right)]
+
+    def __len__(self) -> int:
+        return len(self._order)
+
+    def __getitem__(self, some: slice) -> Any:
+        rows = self._order[some]
+        own, theirs = self._boxes[0][rows], self._boxes[1]
+        low = np.nextafter(np.fmin.reduce(own[:, :2], initial=np.inf) - self._reach, -np.inf)
+        high = np.nextafter(np.fmax.reduce(own[:, 2:], initial=-np.inf) + self._reach, np.inf)
+        near = np.flatnonzero(((theirs[:, :2] <= high) & (theirs[:, 2:] >= low)).all(axis=1))
+        parts = [side.geometry.iloc[each].reset_index(drop=True) for side, each in zip(self._sides, (rows, near))]
+        return rows, near, *parts
+
+
+def _related(shared: tuple[Any, ...], tile: Any, predicate: str, distance: float | None) -> Any:
+    """Return pairs (n, 2) of features that are related, of a part of both layers."""
+    rows, near, left, right = tile
+    sides = left.to_frame("geometry"), right.to_frame("geometry")
+    made = joins.sjoin(sides[0], sides[1], "inner", predicate, distance=distance, workers=1)
+    return np.column_stack([rows[made.index.to_numpy()], near[made["index_right"].to_numpy()]])
 
 
 def _about_rows(ask: Function, solids: tuple[Any, ...], *rows: Any, **options: Any) -> Any:

@@ -31,6 +31,8 @@ from service.route import posts_of
 from service.routes import questions, stored
 from service.settings import WARM_UP, Settings
 from service.store import Store
+from service.stream import PATH as STREAM
+from service.stream import Stream
 from service.tools import PATH, Tools
 from service.work import Pool
 
@@ -74,6 +76,7 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
     pages.add_pages(app)
     app.state.tools = Tools(app, settings, ROUTERS)
     app.router.routes.append(Route(PATH, app.state.tools, methods=["POST"], include_in_schema=False))
+    app.router.routes.append(Route(STREAM, Stream(app), methods=["POST"], include_in_schema=False))
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
     app.add_middleware(Gate, settings=settings, posts=posts_of(ROUTERS), metrics=app.state.metrics)

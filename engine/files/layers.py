@@ -5,8 +5,12 @@ from __future__ import annotations
 import io
 import json
 import os
+import sys
+from collections.abc import Iterable
+from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
-from typing import Any
+from pathlib import Path
+from typing import Any, Final, TextIO
 
 from engine.errors import InvalidInputError
 from engine.files.octets import File, as_text, read_octets
@@ -19,8 +23,8 @@ def read_layer(file: File) -> dict[str, Any]:
     Parameters
     ----------
     file : path, file object or bytes
-        GeoJSON as text, recognised by its contents; anything else that geopandas reads (GeoPackage, Shapefile,
-        FlatGeobuf, GML, Parquet), with the extra `geo`.
+        GeoJSON as text, one object or a feature a line (GeoJSON-seq), recognised by its contents; anything else that
+        geopandas reads (GeoPackage, Shapefile, FlatGeobuf, GML, Parquet), with the extra `geo`.
 
     Returns
     -------
@@ -54,17 +58,11 @@ def read_layer(file: File) -> dict[str, Any]:
     octets, suffix = read_octets(file)
     is_path = isinstance(file, (str, os.PathLike))
     name = str(file) if is_path else "the file"
-    if octets.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{":
+    if octets.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"\x1e"):
         return collection_in(as_text(octets, name), name)
     if suffix in ("json", "geojson") or not octets:
         raise InvalidInputError(f"{name} is no GeoJSON: it begins with {shown(octets[:20])}", ("file",))
-    try:
-        geopandas = import_module("geopandas")
-    except ImportError:
-        raise InvalidInputError(
-            f"{name}: layers other than GeoJSON need the package geopandas: pip install 'exact-geometry[geo]'",
-            ("file",),
-        ) from None
+    geopandas = _geopandas(name)
     try:
         given: Any = file if is_path else io.BytesIO(octets)  # a Shapefile is several files
         frame = geopandas.read_parquet(given) if suffix == "parquet" else geopandas.read_file(given)
@@ -78,8 +76,11 @@ def read_layer(file: File) -> dict[str, Any]:
 
 def collection_in(text: str, name: str) -> dict[str, Any]:
     """Return the FeatureCollection of a GeoJSON text; a single feature or geometry becomes a collection of one."""
+    lines = [line for line in text.replace("\x1e", "").split("\n") if line.strip()]
+    if len(lines) > 1 and lines[0].rstrip().endswith("}") and lines[1].lstrip().startswith("{"):
+        return {"type": "FeatureCollection", "features": [feature_in(*each, name) for each in enumerate(lines, 1)]}
     try:
-        value = json.loads(text)
+        value = json.loads(text.replace("\x1e", ""))
     except ValueError as error:
         raise InvalidInputError(f"{name} is not JSON: {error}", ("file",)) from None
     except RecursionError:
@@ -91,3 +92,76 @@ def collection_in(text: str, name: str) -> dict[str, Any]:
         raise InvalidInputError(f"{name} is JSON, but no GeoJSON: its type is {shown(kind)}", ("type",))
     feature = value if kind == "Feature" else {"type": "Feature", "properties": None, "geometry": value}
     return {"type": "FeatureCollection", "features": [feature]}
+
+
+def feature_in(number: int, line: str, name: str) -> dict[str, Any]:
+    """Return the feature, or geometry, in a line of GeoJSON-seq. number: of the line; name: of the file."""
+    made: list[dict[str, Any]] = collection_in(line, f"line {number} of {name}")["features"]
+    if len(made) != 1:
+        raise InvalidInputError(f"line {number} of {name} is no feature", ("file", number))
+    return made[0]
+
+
+def write_geojson(
+    target: str | None, features: Iterable[dict[str, Any]], crs: Any = None, in_lines: bool = False
+) -> None:
+    """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if any; in_lines:
+    without a collection around them (GeoJSON-seq)."""
+    with open_output(target) as file:
+        if in_lines:
+            file.writelines(f"{json.dumps(each, default=lambda array: array.tolist())}\n" for each in features)
+            return
+        member = "" if crs is None else f'"crs": {json.dumps(crs)}, '
+        file.write(f'{{"type": "FeatureCollection", {member}"features": [')
+        for number, feature in enumerate(features):
+            file.write(",\n" if number else "\n")
+            file.write(json.dumps(feature, default=lambda array: array.tolist()))
+        file.write("\n]}\n")
+
+
+def open_output(target: str | None) -> AbstractContextManager[TextIO]:
+    return nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8")
+
+
+SEQUENCES: Final = (".geojsonl", ".geojsons", ".ndjson", ".jsonl", ".geojsonseq")
+"""Extensions of files with a feature a line."""
+_WRITERS: Final = {".gpkg": "GPKG", ".fgb": "FlatGeobuf", ".shp": "ESRI Shapefile", ".parquet": "parquet"}
+
+
+def write_layer(target: str | None, features: Iterable[dict[str, Any]], crs: Any) -> None:
+    """Write features to a file in the format of its extension, GeoJSON if that is none of those of geopandas; to the
+    standard output without a target. crs: a member of the collection, if any."""
+    suffix = Path(target or "").suffix.lower()
+    if suffix not in _WRITERS:
+        write_geojson(target, features, crs, in_lines=suffix in SEQUENCES)
+        return
+    geopandas = _geopandas(str(target))
+    flat = []
+    for each in features:
+        more = {
+            name: json.dumps(value) for name, value in each.items() if name in ("left", "right", "point", "polygon")
+        }
+        more |= {name: each[name] for name in ("id", "boundary", "distance") if name in each}
+        geometry = each["geometry"] and json.loads(json.dumps(each["geometry"], default=lambda array: array.tolist()))
+        flat.append({"type": "Feature", "properties": {**each["properties"], **more}, "geometry": geometry})
+    name = crs.get("properties", {}).get("name") if isinstance(crs, dict) else None
+    try:
+        frame = geopandas.GeoDataFrame.from_features(flat, crs=name)
+        if suffix == ".parquet":
+            frame.to_parquet(target)
+        else:
+            frame.to_file(target, driver=_WRITERS[suffix])
+    except Exception as error:  # whatever the features lead its writers to
+        raise InvalidInputError(
+            f"{target} cannot be written: {type(error).__name__}: {error!s:.200}", ("file",)
+        ) from error
+
+
+def _geopandas(name: str) -> Any:
+    try:
+        return import_module("geopandas")
+    except ImportError:
+        raise InvalidInputError(
+            f"{name}: layers other than GeoJSON need the package geopandas: pip install 'exact-geometry[geo]'",
+            ("file",),
+        ) from None

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from engine.errors import InvalidArrayError, InvalidInputError
-from engine.files.layers import collection_in, read_layer
+from engine.files.layers import collection_in, open_output, read_layer
 from engine.files.meshes import FORMATS, read_mesh
 from engine.files.octets import read_text
 from engine.layers.geojson import polygon_of
@@ -96,7 +94,7 @@ def write_table(target: str | None, columns: dict[str, npt.NDArray[Any]]) -> Non
     elif suffix == ".npz":
         np.savez(str(target), **columns)  # type: ignore[arg-type]
     elif suffix in ("", ".csv"):
-        with _open_output(target) as file:
+        with open_output(target) as file:
             file.write(_csv(columns))
     else:
         several = "" if len(columns) == 1 else " (one .npy array cannot hold several columns)"
@@ -123,23 +121,8 @@ def write_mesh(target: str | None, vertices: FloatArray, faces: npt.NDArray[Any]
         raise InvalidInputError(f"{target}: a mesh is written to .off or .npz", ("output",))
     rows = [" ".join(map(repr, row)) for row in vertices.tolist()]
     rows += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
-    with _open_output(target) as file:
+    with open_output(target) as file:
         file.write("\n".join(["OFF", f"{len(vertices)} {len(faces)} 0", *rows]) + "\n")
-
-
-def write_geojson(target: str | None, features: Iterable[dict[str, Any]], crs: Any = None) -> None:
-    """Write features, whose coordinates may be arrays, one a line; crs: a member of the collection, if any."""
-    with _open_output(target) as file:
-        member = "" if crs is None else f'"crs": {json.dumps(crs)}, '
-        file.write(f'{{"type": "FeatureCollection", {member}"features": [')
-        for number, feature in enumerate(features):
-            file.write(",\n" if number else "\n")
-            file.write(json.dumps(feature, default=lambda array: array.tolist()))
-        file.write("\n]}\n")
-
-
-def _open_output(target: str | None) -> AbstractContextManager[TextIO]:
-    return nullcontext(sys.stdout) if target is None else Path(target).open("w", encoding="utf-8")
 
 
 Note = Callable[[str], object]

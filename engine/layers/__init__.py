@@ -7,9 +7,11 @@ from engine.layers.frame_joins import sjoin, sjoin_nearest
 from engine.layers.frame_pieces import slivers, split
 from engine.layers.frames import clip, dissolve, overlay
 from engine.layers.geojson import polygon_of
+from engine.layers.streams import FeatureStream
 
 __all__ = [
     "FeatureRows",
+    "FeatureStream",
     "clip",
     "clip_features",
     "dissolve",

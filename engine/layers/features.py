@@ -112,10 +112,11 @@ def overlay_features(
     write_members, n_bytes = members_of(sides, ("left", "right"), limits)
     layers = [mixed_of(side, limits) for side in sides]
     rows = overlay_mixed(layers[0], layers[1], how, limits, frozenset(layers[0].dims.tolist()) - {-1}, False)
-    made = with_geometries(
-        rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])), n_bytes(rows.left, rows.right), crs,
-        [(sides[0].known, rows.left), (sides[1].known, rows.right)],
-    )  # fmt: skip
+    with limits.budget():
+        made = with_geometries(
+            rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])),
+            n_bytes(rows.left, rows.right), crs, [(sides[0].known, rows.left), (sides[1].known, rows.right)],
+        )  # fmt: skip
     return _finished(made, rows, min_width, limits, report)
 
 
@@ -262,17 +263,23 @@ def dissolve_features(
     known = side.known
     known[:, 0] = groups[known[:, 0].astype(np.int64)]
     n_bytes = np.array(lengths, np.int64) + sum(map(len, texts))
-    made = with_geometries(rows, write_members, n_bytes, crs, [(known, np.arange(len(rows)))])
+    with limits.budget():
+        made = with_geometries(rows, write_members, n_bytes, crs, [(known, np.arange(len(rows)))])
     return _finished(made, rows, min_width, limits, report)
 
 
 @overload
 def split_features(
-    layer: Any, lines: Any, *, report: Literal[False] = False, **options: Unpack[TimeOptions]
+    layer: Any,
+    lines: Any,
+    *,
+    min_width: float | None = None,
+    report: Literal[False] = False,
+    **options: Unpack[TimeOptions],
 ) -> FeatureRows: ...
 @overload
 def split_features(
-    layer: Any, lines: Any, *, report: Literal[True], **options: Unpack[TimeOptions]
+    layer: Any, lines: Any, *, min_width: float | None = None, report: Literal[True], **options: Unpack[TimeOptions]
 ) -> tuple[FeatureRows, Accuracy]: ...
 def split_features(
     layer: Any, lines: Any, *, min_width: float | None = None, deadline: float | None = None,
@@ -331,9 +338,10 @@ def _of_left(
     write_members, n_bytes = members_of(sides[:1], ("layer", ""), limits)
     rows, none = function([mixed_of(side, limits) for side in sides]), NONE
     sizes = n_bytes(rows.left, np.full(len(rows), NONE))
-    made = with_geometries(
-        rows, lambda row: write_members(int(rows.left[row]), none), sizes, crs, [(sides[0].known, rows.left)]
-    )
+    with limits.budget():
+        made = with_geometries(
+            rows, lambda row: write_members(int(rows.left[row]), none), sizes, crs, [(sides[0].known, rows.left)]
+        )
     return _finished(made, rows, min_width, limits, report)
 
 

@@ -90,12 +90,12 @@ def sjoin(
     >>> engine.layers.sjoin(wells, parcels, predicate="within")["owner"].tolist()
     []
     """
-    _check("sjoin", left, right, how, lsuffix, rsuffix, others)
+    check_join("sjoin", left, right, how, lsuffix, rsuffix, others)
     reach = check_predicate(predicate, distance)
     check_options(workers, None)
     limits = Limits(deadline, cancel, workers)
     layers = mixed_of(left, "left", limits), mixed_of(right, "right", limits)
-    return _joined(left, right, related_pairs(*layers, predicate, reach, limits), how, (lsuffix, rsuffix))
+    return joined(left, right, related_pairs(*layers, predicate, reach, limits), how, (lsuffix, rsuffix))
 
 
 def sjoin_nearest(
@@ -162,7 +162,7 @@ def sjoin_nearest(
     >>> engine.layers.sjoin_nearest(wells, towns, distance_col="far")[["town", "far"]].to_numpy().tolist()
     [['A', 2.0], ['B', 2.0]]
     """
-    _check("sjoin_nearest", left, right, how, lsuffix, rsuffix, others)
+    check_join("sjoin_nearest", left, right, how, lsuffix, rsuffix, others)
     check_options(workers, None, exclusive=exclusive)
     most = np.inf if max_distance is None else checked_distance(max_distance, "max_distance")
     if distance_col is not None and not isinstance(distance_col, str):
@@ -171,10 +171,10 @@ def sjoin_nearest(
     sides = mixed_of(left, "left", limits), mixed_of(right, "right", limits)
     pairs, distances = nearest_of(*(sides[::-1] if how == "right" else sides), most, bool(exclusive), limits)
     pairs = pairs[:, ::-1] if how == "right" else pairs
-    return _joined(left, right, pairs, how, (lsuffix, rsuffix), distances, distance_col)
+    return joined(left, right, pairs, how, (lsuffix, rsuffix), distances, distance_col)
 
 
-def _check(function: str, left: Any, right: Any, how: Any, lsuffix: Any, rsuffix: Any, others: Any) -> None:
+def check_join(function: str, left: Any, right: Any, how: Any, lsuffix: Any, rsuffix: Any, others: Any) -> None:
     check_frames(function, others, left=left, right=right)
     if not isinstance(how, str) or how not in ("inner", "left", "right"):
         raise InvalidOperationError(f"how must be inner, left or right; got {shown(how)}", ("how",))
@@ -183,7 +183,7 @@ def _check(function: str, left: Any, right: Any, how: Any, lsuffix: Any, rsuffix
             raise InvalidInputError(f"{name} must be text, got {shown(suffix)}", (name,))
 
 
-def _joined(
+def joined(
     left: GeoDataFrame, right: GeoDataFrame, pairs: IntArray, how: str, suffixes: tuple[str, str],
     distances: FloatArray | None = None, column: str | None = None,
 ) -> GeoDataFrame:  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 
@@ -115,11 +115,15 @@ def members_of(
     columns: list[set[str]] = [set(), set()]
     with limits.budget() as budget:
         for side, column in zip(sides, columns):
+            if "names" in side.kept:
+                column.update(side.kept["names"])
+                continue
             for each in polled(side.properties):
                 n_before = len(column)
                 column.update(each)
                 budget.take(_NAME_BYTES * (len(column) - n_before))
-        shared = columns[0] & columns[1]
+            side.kept["names"] = column
+        shared = columns[1] if sides[0].start is not None else columns[0] & columns[1]
         made: set[str] = set()
         twice: set[str] = set()
         for column, end in zip(columns, ("_1", "_2")):
@@ -134,6 +138,7 @@ def members_of(
         )
     nothing = Collection([], [], None, ())
     left, right = (_copied_members(side, shared, end, limits) for side, end in zip([*sides, nothing], ("_1", "_2")))
+    first_number = sides[0].start or 0
 
     def members(first: int, second: int) -> bytes:
         inside, sources, ids = [], b"", b""
@@ -141,7 +146,8 @@ def members_of(
             if number != NONE:
                 inside += [copied.properties[number]] if copied.properties[number] else []
                 ids = copied.ids[number]
-                sources += b',"%b":{"index":%d%b}' % (name.encode(), number, ids)
+                shown_number = number + (first_number if copied is left else 0)
+                sources += b',"%b":{"index":%d%b}' % (name.encode(), shown_number, ids)
         alone = ids[1:] + b"," if ids and NONE in (first, second) else b""
         return b'%b"properties":{%b}%b' % (alone, b",".join(inside), sources)
 
@@ -154,6 +160,8 @@ def members_of(
 
 def _copied_members(side: Collection, shared: set[str], end: str, limits: Limits) -> _CopiedMembers:
     """Return the `_CopiedMembers` of a layer; property names in `shared` get the suffix `end`."""
+    if (known := side.kept.get((end, *sorted(shared)))) is not None:
+        return cast(_CopiedMembers, known)
 
     def renamed() -> Iterator[dict[str, Any]]:
         for each in side.properties:
@@ -164,7 +172,9 @@ def _copied_members(side: Collection, shared: set[str], end: str, limits: Limits
     ids = texts_of(side, ({"id": each["id"]} if "id" in each else {} for each in side.features), "id", limits)
     ids = [b"," + text[1:-1] if len(text) > 2 else b"" for text in ids]
     id_bytes = np.array([*map(len, ids), 0], np.int64)
-    return _CopiedMembers(properties, ids, np.array([*map(len, properties), 0], np.int64) + id_bytes, id_bytes)
+    n_bytes = np.array([*map(len, properties), 0], np.int64) + id_bytes
+    made = side.kept[(end, *sorted(shared))] = _CopiedMembers(properties, ids, n_bytes, id_bytes)
+    return made
 
 
 def groups_of(side: Collection, names: list[str], limits: Limits) -> tuple[IntArray, list[dict[int, bytes]]]:
@@ -199,13 +209,17 @@ EVERY: Final = (*POINTS, *LINES, *AREAS)
 @dataclass(frozen=True, slots=True, eq=False)
 class Collection:
     """A FeatureCollection whose geometries are of one kind: its features, the properties of each (empty for null), its
-    `crs`, and the path of the argument, for messages. altitudes: of vertices, once they are read."""
+    `crs`, and the path of the argument, for messages. altitudes: of vertices, once they are read.
+    start: of a part of a stream, the number of the features before it; kept: what was made of a collection that many
+    calls share."""
 
     features: list[dict[str, Any]]
     properties: list[dict[str, Any]]
     crs: Any
     where: Where
     altitudes: list[FloatArray] = field(default_factory=lambda: [np.zeros((0, 4))])
+    start: int | None = None
+    kept: dict[Any, Any] = field(default_factory=dict)
 
     @property
     def known(self) -> FloatArray:
@@ -213,13 +227,17 @@ class Collection:
         return np.concatenate(self.altitudes)
 
 
-def collection_of(value: Any, where: Where, limits: Limits, kinds: tuple[str, ...] = AREAS) -> Collection:
+def collection_of(
+    value: Any, where: Where, limits: Limits, kinds: tuple[str, ...] = AREAS, start: int | None = None
+) -> Collection:
     """Return a checked FeatureCollection whose geometries are null or of the types `kinds`; coordinates are not
-    checked. where: path of the argument, for messages."""
+    checked; a `Collection` as it is. where: path of the argument, for messages."""
+    if isinstance(value, Collection):
+        return value
     features = value.get("features") if _type_of(value) == "FeatureCollection" else None
     if not isinstance(features, list):
         raise InvalidInputError(f"{where[0]} must be a GeoJSON FeatureCollection, got {shown(value)}", where)
-    side = Collection(features, [], value.get("crs"), where)
+    side = Collection(features, [], value.get("crs"), where, start=start)
     with limits.budget():
         for number, feature in enumerate(polled(features)):
             if _type_of(feature) != "Feature":
@@ -249,6 +267,7 @@ def refused(
     """Return an error of type `kind` for feature `number` of a layer, with its number and id in the message and in
     `where`. what: the fault; path: its place in the feature."""
     feature, where = side.features[number], side.where
+    number += side.start or 0
     named = f" (id {shown(feature['id'])})" if "id" in feature else ""
     return kind(f"{where[0]}.features[{number}]{named} {what}", (*where, "features", number, *path))
 
@@ -261,6 +280,8 @@ def polygons_of(side: Collection, limits: Limits) -> Layer:
 
 def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
     """Return the points, lines and polygons of a collection."""
+    if "mixed" in side.kept:
+        return cast(MixedLayer, side.kept["mixed"])
     n = len(side.features)
     dims, counts, sizes, positions = np.full(n, -1, np.int8), np.zeros(n, np.int64), list[int](), list[FloatArray]()
     with limits.budget():
@@ -274,7 +295,10 @@ def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
                 side.altitudes.extend(_known(number, path) for path in paths if path.shape[1] == 3)
                 dims[number] = (POINT if geometry["type"] in POINTS else LINE) if paths else -1
     vertices = np.concatenate([np.zeros((0, 2)), *positions])
-    return MixedLayer(polygons_of(side, limits), Paths(dims, read_only(vertices), summed(sizes), summed(counts)))
+    made = side.kept["mixed"] = MixedLayer(
+        polygons_of(side, limits), Paths(dims, read_only(vertices), summed(sizes), summed(counts))
+    )
+    return made
 
 
 def _paths_in(geometry: dict[str, Any]) -> list[FloatArray]:

@@ -102,9 +102,9 @@ def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limi
     """Return two layers as edges in the range of exact signs. Raises: NotRepresentableError if there is no scale, or
     they need one where distances are measured."""
     for layer in (left, right):
-        if not layer.prepared:
-            layer.prepared.append(shapes_of(_cleaned(layer, limits), limits))
-    made = left.prepared[0], right.prepared[0]
+        if "shapes" not in layer.prepared:
+            layer.prepared["shapes"] = shapes_of(_cleaned(layer, limits), limits)
+    made = left.prepared["shapes"], right.prepared["shapes"]
     scaled = in_range(*made)
     if is_measured and scaled[0] is not made[0]:
         raise NotRepresentableError("distances need coordinates within 2^-480 .. 2^480; scale the layers", ())

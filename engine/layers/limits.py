@@ -69,6 +69,10 @@ class Limits:
         left = None if self._end is None else self._end - time.monotonic()
         return {"deadline": left, "cancel": self._cancel, "workers": self.workers, "report": True}
 
+    def time(self) -> dict[str, Any]:
+        """Return the keyword arguments deadline and cancel for the next call."""
+        return {name: value for name, value in self.options().items() if name in ("deadline", "cancel")}
+
     def budget(self) -> Budget:
         """Return a budget of the remaining time."""
         return Budget(self.options()["deadline"], self._cancel)

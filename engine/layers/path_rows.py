@@ -82,7 +82,9 @@ def clip_mixed(
         stays = (np.diff(rows.row_offsets) > 0) | (layer.paths.dims[rows.left] >= 0)  # not those without geometry
         return rows if stays.all() else replace(rows.take(np.flatnonzero(stays)), touching=None)
     there = np.flatnonzero(mask.areas.arrays.sizes())
-    arrays = unite(PolygonSelection(mask.areas.arrays, there), limits)
+    if "union" not in mask.prepared:
+        mask.prepared["union"] = unite(PolygonSelection(mask.areas.arrays, there), limits)
+    arrays = mask.prepared["union"]
     none = np.zeros(0, np.int64)
     whole = Layer(arrays, np.zeros(1, np.bool_), arrays.take(none), none)
     parts = [overlay_areas(layer.areas, whole, "intersection", limits, with_touching)]

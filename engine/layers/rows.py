@@ -329,7 +329,8 @@ def dissolve_rows(
             parts.append(_joined_coverage(layer, some, limits))
             with limits.budget():
                 places += gaps_of(parts[-1], layer.arrays.take(some)) if limits.grid is None else []
-        report_gaps(places, gaps == "refuse")
+        with limits.budget():
+            report_gaps(places, gaps == "refuse")
         return rows_of(parts, np.arange(n_groups))
     members = (list(PolygonSelection(layer.arrays, order[start:stop])) for start, stop in pairwise(ends))
     unions = [limits.record(union_all(some, grid=limits.grid, **limits.options())) for some in members]

@@ -45,11 +45,11 @@ class Paths(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False)
 class MixedLayer:
     """A layer with features of any kind: its polygons (empty for other features), and its points and lines; prepared:
-    its `Shapes`, once they are made."""
+    what was made of it once: its `Shapes`, the union of its polygons."""
 
     areas: Layer
     paths: Paths
-    prepared: list[Shapes] = field(default_factory=list, init=False)
+    prepared: dict[str, Any] = field(default_factory=dict, init=False)
 
     @property
     def dims(self) -> Int8Array:

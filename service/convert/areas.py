@@ -18,6 +18,7 @@ from service.schemas.clipping import (
     OverlayCollapse,
     OverlayResponse,
     OverlayRounding,
+    Sliver,
 )
 from service.wire import PART, Series
 from service.work import Call
@@ -35,7 +36,7 @@ def from_features(layer: Any, accuracy: engine.Accuracy, call: Call) -> LayersRe
 
     def features(start: int, stop: int) -> list[Any]:
         return [
-            wire.Raw(b'{"type":"Feature",%b,"geometry":%b}' % (layer.members(row), _geometry(layer, row, call)))
+            wire.Raw(b'{"type":"Feature",%b,"geometry":%b}' % (layer.members(row), geometry_of(layer, row, call)))
             for row in range(start, stop)
         ]
 
@@ -45,11 +46,14 @@ def from_features(layer: Any, accuracy: engine.Accuracy, call: Call) -> LayersRe
         crs=None if layer.crs_text is None else wire.Raw(layer.crs_text),
         features=Series(len(layer), features, weight=10, offsets=n_bytes // _NUMBER_BYTES, least=int(n_bytes[-1])),
         collapsed=layer.collapsed,
+        slivers=None
+        if layer.slivers is None
+        else [Sliver.made(feature=row, piece=piece, width=width) for row, piece, width in layer.slivers],
         accuracy=from_accuracy(accuracy),
     )
 
 
-def _geometry(layer: Any, row: int, call: Call) -> bytes:
+def geometry_of(layer: Any, row: int, call: Call) -> bytes:
     """Return the geometry of a feature, of any number of parts and rings."""
     given = layer.geometry(row)
     if given is not None or layer.areas is None:

@@ -27,8 +27,10 @@ from service.schemas.clipping import (
     LayersClipRequest,
     LayersContainsRequest,
     LayersJoinRequest,
+    LayersNearestRequest,
     LayersOverlayRequest,
     LayersResponse,
+    LayersSplitRequest,
     LayersUnionRequest,
     OverlayBatchRequest,
     OverlayBatchResponse,
@@ -223,14 +225,16 @@ _AS: Final[dict[str, Any]] = {"response_class": GeoJson, "response_model": Layer
 def overlay_layers(question: LayersOverlayRequest, call: CallOf) -> LayersResponse:
     """Overlay two layers, every feature with every one that it meets; attributes of both are kept."""
     sides = question.left, question.right
-    result = call.compute(engine.layers.overlay_features, *sides, question.operation, grid=question.grid)
+    options: dict[str, Any] = {"grid": question.grid, "min_width": question.min_width, "wrap": question.wrap}
+    result = call.compute(engine.layers.overlay_features, *sides, question.operation, **options)
     return areas.from_features(*result, call)
 
 
 @router.post("/v1/layers/union", operation_id="unite_layer", tags=["layers"], **_AS)
 def unite_layer(question: LayersUnionRequest, call: CallOf) -> LayersResponse:
     """Unite the features of a layer, all or those that agree in some properties."""
-    options: dict[str, Any] = {"grid": question.grid, "coverage": bool(question.coverage)}
+    options: dict[str, Any] = {"grid": question.grid, "min_width": question.min_width, "wrap": question.wrap}
+    options |= {"coverage": bool(question.coverage), "gaps": question.gaps or "keep"}
     result = call.compute(engine.layers.dissolve_features, question.layer, question.by, **options)
     return areas.from_features(*result, call)
 
@@ -238,7 +242,25 @@ def unite_layer(question: LayersUnionRequest, call: CallOf) -> LayersResponse:
 @router.post("/v1/layers/clip", operation_id="clip_layer", tags=["layers"], **_AS)
 def clip_layer(question: LayersClipRequest, call: CallOf) -> LayersResponse:
     """Cut the features of a layer to the union of some polygons."""
-    result = call.compute(engine.layers.clip_features, question.layer, question.mask, grid=question.grid)
+    options: dict[str, Any] = {"grid": question.grid, "min_width": question.min_width, "wrap": question.wrap}
+    options["keep"] = question.keep or "inside"
+    result = call.compute(engine.layers.clip_features, question.layer, question.mask, **options)
+    return areas.from_features(*result, call)
+
+
+@router.post("/v1/layers/split", operation_id="split_layer", tags=["layers"], **_AS)
+def split_layer(question: LayersSplitRequest, call: CallOf) -> LayersResponse:
+    """Split polygons by lines: a row for each piece."""
+    sides = question.layer, question.lines
+    return areas.from_features(*call.compute(engine.layers.split_features, *sides, min_width=question.min_width), call)
+
+
+@router.post("/v1/layers/nearest", operation_id="join_nearest", tags=["layers"], **_AS)
+def join_nearest(question: LayersNearestRequest, call: CallOf) -> LayersResponse:
+    """Join features to those that are nearest, all of several that are as near: a row for each such pair."""
+    options: dict[str, Any] = {"max_distance": question.max_distance, "exclusive": bool(question.exclusive)}
+    options["outside"] = bool(question.outside)
+    result = call.compute(engine.layers.nearest_features, question.left, question.right, **options)
     return areas.from_features(*result, call)
 
 

@@ -267,6 +267,8 @@ _FLOODS = _collection(_square(1, 2, properties={"year": 1962}))
 _POINT = {"type": "Feature", "properties": {"well": 7}, "geometry": {"type": "Point", "coordinates": [2, 2]}}
 _ANY = "A FeatureCollection of points, lines and polygons, in the plane; null geometries are welcome."
 _GRID = "Snap polygons to multiples of this power of two or ten."
+_MIN_WIDTH = "List pieces that are narrower: the least distance of two parallel lines around a piece."
+_WRAP = "180: coordinates are degrees; polygons are cut at the antimeridian, and joined in the answer."
 _AREAS = "A FeatureCollection of Polygon and MultiPolygon, in the plane; null geometries are welcome."
 
 
@@ -282,6 +284,8 @@ class LayersOverlayRequest(Schema):
         "the left; identity: both; symmetric_difference: what is left of either; union: all of these."
     )
     grid: Number = optional(_GRID)
+    min_width: Number = optional(_MIN_WIDTH)
+    wrap: Number = optional(_WRAP)
 
 
 class LayersUnionRequest(Schema):
@@ -295,6 +299,11 @@ class LayersUnionRequest(Schema):
     )
     grid: Number = optional(_GRID)
     coverage: bool = optional("The polygons do not overlap: verified, an overlap is refused with its place.")
+    gaps: Literal["keep", "refuse"] = optional(
+        "With coverage: what several features enclose, and none has as a hole, is kept and noted, or refused."
+    )
+    min_width: Number = optional(_MIN_WIDTH)
+    wrap: Number = optional(_WRAP)
 
 
 class LayersClipRequest(Schema):
@@ -304,7 +313,32 @@ class LayersClipRequest(Schema):
 
     layer: FeatureCollection = Field(description=_ANY)
     mask: FeatureCollection = Field(description="The region, the union of polygons: a FeatureCollection of these.")
+    keep: Literal["inside", "outside"] = optional("What lies in the region, if left out, or what lies outside of it.")
     grid: Number = optional(_GRID)
+    min_width: Number = optional(_MIN_WIDTH)
+    wrap: Number = optional(_WRAP)
+
+
+class LayersSplitRequest(Schema):
+    """Which pieces do lines make of these polygons?"""
+
+    model_config = with_example(
+        {
+            "layer": _PARCELS,
+            "lines": _collection(
+                {
+                    "type": "Feature",
+                    "properties": {},
+                    "geometry": {"type": "LineString", "coordinates": [[0, 1], [9, 1]]},
+                }
+            ),
+            "min_width": 0.01,
+        }
+    )
+
+    layer: FeatureCollection = Field(description=_AREAS)
+    lines: FeatureCollection = Field(description="A FeatureCollection of LineString and MultiLineString, in the plane.")
+    min_width: Number = optional(_MIN_WIDTH)
 
 
 class LayersJoinRequest(Schema):
@@ -324,6 +358,20 @@ class LayersJoinRequest(Schema):
     outside: bool = optional("Also a feature for each of the left that has no such relation.")
 
 
+class LayersNearestRequest(Schema):
+    """Which features of another layer are nearest?"""
+
+    model_config = with_example(
+        {"left": _collection(_POINT), "right": _PARCELS, "max_distance": 9.5, "exclusive": True, "outside": True}
+    )
+
+    left: FeatureCollection = Field(description=_ANY)
+    right: FeatureCollection = Field(description=_ANY)
+    max_distance: Number = optional("The largest distance, which counts.")
+    exclusive: bool = optional("Features that are equal to it are not the nearest.")
+    outside: bool = optional("Also a feature for each of the left that has none so near.")
+
+
 class LayersContainsRequest(Schema):
     """Which features of a layer hold these points?"""
 
@@ -332,6 +380,14 @@ class LayersContainsRequest(Schema):
     points: FeatureCollection = Field(description="A FeatureCollection of Point; null geometries are welcome.")
     polygons: FeatureCollection = Field(description=_AREAS)
     outside: bool = optional("Also a feature for each point that nothing holds.")
+
+
+class Sliver(Schema):
+    """A narrow piece."""
+
+    feature: Count = Field(description="Index of its feature in this answer.")
+    piece: Count = Field(description="Index of its polygon in the feature.")
+    width: Number = Field(description="The double nearest to the least distance of two parallel lines around it.")
 
 
 class LayersResponse(Schema):
@@ -344,4 +400,5 @@ class LayersResponse(Schema):
         "and _2; members named after the layers say which these were, by index and id. Geometry null: it was."
     )
     collapsed: Count = Field(description="Rows that are not here because rounding left nothing of them.")
+    slivers: list[Sliver] = optional("The pieces narrower than `min_width`, if that was given.")
     accuracy: Accuracy

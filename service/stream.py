@@ -1,0 +1,197 @@
+"""POST /v1/layers/stream: features against one layer, a JSON text a line in and out, without a limit on their number.
+
+| line | in | out |
+|---|---|---|
+| first | `operation`, `layer` and options, as `engine.layers.FeatureStream` has them | a feature |
+| others | a GeoJSON Feature each, after a record separator (RFC 8142) or not; empty ones are ignored | a feature each |
+
+Features are answered in parts, in order: no more is read before the answers of a part are sent, so a client reads while
+it writes. Each part has the deadline of a request. What is wrong is a problem that names its line: the answer if it is
+in the first part, else the last line of the answer, with `"type": "Error"`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from functools import partial
+from typing import Final
+
+import orjson
+from fastapi import FastAPI
+from starlette.requests import ClientDisconnect
+from starlette.types import Receive, Scope, Send
+
+import engine
+from service import wire
+from service.body import coding_of, media_type_of
+from service.convert.areas import geometry_of
+from service.errors import STATUS, ServiceError, faults_of, problem
+from service.memory import FOOTPRINT
+from service.route import state_of
+from service.schemas.arrays import Fault
+from service.work import Call
+
+PATH: Final = "/v1/layers/stream"
+KINDS: Final = ("application/x-ndjson", "application/jsonl", "application/geo+json-seq")
+PART: Final = 2**20
+"""Bytes of features that are answered together, about."""
+_MOST: Final = 2_000
+"""Features that are answered together, at most."""
+_ANSWER: Final = 2**16
+"""Bytes sent at a time, about."""
+Line = tuple[int, bytes]
+"""Its number, from 1, and its text."""
+
+
+class Stream:
+    """An ASGI application that answers streams of features."""
+
+    def __init__(self, app: FastAPI) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        state, status, calls = state_of(self._app), 0, list[Call]()
+
+        def new_call(lines: list[Line]) -> Call:
+            call = Call(state.settings, state.store, state.memory)
+            calls.append(call)
+            call.take(FOOTPRINT * sum(len(text) for _, text in lines))
+            return call
+
+        async def begin() -> None:
+            nonlocal status
+            if not status:
+                status = 200
+                headers = [(b"content-type", KINDS[0].encode())]
+                await send({"type": "http.response.start", "status": status, "headers": headers})
+
+        lines: list[Line] = []
+        stream: engine.layers.FeatureStream | None = None
+        try:
+            _check_headers(dict(scope["headers"]))
+            parts = _parts_of(receive, state.settings.max_body_bytes, state.settings.body_seconds)
+            lines = await anext(parts, [])
+            call = new_call(lines)
+            stream = await state.pool.run(call, partial(_begun, lines, call), False)
+            async for lines in parts:
+                part = new_call(lines)
+                for text in await state.pool.run(part, partial(_answered, stream, lines, part), False):
+                    await begin()
+                    await send({"type": "http.response.body", "body": text, "more_body": True})
+                part.free()
+                calls.remove(part)
+            await begin()
+            await send({"type": "http.response.body", "body": b"", "more_body": False})
+        except ClientDisconnect:
+            pass
+        except Exception as error:
+            first = 0 if stream is None else stream.n_features
+            answer = problem([_with_line(fault, lines, first) for fault in faults_of(error)])
+            if not status:
+                status = answer.status_code
+                await answer(scope, receive, send)
+            else:
+                text = orjson.dumps({**orjson.loads(bytes(answer.body)), "type": "Error"}) + b"\n"
+                await send({"type": "http.response.body", "body": text, "more_body": False})
+        finally:
+            for call in calls:
+                call.free()
+            state.metrics.count("stream_features", status or STATUS["bad_request"], {})
+
+
+def _check_headers(headers: dict[bytes, bytes]) -> None:
+    if media_type_of(headers) not in KINDS or coding_of(headers) is not None:
+        detail = f"expected the header Content-Type: {KINDS[0]}, and lines that are not compressed"
+        error = ServiceError("unsupported_media_type", detail)
+        error.headers = {"Accept-Post": ", ".join(KINDS)}
+        raise error
+
+
+async def _parts_of(receive: Receive, most: int, seconds: float) -> AsyncIterator[list[Line]]:
+    """Yield the first line alone, then the others in parts. most: bytes of a line; seconds: within which something of
+    the body must arrive."""
+    rest, length, number, is_more, part, size = list[bytes](), 0, 0, True, list[Line](), 0
+    while is_more:
+        try:
+            async with asyncio.timeout(seconds):
+                message = await receive()
+        except TimeoutError:
+            raise ServiceError("slow_body", f"nothing arrived within {seconds} s; send the next line sooner") from None
+        if message["type"] == "http.disconnect":
+            raise ClientDisconnect
+        is_more = message.get("more_body", False)
+        rest.append(message.get("body", b""))
+        length += len(rest[-1])
+        if length > most + PART:
+            what = f"line {number + 1} is longer than {most} bytes"
+            raise ServiceError("body_too_large", f"{what}; split it, or raise GEOMETRY_MAX_BODY_BYTES")
+        if is_more and b"\n" not in rest[-1]:
+            continue
+        *whole, last = b"".join(rest).split(b"\n")
+        rest, length = [last], len(last)
+        for text in whole if is_more else [*whole, last]:
+            number += 1
+            text = text.strip().removeprefix(b"\x1e")
+            if not text:
+                continue
+            part.append((number, text))
+            size += len(text)
+            if number == part[0][0] == 1 or size >= PART or len(part) >= _MOST:
+                yield part
+                part, size = [], 0
+        if part and is_more and not last:  # the client waits for what it sent, perhaps
+            yield part
+            part, size = [], 0
+    if part:
+        yield part
+
+
+def _begun(lines: list[Line], call: Call) -> engine.layers.FeatureStream:
+    """Return the stream that the first line asks for."""
+    call.start_clock()
+    document = wire.decode(lines[0][1], call.remaining) if lines else None
+    if not isinstance(document, dict) or not {"operation", "layer"} <= document.keys():
+        what = '{"operation": "clip", "layer": a FeatureCollection, ...options}'
+        raise ServiceError("invalid_request", f"the first line must be an object like {what}")
+    names = {str(name): value for name, value in document.items() if name not in ("deadline", "cancel")}
+    if len(names) < len(document):
+        raise ServiceError("unknown_field", "deadline and cancel are no options; the service sets them")
+    try:
+        return engine.layers.FeatureStream(**names, deadline=call.remaining(), cancel=call)
+    except engine.DeadlineExceededError:
+        raise call.too_late() from None
+
+
+def _answered(stream: engine.layers.FeatureStream, lines: list[Line], call: Call) -> list[bytes]:
+    """Return the answers of some features as lines."""
+    call.start_clock()
+    features = []
+    for number, text in lines:
+        try:
+            features.append(wire.decode(text, call.remaining))
+        except ServiceError as error:
+            raise ServiceError(error.code, f"line {number}: {error.detail}") from None
+    call.instead = "send fewer properties with each feature"
+    try:
+        rows = stream.rows(features, deadline=call.remaining(), cancel=call)
+    except engine.DeadlineExceededError:
+        raise call.too_late() from None
+    answers, some, size = list[bytes](), list[bytes](), 0
+    for row in range(len(rows)):
+        some.append(b'{"type":"Feature",%b,"geometry":%b}\n' % (rows.members(row), geometry_of(rows, row, call)))
+        call.take_part(some[-1])
+        size += len(some[-1])
+        if size >= _ANSWER or row + 1 == len(rows):
+            answers.append(b"".join(some))
+            some, size = [], 0
+    return answers
+
+
+def _with_line(fault: Fault, lines: list[Line], first: int) -> Fault:
+    """Return a fault of a feature with the number of its line. lines: of the part; first: its first feature."""
+    if fault.path[:2] != ("stream", "features") or not isinstance(fault.path[2], int):
+        return fault
+    line = lines[fault.path[2] - first][0]
+    return Fault((line - 1, *fault.path[3:]), fault.code, f"line {line}: {fault.detail}")
