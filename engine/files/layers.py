@@ -6,6 +6,7 @@ import io
 import json
 import os
 import sys
+import warnings
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
@@ -147,10 +148,9 @@ def write_layer(target: str | None, features: Iterable[dict[str, Any]], crs: Any
     name = crs.get("properties", {}).get("name") if isinstance(crs, dict) else None
     try:
         frame = geopandas.GeoDataFrame.from_features(flat, crs=name)
-        if suffix == ".parquet":
-            frame.to_parquet(target)
-        else:
-            frame.to_file(target, driver=_WRITERS[suffix])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that there is no crs
+            frame.to_parquet(target) if suffix == ".parquet" else frame.to_file(target, driver=_WRITERS[suffix])
     except Exception as error:  # whatever the features lead its writers to
         raise InvalidInputError(
             f"{target} cannot be written: {type(error).__name__}: {error!s:.200}", ("file",)

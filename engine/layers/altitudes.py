@@ -16,7 +16,7 @@ def heights_at(places: FloatArray, rows: IntArray, sources: list[tuple[FloatArra
     and by row the feature, or the group, that it comes from. Of two at a vertex the first counts."""
     heights = np.full(len(places), np.nan)
     sides = [(known[~np.isnan(known[:, 3]) & (known[:, 0] != NONE)], of_rows) for known, of_rows in sources]
-    if not any(len(known) for known, _ in sides):
+    if not len(places) or not any(len(known) for known, _ in sides):
         return None
     for known, of_rows in sides:
         wanted = np.column_stack([of_rows[rows], places + 0.0])

@@ -11,20 +11,11 @@ from engine.distance.clearance import checked_distance
 from engine.errors import CancelledError, DeadlineExceededError, EngineError
 from engine.layers.feature_rows import ROW, FeatureRows
 from engine.layers.features import Answer
-from engine.layers.geojson import (
-    EVERY,
-    Collection,
-    check_each,
-    collection_of,
-    crs_of,
-    members_of,
-    mixed_of,
-    polygons_of,
-    texts_of,
-)
+from engine.layers.geojson import EVERY, Collection, check_each, collection_of, mixed_of, polygons_of
 from engine.layers.joins import check_predicate, nearest_of, related_pairs
 from engine.layers.json_text import text_of
 from engine.layers.limits import Limits, TimeOptions
+from engine.layers.members import crs_of, members_of, texts_of
 from engine.layers.rows import NONE, locate_points_in_layer, with_unmatched
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options

@@ -12,6 +12,7 @@ from engine.errors import EngineError, InvalidInputError, NotFiniteError, Unsupp
 from engine.layers.limits import Limits
 from engine.layers.rows import layer_of
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
+from engine.layers.wrapping import cut_parts
 from engine.polygon_overlay.pair_arrays import arrays_of
 from engine.solids.checks import shown
 from engine.solids.ragged import summed, within
@@ -121,13 +122,9 @@ def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds:
         raise refused(NotFiniteError, frame, (name, int(owner[0])), f"holds {positions[broken[0]].tolist()}")
     counts = np.zeros(len(array), np.int64)
     counts[there] = np.diff(ends)
-    areas = layer_of(
-        arrays_of(positions, rings, parts_of),
-        np.append(0, np.cumsum(counts)),
-        is_missing,
-        limits,
-        bool(frame.crs and frame.crs.is_geographic),
-    )
+    in_degrees = bool(frame.crs and frame.crs.is_geographic)
+    cut = cut_parts(arrays_of(positions, rings, parts_of), summed(counts), in_degrees, limits)
+    areas = layer_of(*cut, is_missing, limits)
     return MixedLayer(areas, paths)
 
 

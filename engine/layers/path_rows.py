@@ -31,7 +31,7 @@ from engine.layers.rows import (
 )  # fmt: skip
 from engine.layers.rows import overlay_rows as overlay_areas
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
-from engine.layers.wrapped_rows import joined_rows
+from engine.layers.wrapping import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
 from engine.polygon_overlay.touching import Place, Touching, concatenate_touching, join_edges
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
@@ -80,7 +80,7 @@ def clip_mixed(
     if limits.is_outside:
         rows = overlay_mixed(layer, mask, "difference", limits, kinds, False)
         stays = (np.diff(rows.row_offsets) > 0) | (layer.paths.dims[rows.left] >= 0)  # not those without geometry
-        return rows if stays.all() else replace(rows.take(np.flatnonzero(stays)), touching=None)
+        return with_touching_of(rows, np.flatnonzero(stays), rows.touching)
     there = np.flatnonzero(mask.areas.arrays.sizes())
     if "union" not in mask.prepared:
         mask.prepared["union"] = unite(PolygonSelection(mask.areas.arrays, there), limits)
@@ -105,8 +105,14 @@ def sorted_rows(parts: list[LayerRows]) -> LayerRows:
     ]
     section = np.where(rows.right == NONE, 1, np.where(rows.left == NONE, 2, 0))
     order = np.lexsort((rows.right, rows.left, section))
-    back = np.argsort(order)
     touching = concatenate_touching(some) if some else None
+    return with_touching_of(rows, order, touching)
+
+
+def with_touching_of(rows: LayerRows, order: IntArray, touching: Touching | None) -> LayerRows:
+    """Return rows in an order, with the lines and points of these."""
+    back = np.full(len(rows), NONE)
+    back[order] = np.arange(len(order))
     if touching is not None:
         touching = touching._replace(lines=back[touching.lines], points=back[touching.points])
     return replace(rows.take(order), touching=touching)

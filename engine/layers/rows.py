@@ -17,7 +17,6 @@ import numpy as np
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
 from engine.layers.gaps import Place, gaps_of, report_gaps
 from engine.layers.limits import Limits
-from engine.layers.wrapping import cut_parts, note_steps
 from engine.polygon_overlay.batch import OverlayBatch, overlay_batch
 from engine.polygon_overlay.coverage import union_of_coverage
 from engine.polygon_overlay.overlay import less_all, overlay, union_all
@@ -212,14 +211,9 @@ def unite(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
     return PolygonArrays(union.vertices, union.ring_offsets, np.array([0, len(union.ring_offsets) - 1]))
 
 
-def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits, in_degrees: bool) -> Layer:
+def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits) -> Layer:
     """Return the `Layer` whose feature k has the polygons offsets[k] .. offsets[k + 1] - 1 of parts; overlapping ones
-    of a feature are united. With `limits.wrap` parts are cut at the antimeridian first. in_degrees: whether coordinates
-    are longitudes and latitudes, as far as is known."""
-    if limits.wrap:
-        parts, offsets = cut_parts(parts, offsets, limits)
-    elif in_degrees:
-        note_steps(*parts[:2])
+    of a feature are united."""
     owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     arrays = parts.merged(offsets)
     filled = np.flatnonzero(parts.sizes())

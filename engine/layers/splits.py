@@ -1,4 +1,7 @@
-"""Layers of polygons split by lines: a row for each piece."""
+"""Layers of polygons split by lines: a row for each piece.
+
+Source: D. E. Muller, F. P. Preparata, Finding the intersection of two convex polyhedra, 1978 (faces, as split.py).
+"""
 
 from __future__ import annotations
 

@@ -5,11 +5,15 @@ ring continuous: longitudes x + 360 k, exact as fractions. It is then split by t
 is moved back by 360 j: vertices of the input are the doubles that they were, and the latitude of a cut is rounded once,
 the same for two features that share the edge. Edges stay straight in longitude and latitude, as RFC 7946 has them.
 
+In an answer the pieces of a row on the two sides are brought together again, exactly as fractions; edges that both
+share vanish from their arrangement. Longitudes are those that the vertices had: such a ring jumps from 180 to -180.
+
 Source: RFC 7946, 3.1.9 (Antimeridian Cutting).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from math import floor
@@ -19,6 +23,7 @@ import numpy as np
 from engine.arrangement.nodes import rational_nodes
 from engine.errors import InvalidInputError
 from engine.layers.limits import Limits
+from engine.layers.rows import LayerRows, concatenate_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of, concatenate_polygons
 from engine.polygon_overlay.split import pieces_between
 from engine.running.budget import Budget, note
@@ -38,7 +43,7 @@ def steps_of(vertices: FloatArray, ring_offsets: IntArray) -> IntArray:
     return is_west.astype(np.int64) - is_east
 
 
-def note_steps(vertices: FloatArray, ring_offsets: IntArray) -> None:
+def _note_steps(vertices: FloatArray, ring_offsets: IntArray) -> None:
     """Warn of rings in longitude and latitude with steps of more than 180 degrees, which are taken as they are."""
     x, y = vertices.T
     if not len(x) or not (x.max() - x.min() > 180 and np.abs(x).max() <= 180 and np.abs(y).max() <= 90):
@@ -48,9 +53,16 @@ def note_steps(vertices: FloatArray, ring_offsets: IntArray) -> None:
         note(f"{n} rings have steps of more than 180 degrees, taken as they are; wrap=180 cuts at the antimeridian")
 
 
-def cut_parts(parts: PolygonArrays, offsets: IntArray, limits: Limits) -> tuple[PolygonArrays, IntArray]:
-    """Return the polygons of features, feature k has offsets[k] .. offsets[k + 1] - 1, cut at the antimeridian. Raises:
-    InvalidInputError for a ring around a pole."""
+def cut_parts(
+    parts: PolygonArrays, offsets: IntArray, in_degrees: bool, limits: Limits
+) -> tuple[PolygonArrays, IntArray]:
+    """Return the polygons of features, feature k has offsets[k] .. offsets[k + 1] - 1, with `limits.wrap` cut at the
+    antimeridian. in_degrees: whether to warn of such that are not cut. Raises: InvalidInputError for a ring around a
+    pole."""
+    if not limits.wrap:
+        if in_degrees:
+            _note_steps(parts.vertices, parts.ring_offsets)
+        return parts, offsets
     steps = steps_of(parts.vertices, parts.ring_offsets)
     ends = parts.ring_offsets[parts.polygon_offsets]
     is_cut: BoolArray = np.array(
@@ -112,3 +124,62 @@ def _polygon(rings: list[list[Exact]]) -> PolygonArrays:
     """Return a piece with nearest doubles."""
     places = np.array([(float(x), float(y)) for ring in rings for x, y in ring])
     return arrays_of(places, summed(np.array([*map(len, rings)], np.int64)), np.array([0, len(rings)]))
+
+
+def joined_rows(rows: LayerRows, limits: Limits) -> LayerRows:
+    """Return rows whose pieces that meet along the antimeridian are joined, with `limits.wrap`; a row with a piece that
+    reaches from one side of it around the earth to the other stays as it is."""
+    if not limits.wrap or not len(rows.vertices):
+        return rows
+    x, following = rows.vertices[:, 0], next_in_rings(rows.ring_offsets)
+    rings = np.repeat(np.arange(len(rows.ring_offsets) - 1), np.diff(rows.ring_offsets))
+    piece = np.searchsorted(rows.piece_offsets, rings, side="right") - 1
+    west, east = (np.unique(piece[(x == side) & (x[following] == side)]) for side in (180.0, -180.0))
+    around = np.intersect1d(west, east)
+    owners = np.searchsorted(rows.row_offsets, np.arange(len(rows.piece_offsets) - 1), side="right") - 1
+    some = np.setdiff1d(np.intersect1d(owners[west], owners[east]), owners[around])
+    if not len(some):
+        return rows
+    parts, order = [rows], np.arange(len(rows))
+    with limits.budget() as budget:
+        for number, k in enumerate(some.tolist()):
+            own = range(rows.row_offsets[k], rows.row_offsets[k + 1])
+            pieces = [_rings(rows, j) for j in own]
+            meet = [j in west or j in east for j in own]
+            made = _united([(rings, j in east) for rings, j, m in zip(pieces, own, meet) if m], budget)
+            every = [rings for rings, m in zip(pieces, meet) if not m] + made
+            parts.append(_row(every, int(rows.left[k]), int(rows.right[k])))
+            order[k] = len(rows) + number
+    return replace(concatenate_rows(parts).take(order), touching=rows.touching)
+
+
+def _rings(rows: LayerRows, piece: int) -> list[FloatArray]:
+    ends = rows.ring_offsets[rows.piece_offsets[piece] : rows.piece_offsets[piece + 1] + 1]
+    return [rows.vertices[i:j] for i, j in pairwise(ends.tolist())]
+
+
+def _united(pieces: list[tuple[list[FloatArray], bool]], budget: Budget) -> list[list[FloatArray]]:
+    """Return the union of pieces, given with whether they are east of the antimeridian, that meet there alone."""
+    given: dict[tuple[Fraction, Fraction], tuple[float, float]] = {}
+    exact = []
+    for rings, is_east in pieces:
+        for ring in rings:
+            exact.append([(Fraction(x) + 360 * is_east, Fraction(y)) for x, y in ring.tolist()])
+            for place, (x, y) in zip(exact[-1], ring.tolist()):
+                given[place] = (180.0 if abs(x) == 180.0 else x, y)
+    nodes, numbers = rational_nodes([place for ring in exact for place in ring], budget)
+    ends = np.cumsum([0, *map(len, exact)]).tolist()
+    arrangement, made = pieces_between(nodes, [numbers[i:j] for i, j in pairwise(ends)], [], budget)
+    return [
+        [np.array([given[nodes.exact(arrangement.origin(edge))] for edge in ring]) for ring in (one.shell, *one.holes)]
+        for one in made
+    ]
+
+
+def _row(pieces: list[list[FloatArray]], left: int, right: int) -> LayerRows:
+    rings = [ring for piece in pieces for ring in piece]
+    arrays = PolygonArrays(
+        np.concatenate(rings), summed(np.array([*map(len, rings)], np.int64)),
+        summed(np.array([*map(len, pieces)], np.int64)),
+    )  # fmt: skip
+    return LayerRows(np.array([left]), np.array([right]), *arrays, np.array([0, len(pieces)]))

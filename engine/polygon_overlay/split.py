@@ -90,7 +90,7 @@ def _lines_in(lines: Any) -> list[FloatArray]:
     except EngineError as error:
         raise error.at("lines") from None
     given = lines if given is None else given
-    if not isinstance(given, (list, tuple, np.ndarray)):
+    if not isinstance(given, (list, tuple)) and not (isinstance(given, np.ndarray) and given.ndim):
         raise InvalidArrayError(f"lines must be a list of arrays of shape (n, 2), got {shown(lines)}", ("lines",))
     return [as_points(line, 2, ("lines", number)) for number, line in enumerate(polled(given))]
 

@@ -284,8 +284,8 @@ class LayersOverlayRequest(Schema):
         "the left; identity: both; symmetric_difference: what is left of either; union: all of these."
     )
     grid: Number = optional(_GRID)
-    min_width: Number = optional(_MIN_WIDTH)
-    wrap: Number = optional(_WRAP)
+    min_width: Number = optional(_MIN_WIDTH, [0.01])
+    wrap: Number = optional(_WRAP, [180])
 
 
 class LayersUnionRequest(Schema):
@@ -300,10 +300,11 @@ class LayersUnionRequest(Schema):
     grid: Number = optional(_GRID)
     coverage: bool = optional("The polygons do not overlap: verified, an overlap is refused with its place.")
     gaps: Literal["keep", "refuse"] = optional(
-        "With coverage: what several features enclose, and none has as a hole, is kept and noted, or refused."
+        "With coverage: what several features enclose, and none has as a hole, is kept and noted, or refused.",
+        ["refuse"],
     )
-    min_width: Number = optional(_MIN_WIDTH)
-    wrap: Number = optional(_WRAP)
+    min_width: Number = optional(_MIN_WIDTH, [0.01])
+    wrap: Number = optional(_WRAP, [180])
 
 
 class LayersClipRequest(Schema):
@@ -313,10 +314,12 @@ class LayersClipRequest(Schema):
 
     layer: FeatureCollection = Field(description=_ANY)
     mask: FeatureCollection = Field(description="The region, the union of polygons: a FeatureCollection of these.")
-    keep: Literal["inside", "outside"] = optional("What lies in the region, if left out, or what lies outside of it.")
+    keep: Literal["inside", "outside"] = optional(
+        "What lies in the region, if left out, or what lies outside of it.", ["outside"]
+    )
     grid: Number = optional(_GRID)
-    min_width: Number = optional(_MIN_WIDTH)
-    wrap: Number = optional(_WRAP)
+    min_width: Number = optional(_MIN_WIDTH, [0.01])
+    wrap: Number = optional(_WRAP, [180])
 
 
 class LayersSplitRequest(Schema):
@@ -385,9 +388,11 @@ class LayersContainsRequest(Schema):
 class Sliver(Schema):
     """A narrow piece."""
 
-    feature: Count = Field(description="Index of its feature in this answer.")
-    piece: Count = Field(description="Index of its polygon in the feature.")
-    width: Number = Field(description="The double nearest to the least distance of two parallel lines around it.")
+    feature: Count = Field(description="Index of its feature in this answer.", examples=[0])
+    piece: Count = Field(description="Index of its polygon in the feature.", examples=[0])
+    width: Number = Field(
+        description="The double nearest to the least distance of two parallel lines around it.", examples=[0.004]
+    )
 
 
 class LayersResponse(Schema):
@@ -400,5 +405,5 @@ class LayersResponse(Schema):
         "and _2; members named after the layers say which these were, by index and id. Geometry null: it was."
     )
     collapsed: Count = Field(description="Rows that are not here because rounding left nothing of them.")
-    slivers: list[Sliver] = optional("The pieces narrower than `min_width`, if that was given.")
+    slivers: list[Sliver] = optional("The pieces narrower than `min_width`, if that was given.", [[]])
     accuracy: Accuracy

@@ -157,6 +157,14 @@ WORK: dict[str, Callable[[], Any]] = {
         "left": features([[bar] for bar in stripes(1_500)]), "right": features([[bar] for bar in across(1_500)]),
         "predicate": "overlaps",
     },
+    "join_nearest": lambda: {
+        "left": features([[k % 2 * 9.0, k] for k in range(9_000)], "Point"),
+        "right": features([[bar] for bar in stripes(1_500)]),
+    },
+    "split_layer": lambda: {
+        "layer": features([[bar] for bar in stripes(300)]),
+        "lines": features([[[-1, k], [9_000, k + 0.5]] for k in range(300)], "LineString"),
+    },
     "overlay_batch": far_apart_batch,
     "put_solid": lambda: prism(comb(1_200)),
     "inspect_solid": lambda: prism(circle(20_000)),

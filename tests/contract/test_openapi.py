@@ -53,6 +53,8 @@ OPERATIONS = {
     ("post", "/v1/layers/contains"): "locate_in_layer",
     ("post", "/v1/layers/clip"): "clip_layer",
     ("post", "/v1/layers/join"): "join_layers",
+    ("post", "/v1/layers/nearest"): "join_nearest",
+    ("post", "/v1/layers/split"): "split_layer",
     ("post", "/v1/clip/segments/scene"): "clip_segments_scene",
     ("post", "/v1/scenes"): "put_scene",
     ("get", "/v1/scenes/{scene_id}"): "get_scene",
@@ -80,7 +82,8 @@ OPERATIONS = {
 ANSWERS = {
     "/metrics": "text/plain",
     **dict.fromkeys(
-        [f"/v1/layers/{name}" for name in ("overlay", "union", "contains", "clip", "join")], "application/geo+json"
+        [f"/v1/layers/{name}" for name in ("overlay", "union", "contains", "clip", "join", "nearest", "split")],
+        "application/geo+json",
     ),
     "/v1/scenes/{scene_id}/binary/contains": "application/octet-stream",
     "/v1/scenes/{scene_id}/binary/clip/segments": "application/octet-stream",

@@ -26,6 +26,9 @@ SEGMENT = [[[0, 0, 0], [1, 1, 1]]]
 NOTHING: dict[str, Any] = {"type": "FeatureCollection", "features": []}
 SQUARE = {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}
 LAYER = {"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": SQUARE, "properties": {"a": 1}}]}
+WIDTH = {"min_width": 1.0, "wrap": None}
+NO_LINES: dict[str, Any] = {"type": "FeatureCollection", "features": [
+    {"type": "Feature", "geometry": {"type": "LineString", "coordinates": [[0, 0], [1, 1]]}}]}  # fmt: skip
 
 
 def nested(depth: int) -> list[Any]:
@@ -208,11 +211,13 @@ OPTIONS: dict[str, Callable[..., object]] = {
     "clip_features": lambda **given: engine.layers.clip_features(LAYER, LAYER, **given),
     "join_features": lambda **given: engine.layers.join_features(LAYER, LAYER, **given),
     "dissolve_features": lambda **given: engine.layers.dissolve_features(LAYER, **given),
+    "nearest_features": lambda **given: engine.layers.nearest_features(LAYER, LAYER, **given),
+    "split_features": lambda **given: engine.layers.split_features(LAYER, NO_LINES, **given),
     "locate_features": lambda **given: engine.layers.locate_features(NOTHING, LAYER, **given),
 }
 
 
-FLAGS = ("report", "signed", "nearest", "rays", "boolean", "witness", "witnesses", "detail", "outside")
+FLAGS = ("report", "signed", "nearest", "rays", "boolean", "witness", "witnesses", "detail", "outside", "exclusive")
 POSE = engine.Pose.identity(3)
 POSES: dict[str, Any] = {"rotations": [np.eye(3)], "translations": [[0, 0, 0]]}
 PAIR: dict[str, Any] = {"first": BOX, "second": POLYHEDRON}
@@ -273,11 +278,14 @@ ASKED: dict[str, dict[str, Any]] = {
     "filled": {"rings": [[[0, 0], [1, 0], [0, 1]]], "rule": "non_zero"},
     "hits": {"segments": SEGMENT, "surface": POLYHEDRON, "keep": "all"},
     "inspect": {"mesh": (VERTICES, FACES), "weld": None, "orient": False, "fill_t_junctions": False},
-    "layers.dissolve_features": {"layer": LAYER, "by": ["a"], "coverage": False, "grid": 1.0},
-    "layers.clip_features": {"layer": LAYER, "mask": LAYER, "grid": 1.0},
+    "layers.dissolve_features": {"layer": LAYER, "by": ["a"], "coverage": False, "gaps": "keep", "grid": 1.0, **WIDTH},
+    "layers.clip_features": {"layer": LAYER, "mask": LAYER, "keep": "outside", "grid": 1.0, **WIDTH},
+    "layers.FeatureStream": {"operation": "clip", "layer": LAYER},
+    "layers.nearest_features": {"left": LAYER, "right": LAYER, "max_distance": 1.0},
+    "layers.split_features": {"layer": LAYER, "lines": NO_LINES, "min_width": 1.0},
     "layers.join_features": {"left": LAYER, "right": LAYER, "predicate": "dwithin", "distance": 1.0},
     "layers.locate_features": {"points": POINTS, "polygons": LAYER},
-    "layers.overlay_features": {"left": LAYER, "right": LAYER, "how": "union", "grid": 1.0},
+    "layers.overlay_features": {"left": LAYER, "right": LAYER, "how": "union", "grid": 1.0, **WIDTH},
     "layers.polygon_of": {"geometry": SQUARE},
     "locate": {"points": POINT, "solid": BOX},
     "locate_scene": {"points": POINT, "solids": [BOX], "poses": [None]},
@@ -286,6 +294,7 @@ ASKED: dict[str, dict[str, Any]] = {
     "polygons": {"coordinates": [[0, 0], [1, 0], [0, 1]], "ring_offsets": [0, 3], "polygon_offsets": [0, 1]},
     "read_mesh": {"file": OFF, "file_format": "off"},
     "read_layer": {"file": b'{"type": "Point", "coordinates": [0, 0]}'},
+    "split": {"polygon": POLYGON, "lines": [[[0, 0], [1, 1]]]},
     "union_all": {"polygons": [POLYGON], "grid": None},
 }
 """A good question of everything that is public, options left out that many have: those are below."""
@@ -300,6 +309,8 @@ ELSEWHERE = {
     "layers.clip",
     "layers.sjoin_nearest",
     "layers.FeatureRows",
+    "layers.slivers",
+    "layers.split",
 }
 """Without arguments; looked at below; of frames: tests/unit/layers/test_frames.py; an answer."""
 

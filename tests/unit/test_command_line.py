@@ -279,3 +279,20 @@ def test_kernels_for_others_are_compiled_whatever_is_installed(
     assert len({env["ENGINE_CACHE_DIR"] for env in around}) == 3  # a folder each, then all together
     assert (tmp_path / "made" / "MADE_BY").exists() == writes
     assert ("no kernel was written" in capsys.readouterr().err) != writes
+
+
+@pytest.mark.parametrize("suffix", ["geojsonl", "gpkg", "fgb", "parquet", "geojson"])
+def test_layers_are_written_as_files_of_many_kinds(tmp_path: Path, suffix: str) -> None:
+    if suffix in ("gpkg", "fgb"):
+        pytest.importorskip("pyogrio")
+    if suffix == "parquet":
+        pytest.importorskip("pyarrow")
+    at = '{"type": "Feature", "properties": {"n": N}, "geometry": {"type": "Point", "coordinates": [N, 0]}}\n'
+    source, mask, target = (tmp_path / name for name in ("a.geojsonl", "mask.geojson", f"made.{suffix}"))
+    source.write_text("".join(at.replace("N", str(k)) for k in range(5)))
+    mask.write_text('{"type": "Polygon", "coordinates": [[[1, -1], [3, -1], [3, 1], [1, 1], [1, -1]]]}')
+    assert main(["crop", str(source), str(mask), "-o", str(target)]) == 0
+    made = engine.read_layer(target)["features"]
+    assert sorted(each["properties"]["n"] for each in made) == [1, 2, 3]  # FlatGeobuf sorts
+    assert main(["nearest", str(mask), str(source), "-o", str(target), "-q"]) == 0
+    assert len(engine.read_layer(target)["features"]) == 3

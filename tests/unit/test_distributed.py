@@ -131,3 +131,15 @@ def test_errors_are_those_of_the_engine(client: Client, solid: engine.Polyhedron
         distributed.locate(client, np.where(np.arange(N_POINTS)[:, None] == 1234, np.nan, points), solid)
     with pytest.raises(engine.InvalidInputError, match="part must be"):
         distributed.locate(client, points, solid, part=0)
+
+
+def test_layers_are_joined_as_by_one_process(client: Client) -> None:
+    geopandas = pytest.importorskip("geopandas")
+    shapely = pytest.importorskip("shapely")
+    testing = pytest.importorskip("pandas.testing")
+    at = np.random.default_rng(5).random((2, 60, 2)) * 9
+    left = geopandas.GeoDataFrame({"a": range(60)}, geometry=[shapely.box(x, y, x + 1, y + 2) for x, y in at[0]])
+    right = geopandas.GeoDataFrame({"b": range(60)}, geometry=[*shapely.points(at[1][:59]), None])
+    for how, options in (("inner", {}), ("left", {}), ("right", {"predicate": "dwithin", "distance": 0.5})):
+        found = distributed.sjoin(client, left, right, how, part=17, **options)
+        testing.assert_frame_equal(found, engine.layers.sjoin(left, right, how, **options))

@@ -108,7 +108,7 @@ async def test_what_is_wrong_is_named(
 
 async def test_the_feature_at_fault_is_named(client: httpx.AsyncClient) -> None:
     given = collection([frozenset({(0, 0)})] * 3)
-    given["features"][1]["geometry"]["coordinates"][0][0][2] = [1, 1, 5]
+    given["features"][1]["geometry"]["coordinates"][0][0] = [[1, 1, 5, 7]] * 4
     answer = await client.post("/v1/layers/union", json={"layer": given})
     problem = check_problem(answer, 422, "wrong_dimension")
     assert "layer.features[1] (id 'f1') has positions" in problem["detail"]
@@ -149,7 +149,7 @@ async def test_what_rows_copy_is_counted_before_it_is_copied(
         if name == "names":
             most = len(whole.content) // 2
         app.state.settings = app.state.settings.model_copy(update={"max_answer_bytes": most})
-        monkeypatch.setattr(areas, "_geometry", None)  # no row may be made
+        monkeypatch.setattr(areas, "geometry_of", None)  # no row may be made
         detail = check_problem(await client.post(f"/v1/layers/{path}", json=question), 422, "answer_too_large")[
             "detail"
         ]
@@ -212,3 +212,30 @@ async def test_one_feature_of_many_parts_and_rings(client: httpx.AsyncClient) ->
     overlaid = await client.post("/v1/overlay", json={"subject": region, "clip": region, "operation": "union"})
     (piece,) = overlaid.json()["pieces"]
     assert len(piece["holes"]) == len(holes)
+
+
+async def test_streams_are_answered_in_parts_and_name_lines(client: httpx.AsyncClient) -> None:
+    first = json.dumps({"operation": "clip", "layer": collection([frozenset({(0, 0)})])})
+    headers = {"content-type": "application/x-ndjson"}
+
+    def point(x: Any) -> str:
+        return json.dumps({"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [x, 0.5]}})
+
+    async def asked(*lines: str, **more: Any) -> httpx.Response:
+        content = "\n".join([first, *lines]).encode()
+        return await client.post("/v1/layers/stream", content=content, headers=headers, **more)
+
+    answer = await asked(*(point(k / 1000) for k in range(5000)))
+    rows = [json.loads(line) for line in answer.text.splitlines()]
+    assert answer.headers["content-type"] == "application/x-ndjson"
+    assert [row["layer"]["index"] for row in rows] == list(range(1001))
+    late = (await asked(*(point(0.5) for _ in range(2500)), "", point("x"))).text.splitlines()
+    assert len(late) == 2001
+    error = json.loads(late[-1])
+    assert (error["type"], error["code"], error["errors"][0]["pointer"]) == ("Error", "invalid_array", "/2502")
+    assert error["detail"].startswith("line 2503: ")
+    for lines, code in ((["{"], "not_json"), ([point("x")], "invalid_array")):
+        assert (await asked(*lines)).json()["code"] == code
+    for body, status in ((b"", 422), (b"[1]", 422), (b'{"operation": "zip", "layer": 1}', 422), (b"{", 400)):
+        assert (await client.post("/v1/layers/stream", content=body, headers=headers)).status_code == status
+    assert (await client.post("/v1/layers/stream", content=first)).status_code == 415
