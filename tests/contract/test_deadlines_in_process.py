@@ -174,6 +174,9 @@ SIZES = [[1e200], [1e-200], [1.0]], [[1e-150], [1e150], [3.0]]
 FAR = [np.tile(IN_A_PLANE * sizes, (100_000, 1, 1)) for sizes in SIZES]
 """Triangles of one plane whose exponents only integers hold."""
 WORK: dict[str, Callable[..., Any]] = {
+    "split": lambda **options: engine.split(
+        engine.Polygon([*stripes(300)]), [[[k, -1.0], [k + 0.5, 9_000.0]] for k in range(900)], **options
+    ),
     "Polygon": lambda **end: engine.Polygon(
         {"type": "MultiPolygon", "coordinates": [[bar] for bar in [*stripes(1_500), *across(1_500), TINY]]}, **end
     ),
