@@ -95,14 +95,48 @@ def _relate_pairs(
         i, j = pairs[item, 0], pairs[item, 1]
         n, m = left.firsts[i + 1] - left.firsts[i], right.firsts[j + 1] - right.firsts[j]
         if left.dims[i] == POINT and right.dims[j] == AREA and n == 1 and m <= _FEW:
-            at, first = -1, right.firsts[j]
-            p = as_point2(left.vertices, left.firsts[i])
-            for edge in range(first, first + m):
-                c, d = as_point2(right.vertices, edge), as_point2(right.vertices, first + right.following[edge])
-                at = 0 if at == 0 else _passed(p, c, d, at)
-            bits[item] = _of_location(at, is_any)
+            bits[item] = _of_location(_locate_few(as_point2(left.vertices, left.firsts[i]), right, j), is_any)
+            continue
+        if is_any and n * m <= _FEW * BLOCK:
+            bits[item] = II if _do_few_meet(left, i, right, j) else 0
             continue
         bits[item] = _relate(shape_of(left, i), shape_of(right, j), is_any, room, flag)
+
+
+@inline
+def _locate_few(p: Point2, shapes: Shapes, k: int) -> int:
+    """Return what `_locate` does, for a feature of few edges."""
+    at, first = -1, shapes.firsts[k]
+    for edge in range(first, shapes.firsts[k + 1]):
+        if at != 0:
+            at = _passed(
+                p, as_point2(shapes.vertices, edge), as_point2(shapes.vertices, first + shapes.following[edge]), at
+            )
+    return at
+
+
+@called
+def _do_few_meet(left: Shapes, i: int, right: Shapes, j: int) -> bool:
+    """Return whether two features of few edges meet: without trees, a pair of edges after the other."""
+    first, second = left.firsts[i], right.firsts[j]
+    for edge in range(first, left.firsts[i + 1]):
+        a, b = as_point2(left.vertices, edge), as_point2(left.vertices, first + left.following[edge])
+        for other in range(second, right.firsts[j + 1]):
+            c, d = as_point2(right.vertices, other), as_point2(right.vertices, second + right.following[other])
+            if _boxes_meet(a, b, c, d) and orient2d(a, b, c) * orient2d(a, b, d) <= 0:
+                if orient2d(c, d, a) * orient2d(c, d, b) <= 0:  # on one line too: their boxes meet
+                    return True
+    return _has_few_inside(left, i, right, j) or _has_few_inside(right, j, left, i)
+
+
+@inline
+def _has_few_inside(left: Shapes, i: int, right: Shapes, j: int) -> bool:
+    """Return whether a path of a feature that meets no edge of another, if that is an area, lies in it."""
+    first, found = left.firsts[i], False
+    for edge in range(first, left.firsts[i + 1]):
+        if right.dims[j] == AREA and not found and left.following[edge] <= edge - first:
+            found = _locate_few(as_point2(left.vertices, edge), right, j) > 0
+    return found
 
 
 @called
