@@ -118,10 +118,11 @@ def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
     n = len(side.features)
     dims, counts, sizes, positions = np.full(n, -1, np.int8), np.zeros(n, np.int64), list[int](), list[FloatArray]()
     with limits.budget():
+        single = _single_points(side)
         for number in polled(range(n)):
             geometry = side.features[number].get("geometry")
             if geometry is not None and geometry["type"] not in AREAS:
-                paths = check_each([number], side, _paths_in, is_array=False)[0]
+                paths = single.get(number) or check_each([number], side, _paths_in, is_array=False)[0]
                 counts[number] = len(paths)
                 sizes += map(len, paths)
                 positions += [path[:, :2] for path in paths]
@@ -132,6 +133,20 @@ def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
         polygons_of(side, limits), Paths(dims, read_only(vertices), summed(sizes), summed(counts))
     )
     return made
+
+
+def _single_points(side: Collection) -> dict[int, list[FloatArray]]:
+    """Return the positions of the Points of a collection, read together; none if one of them is wrong."""
+    geometries = (feature.get("geometry") or {} for feature in side.features)
+    places = {k: each.get("coordinates") for k, each in enumerate(polled(geometries)) if each.get("type") == "Point"}
+    there = {k: place for k, place in places.items() if isinstance(place, list) and place}
+    try:
+        positions = _positions([list(there.values())])
+    except (DeadlineExceededError, CancelledError):
+        raise
+    except (EngineError, TypeError, ValueError):
+        return {}
+    return {k: [positions[row : row + 1]] for row, k in enumerate(polled(there))}
 
 
 def _paths_in(geometry: dict[str, Any]) -> list[FloatArray]:
