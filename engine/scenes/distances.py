@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from engine.distance.distances import Distances, PointQuery
+from engine.errors import EmptyGeometryError
 from engine.running.budget import Budget
 from engine.running.parallel import Progress, run_chunks
 from engine.scenes.placements import Placements
@@ -69,7 +70,12 @@ def measure_all(
             query = PointQuery(
                 read_only(points[some]), solids[number], poses[number], None, True, budget, where=("solids", number)
             )
-            query.fill(0, len(some), budget)
+            try:
+                query.fill(0, len(some), budget)
+            except EmptyGeometryError as error:  # of half-spaces, which no box tells
+                raise EmptyGeometryError(
+                    str(error).replace("solid", f"solids[{number}]", 1), ("solids", number)
+                ) from None
             answer: Distances = query.result()
             n_exact[0] += query.n_exact
             is_less = (answer.distance < best[some]) | ((answer.distance == best[some]) & (number < body[some]))

@@ -100,7 +100,14 @@ class Sections(Ragged):
         -------
         list of Polygon
             With holes.
+
+        Raises
+        ------
+        IndexError
+            There is no such plane.
         """
+        if not 0 <= plane < len(self):
+            raise IndexError(f"there are {len(self)} planes, got number {plane}")
         pieces, rings = self.plane_offsets[plane : plane + 2], self.ring_offsets.tolist()
         bounds = self.piece_offsets[int(pieces[0]) : int(pieces[1]) + 1].tolist()
         return [Polygon([self.flat[rings[k] : rings[k + 1]] for k in range(*ends)]) for ends in pairwise(bounds)]

@@ -12,6 +12,7 @@ from engine import (
     Aabb,
     Convex,
     DeadlineExceededError,
+    EmptyGeometryError,
     IndexOutOfRangeError,
     InvalidArrayError,
     InvalidOperationError,
@@ -160,3 +161,10 @@ def test_says_which_body_is_wrong() -> None:
         scene.collide(deadline=-1.0)
     with pytest.raises(DeadlineExceededError):
         scene.locate(np.zeros((1, 3)), deadline=-1.0)
+
+
+def test_an_empty_body_is_named_with_its_number() -> None:
+    nothing = Convex([[1, 0, 0, 1], [-1, 0, 0, -3]])
+    scene = Scene([Aabb([0, 0, 0], [1, 1, 1]), nothing])
+    with pytest.raises(EmptyGeometryError, match=r"solids\[1\] has no point to be near"):
+        scene.distances([[5.0, 0, 0]])

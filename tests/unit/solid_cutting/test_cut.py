@@ -265,3 +265,11 @@ def test_regions_and_normals_that_do_not_fit_are_refused_by_name() -> None:
         engine.cut(cube, engine.Sphere([0, 0, 0], 1))
     with pytest.raises(engine.InvalidInputError, match="normal goes with heights"):
         engine.section(cube, [engine.HalfSpace([0, 0, 1], -0.5)], normal=[1, 0, 0])
+
+
+def test_a_plane_that_is_not_there_is_named() -> None:
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    body = engine.Polyhedron(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    for number in (1, -1):
+        with pytest.raises(IndexError, match=f"there are 1 planes, got number {number}"):
+            engine.section(body, [0.5]).polygons(number)
