@@ -168,7 +168,7 @@ function chooseQuestion() {
   fillSelects();
 }
 
-const ITEMS = { proof: "points", contains: "points", distances: "points", segments: "segments", scene: "segments", polygons: "polygons" };
+const ITEMS = { hits: "segments", proof: "points", contains: "points", distances: "points", segments: "segments", scene: "segments", polygons: "polygons" };
 
 function readControls() {
   const angle = (Number($("turn").value) * Math.PI) / 180, [c, s] = [Math.cos(angle), Math.sin(angle)];

@@ -191,6 +191,35 @@ export const QUESTIONS = {
     },
   },
 
+  hits: {
+    hint: "A lamp and its rays: green up to the first hit, with the normal there; orange where a ray meets an edge, a corner or a rim, or runs along a face. Move the lamp; snapped, rays meet edges and corners of cubes exactly.",
+    dimensions: [3],
+    firsts: (solid) => solid.mesh,
+    counts: [0, 3.5, 2],
+    ask(state) {
+      const lamp = fromView(state.frame, snapped(state, [0, 1.6, 1.2].map((v, k) => v + state.offset[k]))), next = random(5);
+      const rays = state.items?.segments?.map(([a, b]) => [a, b.map((v, k) => v - a[k])])
+        ?? Array.from({ length: state.n }, () => [lamp, fromView(state.frame, snapped(state, randomPosition(next, 3, 1.2))).map((v, k) => v - lamp[k])]);
+      return { path: "/v1/hits", body: { surface: state.first.asked, segments: rays, rays: true, keep: "first" }, items: rays.length };
+    },
+    figures(state, { hits }) {
+      const kinds = {};
+      for (const { kind } of hits) kinds[kind] = (kinds[kind] ?? 0) + 1;
+      return { "rays that meet it": hits.length, ...kinds };
+    },
+    verdict: (state, { hits }) => `${counted(hits.length, "ray")} of ${state.n.toLocaleString("en")} ${hits.length === 1 ? "meets" : "meet"} it`,
+    draw(state, { hits }, { segments: rays }) {
+      const at = ({ segment, t }) => rays[segment][0].map((v, k) => v + t * rays[segment][1][k]), lines = { kept: [], boundary: [] }, met = new Set(hits.map(({ segment }) => segment));
+      const size = 0.15 / state.frame.scale, tips = hits.map((hit) => [at(hit), unit(hit.normal)].reduce((p, n) => [p, p.map((v, k) => v + size * n[k])]));
+      for (const hit of hits) lines[hit.kind === "across" ? "kept" : "boundary"].push([rays[hit.segment][0], at(hit)]);
+      return [
+        ...firstItems(state), { kind: "lines", lines: rays.filter((_, i) => !met.has(i)).map(([a, d]) => [a, a.map((v, k) => v + 2 * d[k])]), color: "outside", width: 0.7 },
+        ...Object.entries(lines).map(([color, list]) => ({ kind: "lines", lines: list, color, width: state.n > 300 ? 0.7 : 1.5 })),
+        { kind: "lines", lines: tips, color: "second", width: 1.5 }, { kind: "points", points: rays.slice(0, 1).map(([a]) => a), color: "boundary", width: 12 },
+      ];
+    },
+  },
+
   collide: {
     hint: "Move the second body; the faces of the witness are orange, and the shortest line between bodies that are apart. Try the same solid twice, snapped: touching and overlapping are distinguished exactly.",
     firsts: () => true,

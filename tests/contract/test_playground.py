@@ -175,7 +175,7 @@ def request_of(page: Any) -> dict[str, Any]:
         ("collide", 3, "overlapping"), ("collide", 2, "overlapping"),
         ("segments", 3, "of 56 segments"), ("segments", 2, "of 56 segments"), ("polygons", 3, "of 6 polygons"),
         ("scene", 3, "first met: body"), ("scene", 2, "first met: body"),
-        ("distances", 3, "away"), ("distances", 2, "away"),
+        ("hits", 3, "of 100 meet it"), ("distances", 3, "away"), ("distances", 2, "away"),
         ("polygons", 2, "of 6 polygons"), ("overlay", 2, "6 pieces"),
     ],
 )  # fmt: skip
