@@ -171,7 +171,7 @@ def _add_edges(
                 is_out = True
             elif p == 0.0 and q == 0.0:  # case: on its line
                 b = a + 1 if a + 1 < m else 0
-                is_along = (x[k] - x[i]) * (ox[b] - ox[a]) + (y[k] - y[i]) * (oy[b] - oy[a]) > 0.0
+                is_along = (x[k] > x[i]) == (ox[b] > ox[a]) and (y[k] > y[i]) == (oy[b] > oy[a])  # no underflow
                 is_out = is_out or not (is_first and is_along)
         if is_out or low > high:
             continue

@@ -29,6 +29,7 @@ from engine.types import FloatArray, read_only
 _BOX_NUMBERS: Final = 5
 _COMFORTABLE: Final = 128
 """Exponents of coordinates up to which areas are far from the least and the largest double."""
+_MOST: Final = np.finfo(np.float64).max
 
 
 def check_same_length(first: Any, second: Any) -> None:
@@ -122,8 +123,8 @@ def _ratios(pairs: Sequence[tuple[Any, Any]], workers: int | None, budget: Budge
 
 
 def extremes(low: Sequence[Fraction], high: Sequence[Fraction]) -> Any:
-    """Return (both, first, second) at which their ratio is least, and greatest."""
-    return (low[0], *high[1:]), (high[0], *low[1:])
+    """Return (both, first, second) at which their ratio is least, and greatest: 1 where all may be the same."""
+    return (low[0], *high[1:]), (high[0], *low[1:]) if high[0] <= min(low[1:]) else (Fraction(1),) * 3
 
 
 def ratio_of(volumes: Sequence[Fraction]) -> float:
@@ -142,17 +143,22 @@ def _selection(corners: FloatArray) -> PolygonSelection:
 
 def _scaled(*sides: FloatArray) -> list[FloatArray]:
     """Return corners (n, k, 2), each pair multiplied by powers of two by axis, where areas might be too large or too
-    small for doubles."""
+    small for doubles, and where that is exact."""
     exponents = np.frexp(np.maximum(*(np.abs(each).max(axis=1) for each in sides)))[1]
     exponents[np.abs(exponents) <= _COMFORTABLE] = 0
-    return [np.ldexp(each, -exponents[:, None]) for each in sides] if exponents.any() else list(sides)
+    if not exponents.any():
+        return list(sides)
+    up = exponents[:, None]
+    made = [np.ldexp(each, -up) for each in sides]
+    are_exact = [(np.ldexp(some, up) == each).all(axis=(1, 2)) for some, each in zip(made, sides)]
+    return [np.where((are_exact[0] & are_exact[1])[:, None, None], *pair) for pair in zip(made, sides)]
 
 
 def _around(corners: FloatArray) -> FloatArray:
     """Return a box strictly around each polygon: with that it has its own area in common, crossing no edge."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     width = (high - low).max(axis=1, keepdims=True) + np.abs(low) + 1e-300
-    low, high = low - width, high + width
+    low, high = np.maximum(low - width, -_MOST), np.minimum(high + width, _MOST)
     return np.stack([low, np.c_[high[:, 0], low[:, 1]], high, np.c_[low[:, 0], high[:, 1]]], axis=1)
 
 

@@ -303,3 +303,17 @@ def test_no_points_have_no_nearest_points() -> None:
         none = engine.distances(np.zeros((0, 3)), solid, nearest=True)
         assert isinstance(none, engine.Distances)
         assert (len(none), none.point.shape, none.index.shape) == (0, (0, 3), (0, 2))
+
+
+def test_points_in_the_plane_of_a_tiny_surface_far_out() -> None:
+    """Lengths of 1e-200 in the plane x = 1e200: products of them underflow, no bound holds."""
+    draw, numbers = np.random.default_rng(3), np.arange(16).reshape(4, 4)
+    grid = np.stack([*np.meshgrid(np.arange(4), np.arange(4), indexing="ij"), np.zeros((4, 4))], axis=2).reshape(-1, 3)
+    flat = grid + draw.normal(size=grid.shape) * 0.2
+    starts = numbers[:-1, :-1].ravel()[:, None]
+    faces = np.concatenate([starts + np.array([0, 4, 5]), starts + np.array([0, 5, 1])])
+    vertices, points = flat * 1e-200, draw.normal(size=(8, 3))
+    vertices[:, 0] = points[:, 0] = 1e200
+    made = engine.distances(points, engine.Surface(vertices, faces))
+    vertices[:, 0] = points[:, 0] = 0.0
+    assert np.array_equal(np.asarray(made), engine.distances(points, engine.Surface(vertices, faces)))

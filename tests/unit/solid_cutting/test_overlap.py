@@ -180,3 +180,33 @@ def test_heights_in_any_order_are_as_planes_one_by_one() -> None:
             assert made.areas.tolist() == [area for each in alone for area in each.areas.tolist()]
             assert made.vertices.tolist() == [place for each in alone for place in each.vertices.tolist()]
             assert np.diff(made.plane_offsets).tolist() == [len(each.areas) for each in alone]
+
+
+def test_edges_in_common_whose_product_underflows() -> None:
+    first = np.array([[[0.0, 1.0], [0.0, 0.0], [1e-170, 0.0], [1e-170, 1.0]]])
+    second = first * [1.0, 2.0]
+    assert engine.overlap_volume(first, second).tolist() == [1e-170]  # type: ignore[union-attr]
+    assert engine.iou(first, second).tolist() == [0.5]  # type: ignore[union-attr]
+
+
+def test_ratios_whose_bounds_are_wider_than_the_areas() -> None:
+    """Needles an ulp apart."""
+    x = np.array([-0.47560801199137287, -0.992304348800618, -0.9960269889680463, -0.8355143332074377])
+    y = np.array([8.796573304017959e-17, 1.2382277396093705e-17, 8.905187952675274e-18, -5.494686515215683e-17])
+    first = np.stack([x, y], axis=1)[None]
+    x[0], y[1:] = np.nextafter(x[0], -9.0), np.nextafter(y[1:], [-9.0, 9.0, -9.0])
+    second = np.stack([x, y], axis=1)[None]
+    both, own = convex_overlap(first[0], second[0]), [ring_area(points_of(ring[0])) for ring in (first, second)]
+    assert engine.iou(first, second).tolist() == [ratio(both, *map(abs, own))]  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("far", [2.0**200, 1e308])
+def test_ratios_of_polygons_that_no_power_of_two_scales_exactly(far: float) -> None:
+    """An L of a thin long bar and a thin high one, and a box on the high one."""
+    thin, low, high = 1e-300, 1e-180 if far < 1e300 else 1e-300, 1e180 if far < 1e300 else 1e308
+    bar = [(0, 0), (far, 0), (far, low), (thin, low), (thin, high), (0, high)]
+    box = [(0, -high), (thin, -high), (thin, high), (0, high)]
+    w, h, f, g = (Fraction(x) for x in (thin, high, far, low))
+    expected = nearest(w * h / (2 * w * h + f * g - w * g))
+    assert engine.iou(np.array([bar]), np.array([box])).tolist() == [expected]  # type: ignore[union-attr]
+    assert engine.iou(engine.Polygon([bar]), engine.Polygon([box])) == expected
