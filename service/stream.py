@@ -87,8 +87,10 @@ class Stream:
         except ClientDisconnect:
             pass
         except Exception as error:
-            first = 0 if stream is None else stream.n_features
-            answer = problem([_with_line(fault, lines, first) for fault in faults_of(error)])
+            faults = faults_of(error)
+            if stream is not None and isinstance(error, engine.EngineError):
+                faults = [_with_line(fault, lines, stream.n_features) for fault in faults]
+            answer = problem(faults)
             if not status:
                 status = answer.status_code
                 await answer(scope, receive, send)
@@ -113,6 +115,7 @@ async def _parts_of(receive: Receive, most: int, seconds: float) -> AsyncIterato
     """Yield the first line alone, then the others in parts. most: bytes of a line; seconds: within which something of
     the body must arrive."""
     rest, length, number, is_more, part, size = list[bytes](), 0, 0, True, list[Line](), 0
+    is_first = True
     while is_more:
         try:
             async with asyncio.timeout(seconds):
@@ -124,13 +127,14 @@ async def _parts_of(receive: Receive, most: int, seconds: float) -> AsyncIterato
         is_more = message.get("more_body", False)
         rest.append(message.get("body", b""))
         length += len(rest[-1])
-        if length > most + PART:
-            what = f"line {number + 1} is longer than {most} bytes"
-            raise ServiceError("body_too_large", f"{what}; split it, or raise GEOMETRY_MAX_BODY_BYTES")
-        if is_more and b"\n" not in rest[-1]:
+        if is_more and b"\n" not in rest[-1] and length <= most:
             continue
         *whole, last = b"".join(rest).split(b"\n")
         rest, length = [last], len(last)
+        for line, text in enumerate([*whole, last], number + 1):
+            if len(text) > most:
+                what = f"line {line} is longer than {most} bytes"
+                raise ServiceError("body_too_large", f"{what}; split it, or raise GEOMETRY_MAX_BODY_BYTES")
         for text in whole if is_more else [*whole, last]:
             number += 1
             text = text.strip().removeprefix(b"\x1e")
@@ -138,9 +142,9 @@ async def _parts_of(receive: Receive, most: int, seconds: float) -> AsyncIterato
                 continue
             part.append((number, text))
             size += len(text)
-            if number == part[0][0] == 1 or size >= PART or len(part) >= _MOST:
+            if is_first or size >= PART or len(part) >= _MOST:
                 yield part
-                part, size = [], 0
+                part, size, is_first = [], 0, False
         if part and is_more and not last:  # the client waits for what it sent, perhaps
             yield part
             part, size = [], 0
@@ -190,8 +194,10 @@ def _answered(stream: engine.layers.FeatureStream, lines: list[Line], call: Call
 
 
 def _with_line(fault: Fault, lines: list[Line], first: int) -> Fault:
-    """Return a fault of a feature with the number of its line. lines: of the part; first: its first feature."""
-    if fault.path[:2] != ("stream", "features") or not isinstance(fault.path[2], int):
-        return fault
-    line = lines[fault.path[2] - first][0]
-    return Fault((line - 1, *fault.path[3:]), fault.code, f"line {line}: {fault.detail}")
+    """Return a fault of a feature with the number of its line, or with those of the part. lines: of the part; first:
+    its first feature."""
+    match fault.path:
+        case ("stream", "features", int(number), *rest):
+            line = lines[number - first][0]
+            return Fault((line - 1, *rest), fault.code, f"line {line}: {fault.detail}")
+    return Fault(fault.path, fault.code, f"lines {lines[0][0]} to {lines[-1][0]}: {fault.detail}")

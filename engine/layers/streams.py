@@ -63,7 +63,14 @@ class FeatureStream:
     """
 
     def __init__(
-        self, operation: str, layer: Any, *, deadline: float | None = None, cancel: Cancel | None = None, **options: Any
+        self,
+        /,
+        operation: str,
+        layer: Any,
+        *,
+        deadline: float | None = None,
+        cancel: Cancel | None = None,
+        **options: Any,
     ) -> None:
         if not isinstance(operation, str) or operation not in OPERATIONS:
             what = f"operation must be one of {', '.join(OPERATIONS)}; got {shown(operation)}"

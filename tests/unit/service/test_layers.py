@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 
+import engine
+from service.app import create_app
 from service.convert import areas
 from service.schemas.clipping import LayersResponse
+from service.settings import Settings
 from tests.unit.layers.cells import collection, layer, rows
 from tests.unit.layers.test_features import cells_of
 from tests.unit.service.asking import check_problem, client_of
@@ -239,3 +242,29 @@ async def test_streams_are_answered_in_parts_and_name_lines(client: httpx.AsyncC
     for body, status in ((b"", 422), (b"[1]", 422), (b'{"operation": "zip", "layer": 1}', 422), (b"{", 400)):
         assert (await client.post("/v1/layers/stream", content=body, headers=headers)).status_code == status
     assert (await client.post("/v1/layers/stream", content=first)).status_code == 415
+    for empty in ("\r\n\n", "\x1e\n"):  # before the first line
+        content = f"{empty}{first}\r\n{point(0.5)}\n\n\x1e{point(0.25)}".encode()
+        answer = await client.post("/v1/layers/stream", content=content, headers=headers)
+        assert [json.loads(line)["layer"]["index"] for line in answer.text.splitlines()] == [0, 1]
+    own = first[:-1] + ', "self": 1}'
+    answer = await client.post("/v1/layers/stream", content=own, headers=headers)
+    assert (answer.status_code, answer.json()["code"]) == (422, "invalid_input")
+    wrap, ring = first[:-1] + ', "wrap": 180}', [[0, 80], [120, 80], [-120, 80]]
+    pole = {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    content = "\n".join([wrap, *(point(0.5) for _ in range(2100)), json.dumps(pole)])
+    late = (await client.post("/v1/layers/stream", content=content, headers=headers)).text.splitlines()
+    assert json.loads(late[-1])["detail"].startswith("line 2102: stream.features[2100] has a ring")
+
+
+async def test_lines_of_a_stream_are_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "warm", lambda **_: None)
+    first = json.dumps({"operation": "clip", "layer": collection([frozenset({(0, 0)})])})
+    feature = '{"type": "Feature", "properties": {"a": ["%s"]}, "geometry": null}'
+    async with client_of(create_app(Settings(concurrency=1, max_body_bytes=10_000))) as client:
+        for lines, status in (([feature % ("x" * 9_000)] * 200, 200), ([feature % "x", feature % ("x" * 10_000)], 413)):
+            content = "\n".join([first, *lines]).encode()
+            answer = await client.post(
+                "/v1/layers/stream", content=content, headers={"content-type": "application/x-ndjson"}
+            )
+            assert answer.status_code == status
+    assert answer.json()["detail"].startswith("line 3 is longer than 10000 bytes")
