@@ -67,11 +67,14 @@ def read_layer(file: File) -> dict[str, Any]:
     try:
         given: Any = file if is_path else io.BytesIO(octets)  # a Shapefile is several files
         frame = geopandas.read_parquet(given) if suffix == "parquet" else geopandas.read_file(given)
+        text = frame.to_json(drop_id=True) if isinstance(frame, geopandas.GeoDataFrame) else None
     except Exception as error:  # whatever the bytes lead its readers to
         raise InvalidInputError(
             f"{name} cannot be read as a layer: {type(error).__name__}: {error!s:.200}", ("file",)
         ) from error
-    made: dict[str, Any] = json.loads(frame.to_json(drop_id=True))
+    if text is None:
+        raise InvalidInputError(f"{name} has no geometries; its columns are {shown([*frame.columns])}", ("file",))
+    made: dict[str, Any] = json.loads(text)
     return made
 
 
@@ -97,10 +100,11 @@ def collection_in(text: str, name: str) -> dict[str, Any]:
 
 def feature_in(number: int, line: str, name: str) -> dict[str, Any]:
     """Return the feature, or geometry, in a line of GeoJSON-seq. number: of the line; name: of the file."""
-    made: list[dict[str, Any]] = collection_in(line, f"line {number} of {name}")["features"]
-    if len(made) != 1:
+    made: Any = collection_in(line, f"line {number} of {name}").get("features")
+    if not isinstance(made, list) or len(made) != 1 or not isinstance(made[0], dict):
         raise InvalidInputError(f"line {number} of {name} is no feature", ("file", number))
-    return made[0]
+    feature: dict[str, Any] = made[0]
+    return feature
 
 
 def write_geojson(
@@ -139,13 +143,16 @@ def write_layer(target: str | None, features: Iterable[dict[str, Any]], crs: Any
     geopandas = _geopandas(str(target))
     flat = []
     for each in features:
+        if "geometry" in each["properties"]:
+            raise InvalidInputError(f"{target} has no place for a property named geometry; rename it", ("file",))
         more = {
             name: json.dumps(value) for name, value in each.items() if name in ("left", "right", "point", "polygon")
         }
         more |= {name: each[name] for name in ("id", "boundary", "distance") if name in each}
         geometry = each["geometry"] and json.loads(json.dumps(each["geometry"], default=lambda array: array.tolist()))
         flat.append({"type": "Feature", "properties": {**each["properties"], **more}, "geometry": geometry})
-    name = crs.get("properties", {}).get("name") if isinstance(crs, dict) else None
+    named = crs.get("properties") if isinstance(crs, dict) else None
+    name = named.get("name") if isinstance(named, dict) else None
     try:
         frame = geopandas.GeoDataFrame.from_features(flat, crs=name)
         with warnings.catch_warnings():

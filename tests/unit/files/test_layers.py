@@ -11,6 +11,7 @@ import pytest
 
 import engine
 from engine.__main__ import main
+from engine.files.layers import write_layer
 
 RING = [[0, 0], [2, 0], [2, 2], [0, 2], [0, 0]]
 POLYGON = {"type": "Polygon", "coordinates": [RING]}
@@ -49,6 +50,8 @@ def test_other_formats_come_through_geopandas(tmp_path: Path, suffix: str) -> No
     (b'{"type": "sphere"}', "no GeoJSON: its type is 'sphere'"), (b"{" + b"\xff", "no text in UTF-8"),
     ("nowhere.geojson", "nowhere.geojson: there is no such file"), (7, "file must be a path"),
     (io.StringIO("{}"), "open for reading bytes"), ("/", "it is a folder, not a file"),
+    *((b'{"type": "Point", "coordinates": [1, 2]}\n{"type": "FeatureCollection"%b}' % features, "line 2 .* no feature")
+      for features in (b"", b', "features": 5', b', "features": [1]')),
 ])  # fmt: skip
 def test_what_is_no_layer_is_refused_in_words(given: Any, words: str) -> None:
     with pytest.raises(engine.InvalidInputError, match=words) as error:
@@ -74,3 +77,15 @@ def test_the_command_line_speaks_in_words(
     assert "Errno" not in said
     assert "codec" not in said
     assert command.split()[1] in said or command.split()[2] in said
+
+
+def test_files_without_geometries_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("geopandas")
+    (tmp_path / "a.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(engine.InvalidInputError, match=r"a.csv has no geometries; its columns are \['a', 'b'\]"):
+        engine.read_layer(tmp_path / "a.csv")
+    feature = {"type": "Feature", "properties": {"geometry": 3}, "geometry": POLYGON}
+    with pytest.raises(engine.InvalidInputError, match="no place for a property named geometry"):
+        write_layer(str(tmp_path / "a.gpkg"), [feature], None)
+    write_layer(str(tmp_path / "b.gpkg"), LAYER["features"], {"type": "name", "properties": None})
+    assert engine.union_all(engine.read_layer(tmp_path / "b.gpkg")).area == 4.0
