@@ -28,7 +28,9 @@ from engine.distance import distances as point_distances
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.layers import frame_joins as joins
+from engine.layers.frame_reading import mixed_of
 from engine.layers.joins import check_predicate
+from engine.layers.limits import Limits
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
 from engine.polygon_overlay.run import Operation
@@ -159,7 +161,12 @@ def sjoin(
     with the features of the right that are near it."""
     joins.check_join("sjoin", left, right, how, lsuffix, rsuffix, {})
     reach = check_predicate(predicate, distance)
-    order = np.argsort(left.geometry.hilbert_distance().to_numpy(), kind="stable") if len(left) else np.zeros(0, int)
+    for name, side in (("left", left), ("right", right)):
+        mixed_of(side, name, Limits(None, None))  # a worker could not say which feature is wrong, and sees not all
+    there = np.flatnonzero(~(left.geometry.isna() | left.geometry.is_empty))
+    order = there
+    if len(there):
+        order = there[np.argsort(left.geometry.iloc[there].hilbert_distance().to_numpy(), kind="stable")]
     tasks = _Tiles(left, right, order, reach)
     function = partial(_related, predicate=predicate, distance=distance)
     pairs = [

@@ -140,6 +140,10 @@ def test_layers_are_joined_as_by_one_process(client: Client) -> None:
     at = np.random.default_rng(5).random((2, 60, 2)) * 9
     left = geopandas.GeoDataFrame({"a": range(60)}, geometry=[shapely.box(x, y, x + 1, y + 2) for x, y in at[0]])
     right = geopandas.GeoDataFrame({"b": range(60)}, geometry=[*shapely.points(at[1][:59]), None])
+    left.geometry.array[7], left.geometry.array[8] = None, shapely.Polygon()
     for how, options in (("inner", {}), ("left", {}), ("right", {"predicate": "dwithin", "distance": 0.5})):
         found = distributed.sjoin(client, left, right, how, part=17, **options)
         testing.assert_frame_equal(found, engine.layers.sjoin(left, right, how, **options))
+    right.geometry.array[41] = shapely.GeometryCollection([shapely.Point(1e6, 0)])  # far from all of the left
+    with pytest.raises(engine.UnsupportedSolidError, match=r"right\[41\] \(index 41\)"):
+        distributed.sjoin(client, left, right, part=17)
