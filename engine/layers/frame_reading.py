@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -100,11 +101,12 @@ def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds:
     _, shapely = geopandas_and_shapely()
     types, is_missing = shapely.get_type_id(array), shapely.is_missing(array)
     dims = dims_of(array)
-    if len(wrong := np.flatnonzero(~is_missing & ~np.isin(dims, kinds))):
+    is_filled = ~is_missing & ~shapely.is_empty(array)
+    if len(wrong := np.flatnonzero(is_filled & ~np.isin(dims, kinds))):
         nouns = " or ".join(NOUNS[kind] for kind in kinds)
         what = f"is a {array[wrong[0]].geom_type}; {name} takes {nouns}{'; explode it' if types[wrong[0]] > 6 else ''}"
         raise refused(UnsupportedSolidError, frame, (name, int(wrong[0])), what)
-    dims[shapely.is_empty(array)] = -1
+    dims[~is_filled] = -1
     paths = _paths(frame, name, array, dims)
     is_area = dims == AREA
     there = np.flatnonzero(is_area)
@@ -123,7 +125,9 @@ def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds:
     counts = np.zeros(len(array), np.int64)
     counts[there] = np.diff(ends)
     in_degrees = bool(frame.crs and frame.crs.is_geographic)
-    cut = cut_parts(arrays_of(positions, rings, parts_of), summed(counts), in_degrees, limits)
+    parts = arrays_of(positions, rings, parts_of)
+    refuse = partial(refused, InvalidInputError, frame)
+    cut = cut_parts(parts, summed(counts), in_degrees, limits, lambda k, what: refuse((name, k), what))
     areas = layer_of(*cut, is_missing, limits)
     return MixedLayer(areas, paths)
 

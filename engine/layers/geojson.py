@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain
 from typing import Any, Final, cast
 
@@ -108,7 +109,8 @@ def polygons_of(side: Collection, limits: Limits) -> Layer:
     """Return the polygons of a collection as a `Layer`; overlapping parts of a feature are united."""
     with limits.budget():
         parts, offsets, is_missing = _parts_of(side, limits)
-        return layer_of(*cut_parts(parts, offsets, side.crs is None, limits), is_missing, limits)
+        cut = cut_parts(parts, offsets, side.crs is None, limits, partial(refused, InvalidInputError, side))
+        return layer_of(*cut, is_missing, limits)
 
 
 def mixed_of(side: Collection, limits: Limits) -> MixedLayer:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from engine.predicates.rational import common_integers
 from engine.running.budget import polled
 from engine.solids.ragged import next_in_rings
 from engine.types import FloatArray, IntArray
+
+_LEAST: Final = 2.0**-900
+"""Area from which no product of doubles above was near underflow."""
 
 
 def narrow_rings(
@@ -44,7 +48,7 @@ def narrow_rings(
         wide, tall = (np.maximum.reduceat(each, starts) - np.minimum.reduceat(each, starts) for each in (x, y))
         # bound: n terms of three roundings each, summed in some order; less than 2^-50 n of their size.
         low = 0.5 * (np.abs(area) - 2.0**-50 * np.diff(ring_offsets) * size)
-        is_wide = low * (1.0 - 2.0**-48) >= float(min_width) * np.hypot(wide, tall)
+        is_wide = low * (1.0 - 2.0**-48) >= np.maximum(float(min_width) * np.hypot(wide, tall), _LEAST)
     with limits.budget():
         for k in polled(np.flatnonzero(~is_wide[rings]).tolist()):
             square = width_square(vertices[ring_offsets[rings[k]] : ring_offsets[rings[k] + 1]])

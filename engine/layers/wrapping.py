@@ -13,15 +13,16 @@ Source: RFC 7946, 3.1.9 (Antimeridian Cutting).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from math import floor
+from typing import Final
 
 import numpy as np
 
 from engine.arrangement.nodes import rational_nodes
-from engine.errors import InvalidInputError
 from engine.layers.limits import Limits
 from engine.layers.rows import LayerRows, concatenate_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of, concatenate_polygons
@@ -31,6 +32,8 @@ from engine.solids.ragged import next_in_rings, summed
 from engine.types import BoolArray, FloatArray, IntArray
 
 Exact = tuple[Fraction, Fraction]
+_FARTHEST: Final = 540.0
+"""Largest longitude, a turn beyond 180: there is a cut at each turn."""
 
 
 def steps_of(vertices: FloatArray, ring_offsets: IntArray) -> IntArray:
@@ -54,11 +57,11 @@ def _note_steps(vertices: FloatArray, ring_offsets: IntArray) -> None:
 
 
 def cut_parts(
-    parts: PolygonArrays, offsets: IntArray, in_degrees: bool, limits: Limits
+    parts: PolygonArrays, offsets: IntArray, in_degrees: bool, limits: Limits, refused: Callable[[int, str], Exception]
 ) -> tuple[PolygonArrays, IntArray]:
     """Return the polygons of features, feature k has offsets[k] .. offsets[k + 1] - 1, with `limits.wrap` cut at the
-    antimeridian. in_degrees: whether to warn of such that are not cut. Raises: InvalidInputError for a ring around a
-    pole."""
+    antimeridian. in_degrees: whether to warn of such that are not cut. Raises: refused(feature, what is wrong) for a
+    ring around a pole, or a longitude that is none."""
     if not limits.wrap:
         if in_degrees:
             _note_steps(parts.vertices, parts.ring_offsets)
@@ -75,11 +78,12 @@ def cut_parts(
     with limits.budget() as budget:
         for k in np.flatnonzero(is_cut).tolist():
             rings = parts.ring_offsets[parts.polygon_offsets[k] : parts.polygon_offsets[k + 1] + 1].tolist()
+            feature = int(np.searchsorted(offsets, k, side="right")) - 1
+            if (far := float(np.abs(parts.vertices[ends[k] : ends[k + 1], 0]).max())) > _FARTHEST:
+                raise refused(feature, f"has a longitude of size {far!r}; with wrap the largest is {_FARTHEST}")
             around = [_unwrapped(parts.vertices[i:j], steps[i:j]) for i, j in pairwise(rings)]
             if None in around:
-                feature = int(np.searchsorted(offsets, k, side="right")) - 1
-                what = f"feature {feature} has a ring that goes around a pole: add the pole, and the antimeridian twice"
-                raise InvalidInputError(f"wrap: {what}", ("wrap",))
+                raise refused(feature, "has a ring that goes around a pole: add the pole, and the antimeridian twice")
             pieces = _cut([each for each in around if each is not None], budget)
             numbers[k] = np.arange(n_made, n_made + len(pieces))
             n_made += len(pieces)

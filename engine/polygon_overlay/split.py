@@ -67,7 +67,7 @@ def split(
     --------
     >>> import engine
     >>> left, right = engine.split(engine.Polygon([[[0, 0], [2, 0], [2, 2], [0, 2]]]), [[[1, -1], [1, 3]]])
-    >>> right.rings[0].tolist()
+    >>> right.vertices.tolist()
     [[1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [1.0, 2.0]]
     """
     with reading(deadline, cancel) as budget:

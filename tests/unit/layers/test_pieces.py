@@ -101,6 +101,11 @@ def test_slivers_are_listed() -> None:
         layers.slivers(frame(*some), -1.0)
 
 
+def test_slivers_whose_area_underflows_are_listed() -> None:
+    squares = frame(*(shapely.box(0, 0, size, size) for size in (1e-200, 1e-160, 1e-310)))
+    assert layers.slivers(squares, 1e-150).width.tolist() == [1e-200, 1e-160, 1e-310]
+
+
 def test_gaps_are_told_or_refused() -> None:
     cells = [shapely.box(x, y, x + 1, y + 1) for x in range(3) for y in range(3) if (x, y) != (1, 1)]
     with pytest.warns(UserWarning, match=r"1 gaps, .* at \(1.0, 1.0\)"):
@@ -165,8 +170,13 @@ def test_rings_that_cross_are_told() -> None:
         assert layers.clip(crossing, other, wrap=180).geometry[0].equals(shapely.box(175, 5, 180, 10))
     with pytest.warns(UserWarning, match="1 rings have steps of more than 180 degrees"):
         layers.clip_features(crossing.__geo_interface__, other.__geo_interface__)
-    with pytest.raises(InvalidInputError, match="feature 0 has a ring that goes around a pole"):
-        layers.dissolve(frame(shapely.Polygon([(0, 80), (120, 80), (-120, 80)])), wrap=180)
+    square, around = shapely.box(0, 0, 1, 1), shapely.Polygon([(0, 80), (120, 80), (-120, 80)])
+    far = shapely.Polygon([(0, 0), (1e300, 0), (0, 1)])  # a cut at each turn would take all memory
+    for body, what in ((around, "a ring that goes around a pole"), (far, "a longitude of size 1e[+]300")):
+        with pytest.raises(InvalidInputError, match=rf"layer\[1\] \(index 1\) has {what}"):
+            layers.dissolve(frame(square, body), wrap=180)
+        with pytest.raises(InvalidInputError, match=rf"layer.features\[1\].* has {what}"):
+            layers.dissolve_features(collection(square, body), wrap=180)
     for options in ({"wrap": 90}, {"wrap": True}, {"wrap": 180, "min_width": 1.0}):
         with pytest.raises(InvalidInputError, match=r"wrap|min_width"):
             layers.dissolve_features(other.__geo_interface__, **options)
@@ -200,6 +210,8 @@ def test_a_stream_answers_as_all_at_once() -> None:
         assert found == rows
     with pytest.raises(engine.EngineError, match=r"stream.features\[20\]"):
         stream.rows([{"type": "Feature", "geometry": {"type": "Point", "coordinates": "x"}}])
+    with pytest.raises(InvalidInputError, match="no option 'self'"):
+        layers.FeatureStream(operation="clip", layer=fields, self=1)
     for wrong in ({"operation": "zip"}, {"operation": "clip", "by": 1}, {"operation": "clip", "layer": 3}):
         with pytest.raises(engine.EngineError, match=r"operation|option|layer"):
             layers.FeatureStream(**{"layer": fields, **wrong})
@@ -212,3 +224,10 @@ def test_what_is_prepared_is_forgotten_with_the_geometries() -> None:
     assert layers.sjoin(mark, layer).n_right.tolist() == [0, 1]
     with pytest.raises(UnsupportedSolidError, match="polygons"):
         layers.overlay(layer, mark)
+
+
+def test_empty_geometries_of_other_kinds_are_accepted_as_they_are_once_prepared() -> None:
+    layer = frame(shapely.box(0, 0, 2, 2), shapely.LineString(), shapely.GeometryCollection(), None)
+    for _ in range(2):
+        assert layers.overlay(frame(shapely.box(1, 0, 3, 2)), layer).geometry.area.tolist() == [2.0]
+        assert len(layers.sjoin(layer, layer)) == 1
