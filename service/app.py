@@ -21,7 +21,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 import engine
-from service import pages, traces
+from service import pages, stream, traces
 from service.errors import faults_of, http_fault, problem
 from service.gate import Gate
 from service.memory import Memory, freeze
@@ -31,8 +31,6 @@ from service.route import posts_of
 from service.routes import questions, stored
 from service.settings import WARM_UP, Settings
 from service.store import Store
-from service.stream import PATH as STREAM
-from service.stream import Stream
 from service.tools import PATH, Tools
 from service.work import Pool
 
@@ -45,6 +43,7 @@ ROUTERS: Final = (
     pages.router,
     stored.lookup,
     stored.scene_binary,
+    stream.router,
 )
 _SHOWN: Final = "ETag, Geometry-Accuracy, Location, Retry-After, Server-Timing, Traceresponse, X-Request-ID"
 END_SECONDS: Final = 0.7
@@ -76,7 +75,6 @@ def create_app(settings: Settings | None = None, owns_process: bool = False) -> 
     pages.add_pages(app)
     app.state.tools = Tools(app, settings, ROUTERS)
     app.router.routes.append(Route(PATH, app.state.tools, methods=["POST"], include_in_schema=False))
-    app.router.routes.append(Route(STREAM, Stream(app), methods=["POST"], include_in_schema=False))
     app.add_exception_handler(HTTPException, _answer_http_exception)
     app.add_exception_handler(Exception, _answer_anything)
     app.add_middleware(Gate, settings=settings, posts=posts_of(ROUTERS), metrics=app.state.metrics)

@@ -42,7 +42,7 @@ log = logging.getLogger("service")
 LEAST_COMPRESSED: Final = 2**14
 """Bytes from which an answer is compressed if the client accepts it."""
 _CODING: Final = re.compile(rb"([a-z0-9*-]+)\s*(?:;\s*q=([01](?:\.\d{0,3})?))?\s*(?:,|$)")
-_OF_BODY: Final = (b"content-length", b"content-type")
+OF_BODY: Final = (b"content-length", b"content-type")
 """Headers that belong to the body, not to a dependency."""
 Part = bytes | memoryview
 Query = dict[str, tuple[TypeAdapter[Any], bool]]
@@ -91,7 +91,7 @@ class GeometryRoute(APIRoute):
             for item in self.dependant.query_params
         }
 
-        guard = _guard_of(self)
+        guard = guard_of(self)
         upload: Any = getattr(endpoint, "upload", None)
         """What takes files of meshes in place of JSON."""
 
@@ -106,7 +106,7 @@ class GeometryRoute(APIRoute):
             finally:
                 if not isinstance(response, _Answer):  # it ended early, its memory is free
                     call.free()
-            response.raw_headers += [header for header in given if header[0] not in _OF_BODY]
+            response.raw_headers += [header for header in given if header[0] not in OF_BODY]
             operation = self.operation_id or self.name
             state.metrics.count(operation, response.status_code, call.seconds)
             traces.note(operation, call.seconds)
@@ -132,7 +132,7 @@ class GeometryRoute(APIRoute):
                     is_small = 0 < declared <= call.settings.inline_bytes
                     if not is_small:
                         state.pool.check_room()
-                    job.body = await body.read(_receive_of(request), declared, call)
+                    job.body = await body.read(receive_of(request), declared, call)
                     call.start_clock()
                     state.metrics.bytes_in.inc(len(job.body))
                 if is_small and state.warm.is_set() and job.adapter is not None and job.coding is None:
@@ -153,7 +153,7 @@ class GeometryRoute(APIRoute):
         return handle
 
 
-def _guard_of(route: APIRoute) -> Answer | None:
+def guard_of(route: APIRoute) -> Answer | None:
     """Return the solver of the dependencies that an application gave to the router, None if there are none.
 
     FastAPI's own handler would solve them. Newer versions do not copy them into the routes of an included router.
@@ -167,7 +167,7 @@ def _guard_of(route: APIRoute) -> Answer | None:
     return APIRoute(effective.path, lambda: None, **given).get_route_handler()
 
 
-def _receive_of(request: Request) -> Receive:
+def receive_of(request: Request) -> Receive:
     """Return the receiver of the body, also if a dependency of the host has read it: the framework stores it then."""
     known: bytes | None = getattr(request, "_body", None)
     if known is None:

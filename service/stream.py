@@ -18,8 +18,9 @@ from functools import partial
 from typing import Final
 
 import orjson
-from fastapi import FastAPI
-from starlette.requests import ClientDisconnect
+from fastapi.routing import APIRoute, APIRouter
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
 import engine
@@ -28,7 +29,8 @@ from service.body import coding_of, media_type_of
 from service.convert.areas import geometry_of
 from service.errors import STATUS, ServiceError, faults_of, problem
 from service.memory import FOOTPRINT
-from service.route import state_of
+from service.openapi import responses
+from service.route import OF_BODY, Answer, guard_of, receive_of, state_of
 from service.schemas.arrays import Fault
 from service.work import Call
 
@@ -44,15 +46,17 @@ Line = tuple[int, bytes]
 """Its number, from 1, and its text."""
 
 
-class Stream:
-    """An ASGI application that answers streams of features."""
+class Stream(Response):
+    """The answer to a stream of features: reads the request while it is sent."""
 
-    def __init__(self, app: FastAPI) -> None:
-        self._app = app
+    def __init__(self, request: Request, given: list[tuple[bytes, bytes]]) -> None:
+        """given: headers that the application's own dependencies add."""
+        super().__init__()
+        self._request, self._given = request, given
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
-        state, status, calls = state_of(self._app), 0, list[Call]()
+        state, status, calls = state_of(self._request.app), 0, list[Call]()
 
         def new_call(lines: list[Line]) -> Call:
             call = Call(state.settings, state.store, state.memory)
@@ -64,14 +68,14 @@ class Stream:
             nonlocal status
             if not status:
                 status = 200
-                headers = [(b"content-type", KINDS[0].encode())]
+                headers = [(b"content-type", KINDS[0].encode()), *self._given]
                 await send({"type": "http.response.start", "status": status, "headers": headers})
 
         lines: list[Line] = []
         stream: engine.layers.FeatureStream | None = None
         try:
             _check_headers(dict(scope["headers"]))
-            parts = _parts_of(receive, state.settings.max_body_bytes, state.settings.body_seconds)
+            parts = _parts_of(receive_of(self._request), state.settings.max_body_bytes, state.settings.body_seconds)
             lines = await anext(parts, [])
             call = new_call(lines)
             stream = await state.pool.run(call, partial(_begun, lines, call), False)
@@ -93,6 +97,7 @@ class Stream:
             answer = problem(faults)
             if not status:
                 status = answer.status_code
+                answer.raw_headers += self._given
                 await answer(scope, receive, send)
             else:
                 text = orjson.dumps({**orjson.loads(bytes(answer.body)), "type": "Error"}) + b"\n"
@@ -100,7 +105,38 @@ class Stream:
         finally:
             for call in calls:
                 call.free()
-            state.metrics.count("stream_features", status or STATUS["bad_request"], {})
+            state.metrics.count(stream_features.__name__, status or STATUS["bad_request"], {})
+
+
+class StreamRoute(APIRoute):
+    """A route that answers with a `Stream`."""
+
+    def get_route_handler(self) -> Answer:
+        """Return the coroutine that answers a request."""
+        guard = guard_of(self)
+
+        async def handle(request: Request) -> Response:
+            given = [] if guard is None else (await guard(request)).raw_headers
+            return Stream(request, [header for header in given if header[0] not in OF_BODY])
+
+        return handle
+
+
+router = APIRouter(route_class=StreamRoute, responses=responses(400, 404, 408, 413, 415, 422, 504))
+_LINES: Final = {KINDS[0]: {"schema": {"type": "string", "description": "A JSON text a line."}}}
+
+
+@router.post(
+    PATH,
+    operation_id="stream_features",
+    tags=["layers"],
+    response_class=Response,
+    responses={200: {"description": "A feature a line; a problem is the last.", "content": _LINES}},
+    openapi_extra={"requestBody": {"required": True, "content": _LINES}},
+)
+def stream_features() -> None:
+    """Answer features against one layer, a JSON text a line in and out: the first line has the members `operation`
+    (clip, join, nearest or contains), `layer`, and options of the call of that name; the others are a feature each."""
 
 
 def _check_headers(headers: dict[bytes, bytes]) -> None:

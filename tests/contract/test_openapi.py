@@ -55,6 +55,7 @@ OPERATIONS = {
     ("post", "/v1/layers/join"): "join_layers",
     ("post", "/v1/layers/nearest"): "join_nearest",
     ("post", "/v1/layers/split"): "split_layer",
+    ("post", "/v1/layers/stream"): "stream_features",
     ("post", "/v1/clip/segments/scene"): "clip_segments_scene",
     ("post", "/v1/scenes"): "put_scene",
     ("get", "/v1/scenes/{scene_id}"): "get_scene",
@@ -85,6 +86,7 @@ ANSWERS = {
         [f"/v1/layers/{name}" for name in ("overlay", "union", "contains", "clip", "join", "nearest", "split")],
         "application/geo+json",
     ),
+    "/v1/layers/stream": "application/x-ndjson",
     "/v1/scenes/{scene_id}/binary/contains": "application/octet-stream",
     "/v1/scenes/{scene_id}/binary/clip/segments": "application/octet-stream",
     "/v1/scenes/{scene_id}/binary/distances": "application/octet-stream",
@@ -146,6 +148,7 @@ def test_one_media_type_for_each_operation_and_direction(made: dict[str, Any]) -
             if "requestBody" in operation:
                 is_binary = "binary" in operation["tags"]
                 kind = "application/octet-stream" if is_binary else "application/json"
+                kind = ANSWERS[path] if path.endswith("/stream") else kind
                 assert list(operation["requestBody"]["content"]) == [kind]
                 assert list(operation["requestBody"].get("x-also-accepts", ())) == [*FILES.get(path, ())]
                 assert operation["requestBody"]["required"] is True

@@ -51,6 +51,11 @@ async def test_a_router_for_an_application(monkeypatch: pytest.MonkeyPatch, anyi
             many = {**body, "points": [[0, 0, 0]] * 4}
             check_problem(await client.post("/geometry/v1/contains", json=many), 422, "limit_exceeded")
             assert (await client.get(f"/geometry/v1/solids/{stored['id']}")).status_code == 200
+            lines = [{"operation": "contains", "layer": {"type": "FeatureCollection", "features": []}, "outside": True}]
+            lines.append({"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [1, 2]}})
+            content, kind = "\n".join(map(json.dumps, lines)), {"content-type": "application/x-ndjson"}
+            rows = await client.post("/geometry/v1/layers/stream", content=content, headers=kind)
+            assert rows.json()["point"] == {"index": 0}
             assert (await client.get("/geometry/healthz")).status_code == 200
             assert "geometry_requests_total" in (await client.get("/geometry/metrics")).text
             document = (await client.get("/openapi.json")).json()
