@@ -73,7 +73,7 @@ class GeometryRoute(APIRoute):
             job.document, job.finish = document, lambda answer: [finish(answer)]
             (outcome,) = await state.pool.run(call, job.answer, False)
         except Exception as error:
-            outcome = _faults_in(error, f"{self.name} as a tool")
+            outcome = faults_in(error, f"{self.name} as a tool")
         status = self.status_code or 200 if isinstance(outcome, bytes) else STATUS[outcome[0].code]
         operation = self.operation_id or self.name
         state.metrics.count(operation, status, call.seconds)
@@ -147,7 +147,7 @@ class GeometryRoute(APIRoute):
             except ClientDisconnect:
                 return Response(status_code=STATUS["bad_request"])  # nobody reads it
             except Exception as error:
-                faults = _faults_in(error, f"{request.method} {request.url.path}")
+                faults = faults_in(error, f"{request.method} {request.url.path}")
                 return problem(faults, getattr(error, "headers", None) or {})
 
         return handle
@@ -319,7 +319,7 @@ class _InvalidBody(Exception):
         self.faults = faults_of_validation(error, document)
 
 
-def _faults_in(error: Exception, what: str) -> list[Fault]:
+def faults_in(error: Exception, what: str) -> list[Fault]:
     """Return the faults of an error; an unexpected one is logged in full."""
     faults = error.faults if isinstance(error, _InvalidBody) else faults_of(error)
     if faults[0].code == "internal":

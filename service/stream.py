@@ -21,16 +21,16 @@ import orjson
 from fastapi.routing import APIRoute, APIRouter
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
-from starlette.types import Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 import engine
 from service import wire
 from service.body import coding_of, media_type_of
 from service.convert.areas import geometry_of
-from service.errors import STATUS, ServiceError, faults_of, problem
+from service.errors import STATUS, ServiceError, problem
 from service.memory import FOOTPRINT
 from service.openapi import responses
-from service.route import OF_BODY, Answer, guard_of, receive_of, state_of
+from service.route import OF_BODY, Answer, faults_in, guard_of, receive_of, state_of
 from service.schemas.arrays import Fault
 from service.work import Call
 
@@ -71,16 +71,18 @@ class Stream(Response):
                 headers = [(b"content-type", KINDS[0].encode()), *self._given]
                 await send({"type": "http.response.start", "status": status, "headers": headers})
 
-        lines: list[Line] = []
+        lines, ahead = list[Line](), _Ahead(receive_of(self._request))
         stream: engine.layers.FeatureStream | None = None
         try:
             _check_headers(dict(scope["headers"]))
-            parts = _parts_of(receive_of(self._request), state.settings.max_body_bytes, state.settings.body_seconds)
+            parts = _parts_of(ahead, state.settings.max_body_bytes, state.settings.body_seconds)
             lines = await anext(parts, [])
             call = new_call(lines)
+            ahead.watch(call)
             stream = await state.pool.run(call, partial(_begun, lines, call), False)
             async for lines in parts:
                 part = new_call(lines)
+                ahead.watch(part)
                 for text in await state.pool.run(part, partial(_answered, stream, lines, part), False):
                     await begin()
                     await send({"type": "http.response.body", "body": text, "more_body": True})
@@ -91,10 +93,10 @@ class Stream(Response):
         except ClientDisconnect:
             pass
         except Exception as error:
-            faults = faults_of(error)
+            faults = faults_in(error, f"POST {PATH}")
             if stream is not None and isinstance(error, engine.EngineError):
                 faults = [_with_line(fault, lines, stream.n_features) for fault in faults]
-            answer = problem(faults)
+            answer = problem(faults, getattr(error, "headers", None) or {})
             if not status:
                 status = answer.status_code
                 answer.raw_headers += self._given
@@ -103,9 +105,45 @@ class Stream(Response):
                 text = orjson.dumps({**orjson.loads(bytes(answer.body)), "type": "Error"}) + b"\n"
                 await send({"type": "http.response.body", "body": text, "more_body": False})
         finally:
+            ahead.end()
             for call in calls:
                 call.free()
             state.metrics.count(stream_features.__name__, status or STATUS["bad_request"], {})
+
+
+class _Ahead:
+    """Receives the next message of a body while a part is answered, so that work ends when the client disconnects."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self._next: asyncio.Task[Message] | None = None
+
+    async def __call__(self) -> Message:
+        """Return the next message."""
+        if self._next is None:
+            return await self._receive()
+        message, self._next = self._next, None
+        return await message
+
+    def watch(self, call: Call) -> None:
+        """Set the call's switch if the next message is that the client disconnected."""
+
+        def end(done: asyncio.Task[Message]) -> None:
+            if not done.cancelled() and done.exception() is None and done.result()["type"] == "http.disconnect":
+                call.set()
+
+        if self._next is None:
+            self._next = asyncio.get_running_loop().create_task(_next_of(self._receive))
+        self._next.add_done_callback(end)
+
+    def end(self) -> None:
+        """Receive no more."""
+        if self._next is not None:
+            self._next.cancel()
+
+
+async def _next_of(receive: Receive) -> Message:
+    return await receive()
 
 
 class StreamRoute(APIRoute):

@@ -165,6 +165,13 @@ WORK: dict[str, Callable[[], Any]] = {
         "layer": features([[bar] for bar in stripes(300)]),
         "lines": features([[[-1, k], [9_000, k + 0.5]] for k in range(300)], "LineString"),
     },
+    "stream_features": lambda: "\n".join(
+        json.dumps(line)
+        for line in (
+            {"operation": "join", "layer": features([[bar] for bar in stripes(1_500)]), "predicate": "overlaps"},
+            *features([[bar] for bar in across(1_500)])["features"],
+        )
+    ),
     "overlay_batch": far_apart_batch,
     "put_solid": lambda: prism(comb(1_200)),
     "inspect_solid": lambda: prism(circle(20_000)),
@@ -250,6 +257,8 @@ def request_of(storing: Service, name: str) -> bytes:
         path = path.replace("{solid_id}", stored_id).replace("{scene_id}", stored_id)
     kind = "application/json" if isinstance(work, dict) else "application/octet-stream"
     body = json.dumps(work).encode() if isinstance(work, dict) else work
+    if isinstance(work, str):
+        kind, body = "application/x-ndjson", work.encode()
     assert len(body) < 2**21
     query = "?format=obj" if name == "import_solid" else ""
     head = f"POST {path}{query} HTTP/1.1\r\nHost: x\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n"
