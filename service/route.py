@@ -187,7 +187,7 @@ def _path_of(request: Request) -> str:
 
 def posts_of(routers: Iterable[APIRouter]) -> dict[str, Answer]:
     """Return the POST handler of each path without parameters."""
-    routes = [route for router in routers for route in router.routes if isinstance(route, GeometryRoute)]
+    routes = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
     return {
         route.path: route.get_route_handler()
         for route in routes
