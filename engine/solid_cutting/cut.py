@@ -126,7 +126,7 @@ def cut(
     progress: Progress | None = None,
     report: bool = False,
 ) -> Any:
-    """Return the part of a polyhedron within a half-space, box or convex region, or outside a half-space, closed.
+    """Return the part of a polyhedron within a half-space, box or convex region, or outside it, closed.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def cut(
     region : Solid
         A half_space, aabb, convex or convex polyhedron of space.
     keep : {"inside", "outside", "both"}, optional
-        The part within the region, or what is outside it, which takes a half-space.
+        The part within the region, or what is outside it, in one.
     measures : bool, default False
         Compute `volume` and `area` in this call, within its deadline.
     workers, progress : optional
@@ -151,7 +151,7 @@ def cut(
     Raises
     ------
     UnsupportedSolidError
-        The solid is no polyhedron; the region is not convex; or what is outside several planes is asked for.
+        The solid is no polyhedron, or the region is not convex.
     InvalidInputError
         Faces of the polyhedron cross; the message names two.
     InvalidOperationError
@@ -163,8 +163,8 @@ def cut(
 
     Notes
     -----
-    The result is the closure of what the open interiors have in common, without flat parts. A vertex on a plane counts
-    as outside, an edge that ends there is cut at that vertex.
+    The result is the closure of what the open interiors have in common, without flat parts; outside, of the open
+    interior without the region. A vertex on a plane counts as not in that, an edge that ends there is cut at it.
 
     Degenerate input: where nothing is left, no vertices and faces. Shells count by nesting, see `volume`.
 
@@ -173,7 +173,7 @@ def cut(
     faces thinner than that or turn them over: `collapsed` and `folded` name them. `volume` and `area` are those of the
     exact result.
 
-    Cost: some 0.1 us a face for each plane that cuts, and what `volume` computes once.
+    Cost: some 0.1 us a face for each plane that cuts, twice that outside several, and what `volume` computes once.
 
     References
     ----------
@@ -201,16 +201,11 @@ def cut(
     with Budget(deadline, cancel) as budget, np.errstate(all="ignore"):
         budget.check()
         planes = planes_in(region, budget)
-        if keep != "inside" and len(planes) > 1:
-            raise InvalidOperationError(
-                f"keep={keep!r} takes a half_space; cut by one plane after the other for what is outside several",
-                ("keep",),
-            )
         parts = []
         if keep != "outside":
             parts.append(_part(body, cut_by_planes(body, planes, budget), budget))
         if keep != "inside":
-            parts.append(_part(body, cut_by_planes(body, [plane.reversed for plane in planes], budget), budget))
+            parts.append(_part(body, cut_outside(body, planes, budget), budget))
         for part in parts if measures else ():
             part._measured(budget)
     if progress is not None:
@@ -261,6 +256,63 @@ def cut_by_planes(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Lef
         if not len(triangles):
             break
     return Left(points, triangles, origins, is_whole, planes)
+
+
+def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
+    """Return what is outside some plane of a polyhedron, closed: its faces there, and the caps of the rest reversed.
+
+    A vertex on a plane counts as inside, as if the region were a little larger. Each plane takes away what is outside
+    it from what is inside those before, and caps the rest. A side along a plane that a later one cuts is cut in what
+    was taken away before, too. A region without interior takes nothing away.
+    """
+    given, planes = outward(solid, budget), [plane.reversed for plane in planes]
+    points, triangles, origins = Points(solid.vertices), given, np.arange(len(given))
+    if len(planes) > 1 and not len(cut_by_planes(solid, [plane.reversed for plane in planes], budget).triangles):
+        return Left(points, given, origins, np.ones(len(given), np.bool_), planes)
+    parts, splits = [], [_NONE]
+    for number, plane in enumerate(planes):
+        budget.check()
+        left = cut_triangles(points, triangles, plane, budget, with_beyond=True)
+        cap = cap_of(seen(points, plane), left.chain, budget)
+        for rows, of in ((triangles[left.whole], left.whole), (left.pieces, left.of)):
+            is_of_solid = origins[of] >= 0
+            parts.append((rows[is_of_solid], origins[of[is_of_solid]]))
+        splits.append(left.splits)
+        triangles = np.concatenate([left.beyond, cap[:, ::-1]])
+        origins = np.concatenate([origins[left.beyond_of], np.full(len(cap), -1 - number)])
+        if not len(triangles):
+            break
+    is_cap = origins < 0
+    taken, of = (np.concatenate(each) for each in zip(*parts))
+    taken, rows = _with_splits(taken, np.concatenate(splits), budget)
+    taken, of = np.concatenate([taken, triangles[is_cap][:, ::-1]]), np.concatenate([of[rows], origins[is_cap]])
+    return Left(points, taken, of, (of >= 0) & (taken == given[np.maximum(of, 0)]).all(axis=1), planes)
+
+
+def _with_splits(triangles: IntArray, splits: IntArray, budget: Budget) -> tuple[IntArray, IntArray]:
+    """Return triangles with the sides that later planes cut, at most one each, cut there too; and whose they are."""
+    keys = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    ends = np.sort(splits[:, :2], axis=1)
+    n = 1 + int(max(triangles.max(initial=0), splits.max(initial=0)))
+    is_cut = np.isin(keys[..., 0] * n + keys[..., 1], ends[:, 0] * n + ends[:, 1])
+    at = {(low, high): point for (low, high), point in zip(ends.tolist(), splits[:, 2].tolist())}
+    fans: list[tuple[int, int, int]] = []
+    of: list[int] = []
+    for row, side in np.argwhere(is_cut).tolist():
+        budget.check()
+        start, end, tip = np.roll(triangles[row], -side).tolist()
+        waiting = [end]
+        while waiting:  # bound: each turn goes on, or to a point of `splits`
+            point = at.get((min(start, waiting[-1]), max(start, waiting[-1])))
+            if point is None:
+                fans.append((start, waiting[-1], tip))
+                of.append(row)
+                start = waiting.pop()
+            else:
+                waiting.append(point)
+    same = np.flatnonzero(~is_cut.any(axis=1))
+    added = np.array(fans, np.int64).reshape(-1, 3)
+    return np.concatenate([triangles[same], added]), np.concatenate([same, np.array(of, np.int64)])
 
 
 def _part(solid: Polyhedron, left: Left, budget: Budget) -> CutSolid:

@@ -175,18 +175,24 @@ def value_at(plane: Plane, place: Place) -> int:
 class Cut(NamedTuple):
     """What a plane leaves of triangles. whole: numbers of those that it leaves whole. pieces (k, 3): triangles of the
     others, cut; of (k,): the number of each one's triangle. chain (n, 2): sides of pieces along the plane, with what is
-    left on their left seen against the normal."""
+    left on their left seen against the normal. beyond, beyond_of: pieces of what the plane takes away, if asked for,
+    with whole triangles among them. splits (j, 3): ends of edges, and the point where each is cut."""
 
     whole: IntArray
     pieces: IntArray
     of: IntArray
     chain: IntArray
+    beyond: IntArray
+    beyond_of: IntArray
+    splits: IntArray
 
 
 def cut_triangles(
-    points: Points, triangles: IntArray, plane: Plane, budget: Budget, sides: Int8Array | None = None
-) -> Cut:
-    """Return what is inside a plane of triangles (m, 3); the points on it are added. sides: by point, if known."""
+    points: Points, triangles: IntArray, plane: Plane, budget: Budget, sides: Int8Array | None = None,
+    with_beyond: bool = False,
+) -> Cut:  # fmt: skip
+    """Return what is inside a plane of triangles (m, 3), and what is outside if asked for; the points on it are added.
+    sides: by point, if known."""
     sides = points.sides(plane, budget) if sides is None else sides
     whole, mixed = np.empty(len(triangles), np.int64), np.empty(len(triangles), np.int64)
     counts = entry_of(split_faces)(read_only(triangles), sides, whole, mixed, budget.flag)
@@ -203,16 +209,25 @@ def cut_triangles(
     crosses = np.flatnonzero(sides[cuts] < 0)
     keys, numbers = np.unique(ends[crosses, 0] * len(points) + ends[crosses, 1], return_inverse=True)
     edges = np.stack(np.divmod(keys, len(points)), axis=1)
-    cuts[crosses] = points.add_crossings(edges, np.flatnonzero(sides == 0), plane, budget)[numbers.reshape(-1)]
+    new = points.add_crossings(edges, np.flatnonzero(sides == 0), plane, budget)
+    cuts[crosses] = new[numbers.reshape(-1)]
     a, b = cuts[: len(some)], cuts[len(some) :]
-    two = np.flatnonzero(~is_one)
-    quads = two[a[two] != b[two]]
-    pieces = np.stack([np.where(is_one, p, a), np.where(is_one, a, q), np.where(is_one, b, r)], axis=1)
-    others = np.stack([a[quads], r[quads], b[quads]], axis=1)
     chain = np.stack([np.where(is_one, a, b), np.where(is_one, b, a)], axis=1)
-    cut, of = np.concatenate([pieces, others]), np.concatenate([mixed, mixed[quads]])
-    has_sides = _are_different(cut)
-    return Cut(whole, cut[has_sides], of[has_sides], chain[a != b])
+
+    def pieces(is_tip: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return triangles at the lone corners, where is_tip, else of what is across; and whose they are."""
+        tips = np.stack([np.where(is_tip, p, a), np.where(is_tip, a, q), np.where(is_tip, b, r)], axis=1)
+        quads = np.flatnonzero(~is_tip & (a != b))
+        cut = np.concatenate([tips, np.stack([a[quads], r[quads], b[quads]], axis=1)])
+        has_sides = _are_different(cut)
+        return cut[has_sides], np.concatenate([mixed, mixed[quads]])[has_sides]
+
+    beyond = triangles[:0], mixed[:0]
+    if with_beyond:
+        beyond, is_out = pieces(~is_one), np.ones(len(triangles), np.bool_)
+        is_out[whole], is_out[mixed] = False, False
+        beyond = np.concatenate([triangles[is_out], beyond[0]]), np.concatenate([np.flatnonzero(is_out), beyond[1]])
+    return Cut(whole, *pieces(is_one), chain[a != b], *beyond, np.column_stack([edges, new]))
 
 
 def _are_different(triangles: IntArray) -> BoolArray:

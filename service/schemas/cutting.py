@@ -87,9 +87,7 @@ class CutRequest(Schema):
 
     solid: Solid = Field(description="A polyhedron.")
     region: Solid = Field(description="half_space, aabb, convex or convex polyhedron, of space.")
-    keep: Literal["inside", "outside", "both"] = optional(
-        "Inside the region, if left out. What is outside takes a half-space; both: inside, then outside."
-    )
+    keep: Literal["inside", "outside", "both"] = optional("Inside the region, if left out; both: inside, then outside.")
 
 
 class CutPart(Schema):

@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 import engine
+from engine.running.budget import Budget
+from engine.solid_cutting.cut_measures import volume_in_fractions
 from engine.solid_cutting.ears import bridge_of
+from engine.solid_cutting.plane_cut import Points
+from engine.solid_cutting.shells import outward
 from tests.reference.cutting import cut_volume, nearest, points_of
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
 
@@ -138,10 +142,58 @@ def test_boxes_and_convex_regions_leave_what_planes_one_by_one_do() -> None:
     )
     both: Any = engine.cut(body, tetrahedron)
     assert_closed(both.faces)
-    with pytest.raises(engine.InvalidOperationError, match="half_space"):
-        engine.cut(body, engine.Aabb(low, high), keep="outside")
     with pytest.raises(engine.UnsupportedSolidError, match="not convex"):
         engine.cut(body, body)
+
+
+def region_of(draw: np.random.Generator, vertices: np.ndarray, kind: int) -> Any:
+    """Return a box of whole numbers, between vertices, or anywhere; or planes of `plane`, a vertex or the middle in."""
+    if kind == 0:
+        low = draw.integers(-1, 4, 3)
+        return engine.Aabb(low.astype(float), (low + draw.integers(1, 5, 3)).astype(float))
+    if kind < 3:
+        a, b = vertices[draw.choice(len(vertices), 2, replace=False)] + (draw.normal(size=3) if kind == 2 else 0.0)
+        return engine.Aabb(np.minimum(a, b), np.maximum(a, b))
+    rows = [(*normal, d) for normal, d in (plane(draw, vertices, int(draw.integers(5))) for _ in range(4))]
+    at = vertices.mean(axis=0) if kind == 3 else vertices[draw.integers(len(vertices))]
+    return engine.Convex([np.array(row) * (-1 if np.dot(row[:3], at) + row[3] < 0 else 1) for row in rows])
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_what_is_inside_and_outside_several_planes_is_the_whole(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    name = list(BODIES)[seed % len(BODIES)]
+    vertices, faces = BODIES[name](draw)
+    body, region = engine.Polyhedron(vertices, faces), region_of(draw, vertices, seed // len(BODIES) % 5)
+    inside, outside = engine.cut(body, region, keep="both")
+    assert outside == engine.cut(body, region, keep="outside")
+    volumes = [volume_in_fractions(part._points, part._triangles) if part else 0 for part in (inside, outside)]
+    with Budget(None) as budget:
+        assert sum(volumes) == volume_in_fractions(Points(body.vertices), outward(body, budget))
+    assert bool(outside) is (volumes[1] > 0)
+    if not outside:
+        return
+    assert_closed(outside.faces)
+    _, at = np.unique(outside.vertices, axis=0, return_inverse=True)
+    assert_closed(at.reshape(-1)[outside.faces])
+    points = vertices.min(axis=0) + draw.random((60, 3)) * np.ptp(vertices, axis=0)
+    is_out = (engine.locate(points, body) > 0) & (engine.locate(points, region) < 0)
+    assert (engine.locate(points, outside.solid) == np.where(is_out, 1, -1)).all()
+    if name in ("block", "cavities") and seed // len(BODIES) % 5 == 0:  # coordinates that are not rounded
+        assert "nothing is wrong" in repr(engine.inspect((outside.vertices, outside.faces)))
+
+
+def test_outside_a_region_without_interior_is_the_whole_and_a_flush_one_leaves_nothing_flat() -> None:
+    cube = engine.Polyhedron(block([0] * 3, [4] * 3), CUBE)
+    flat: Any = engine.cut(cube, engine.Aabb([1, 1, 2], [3, 3, 2]), keep="outside")
+    assert (flat.volume, flat.area, set(flat.origins.tolist())) == (64.0, 96.0, set(range(len(CUBE))))
+    corner: Any = engine.cut(cube, engine.Aabb([2, 2, 2], [4, 4, 4]), keep="outside")
+    assert (corner.volume, corner.area) == (56.0, 96.0)
+    cavity: Any = engine.cut(cube, engine.Aabb([1, 1, 1], [3, 3, 3]), keep="outside")
+    assert (cavity.volume, cavity.area) == (56.0, 96.0 + 24.0)
+    assert not engine.cut(cube, engine.Aabb([0, 0, 0], [4, 4, 4]), keep="outside")
+    slab: Any = engine.cut(cube, engine.Aabb([0, 0, 1], [4, 4, 3]), keep="outside")
+    assert (slab.volume, slab.area) == (32.0, 2 * (32.0 + 16.0))
 
 
 def test_overlaps() -> None:
