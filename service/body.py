@@ -47,6 +47,9 @@ FILES: Final = {
     "model/gltf-binary": "glb",
 }
 """Formats of mesh files by media type."""
+FILES_OUT: Final = ("model/ply", "model/off", "model/stl")
+"""Those that are written."""
+_WEIGHT: Final = re.compile(r"(?:^|;)\s*q=([01](?:\.\d{0,3})?)\s*(?:;|$)")
 MULTIPART: Final = "multipart/form-data"
 _BOUNDARY: Final = re.compile(r"""boundary=(?:"([^"]{1,70})"|([^\s;"]{1,70}))""", re.IGNORECASE)
 _FIELD: Final = re.compile(rb"""[;\s](name|filename)=(?:"([^"]*)"|([^\s;"]+))""", re.IGNORECASE)
@@ -85,6 +88,18 @@ def fields_of(form: Body, content_type: str) -> dict[str, tuple[str, bytes]]:
         at = end + 2
     detail = "the body is no form: a part, or its end, is missing or there twice; curl -F file=@NAME makes one"
     raise ServiceError("bad_request", detail)
+
+
+def file_wanted(accept: str) -> str | None:
+    """Return the media type of a mesh file that a header Accept (RFC 9110, 12.5.1) prefers to JSON; the first of
+    equals."""
+    wanted, most = "", 0.0
+    for item in accept.lower().split(","):
+        kind, _, parameters = item.partition(";")
+        weight = _WEIGHT.search(parameters)
+        if float(weight[1] if weight else 1) > most and kind.strip() in (*FILES_OUT, JSON, "application/*", "*/*"):
+            wanted, most = kind.strip(), float(weight[1] if weight else 1)
+    return wanted if wanted in FILES_OUT else None
 
 
 def check_media_type(headers: dict[bytes, bytes], expected: str) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import re
-from collections.abc import Callable, Coroutine, Iterable
+from collections.abc import Callable, Coroutine, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -117,6 +117,8 @@ class GeometryRoute(APIRoute):
             try:
                 headers = dict(request.scope["headers"])  # a look-up in the framework's reads them all
                 call.coding = _coding_wanted(headers.get(b"accept-encoding", b""))
+                if b"model/" in headers.get(b"accept", b""):
+                    call.file = body.file_wanted(headers[b"accept"].decode("latin-1"))
                 is_small = True
                 arguments = {**request.path_params, **_parse_query_params(request, query, guard is None)}
                 job = _Job(endpoint, adapter, arguments, call, media_type is not None)
@@ -263,6 +265,8 @@ class _Job:
         if isinstance(answer, np.ndarray):
             self.call.media_type = body.OCTETS
             return wire.cut(wire.octets(answer))
+        if isinstance(answer, Iterator):
+            return answer
         self.call.check_answer(wire.least_of(answer))
         return wire.encoded(answer, self.call.remaining)
 

@@ -79,8 +79,8 @@ class Call(Cancel):
     """
 
     __slots__ = (
-        "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "headers", "instead",
-        "is_light", "may_wait", "media_type", "notes", "path", "seconds", "settings", "status", "store",
+        "_answer", "_is_over", "_is_running", "_memory", "_most", "_taken", "coding", "end", "file", "headers",
+        "instead", "is_light", "may_wait", "media_type", "notes", "path", "seconds", "settings", "status", "store",
     )  # fmt: skip
 
     def __init__(self, settings: Settings, store: Store, memory: Memory) -> None:
@@ -93,6 +93,8 @@ class Call(Cancel):
         self.media_type = "application/json"
         self.coding: str | None = None
         """How the answer is compressed."""
+        self.file: str | None = None
+        """The media type of a mesh file in place of JSON, where the answer may be one."""
         self.instead: str | None = None
         """Advice if the answer would be too large."""
         self.is_light = False  # then it ends before a deadline's timer could be started

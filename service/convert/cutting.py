@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import engine
-from service.convert import questions
+from service.convert import octets, questions
 from service.convert.answers import from_accuracy
 from service.errors import ServiceError
 from service.schemas.cutting import (
@@ -75,12 +76,17 @@ def sections(question: SectionRequest, call: Call) -> SectionResponse:
     return SectionResponse.made(sections=Series(len(result), some, 3, 3 * ends), accuracy=from_accuracy(accuracy))
 
 
-def cut(question: CutRequest, call: Call) -> CutResponse:
-    """Return what a region leaves of a solid."""
+def cut(question: CutRequest, call: Call) -> CutResponse | Iterator[bytes]:
+    """Return what a region leaves of a solid; the bytes of a file where one is asked for."""
     solid = questions.to_solid(question.solid, call, ("solid",))
     region = questions.to_solid(question.region, call, ("region",))
     keep = question.keep or "inside"
-    result, accuracy = call.compute(engine.cut, solid, region, keep=keep, measures=True)
+    if call.file is not None and keep == "both":
+        raise ServiceError("invalid_request", "a file takes one part; ask for inside, then outside", ("keep",))
+    result, accuracy = call.compute(engine.cut, solid, region, keep=keep, measures=call.file is None)
+    if call.file is not None:
+        more = {"collapsed": result.n_collapsed, "folded": result.n_folded}
+        return octets.answer(call, octets.mesh_file(result.vertices, result.faces, call), accuracy, more)
     names = ("vertices", "faces", "origins", "collapsed", "folded", "volume", "area")
     parts = [
         CutPart.made(**{name: getattr(part, name) for name in names})

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, Final, Literal, cast
 
 import numpy as np
 from starlette import responses
 
 import engine
-from service import mesh_reader
+from service import body, mesh_reader
 from service.body import FILES, MULTIPART, fields_of
 from service.convert.answers import from_accuracy
 from service.errors import ServiceError
@@ -32,9 +33,10 @@ def to_rows(octets: Any, shape: tuple[int, ...]) -> Any:
     return np.frombuffer(octets, "<f8").astype(np.float64, copy=False).reshape(-1, *shape)
 
 
-def answer(call: Call, array: Any, accuracy: engine.Accuracy) -> Any:
-    """Return `array`, with its accuracy in a header: a dictionary of structured fields (RFC 8941)."""
+def answer(call: Call, array: Any, accuracy: engine.Accuracy, more: dict[str, int] | None = None) -> Any:
+    """Return `array`, with its accuracy in a header, and more: a dictionary of structured fields (RFC 8941)."""
     members = {name: value for name, value in vars(from_accuracy(accuracy)).items() if value is not None}
+    members |= more or {}
     call.headers["Geometry-Accuracy"] = ", ".join(f"{name}={value}" for name, value in members.items())
     return array
 
@@ -74,6 +76,48 @@ _FORM: Final = {
 FILES_IN: Final = {**{kind: {"schema": _FILE} for kind in FILES}, MULTIPART: {"schema": _FORM}}
 """The files that are taken in place of JSON. The OpenAPI document names them beside the body: with two media types of a
 body some generators make clients that do not run."""
+
+FILES_OUT: Final = {kind: {"schema": _FILE} for kind in body.FILES_OUT}
+"""The files that a call answers with in place of JSON, by the header Accept."""
+_ROWS: Final = 4096
+_PLY: Final = """ply
+format binary_little_endian 1.0
+element vertex {}
+property double x
+property double y
+property double z
+element face {}
+property list uchar int vertex_indices
+end_header
+"""
+_FACET: Final = "facet normal {!r} {!r} {!r}\nouter loop\n" + 3 * "vertex {!r} {!r} {!r}\n" + "endloop\nendfacet\n"
+
+
+def mesh_file(vertices: Any, faces: Any, call: Call) -> Iterator[bytes]:
+    """Yield a file of triangles in parts; every coordinate reads back as the same double, STL is text for that."""
+    call.media_type, n = call.file or "", len(faces)
+    if call.file == "model/ply":
+        yield _PLY.format(len(vertices), n).encode()
+        yield vertices.astype("<f8").tobytes()
+        rows = np.empty(n, [("n", "u1"), ("corners", "<i4", 3)])
+        rows["n"], rows["corners"] = 3, faces
+        yield rows.tobytes()
+    elif call.file == "model/off":
+        yield f"OFF\n{len(vertices)} {n} 0\n".encode()
+        for start in range(0, len(vertices), _ROWS):
+            yield "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in vertices[start : start + _ROWS].tolist()).encode()
+        for start in range(0, n, _ROWS):
+            yield "".join(f"3 {a} {b} {c}\n" for a, b, c in faces[start : start + _ROWS].tolist()).encode()
+    else:
+        yield b"solid cut\n"
+        for start in range(0, n, _ROWS):
+            corners = vertices[faces[start : start + _ROWS]]
+            with np.errstate(all="ignore"):
+                normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+                normals = np.nan_to_num(normals / np.linalg.norm(normals, axis=1)[:, None], posinf=0.0, neginf=0.0)
+            facets = np.concatenate([normals[:, None], corners], axis=1).reshape(-1, 12).tolist()
+            yield "".join(_FACET.format(*facet) for facet in facets).encode()
+        yield b"endsolid cut\n"
 
 
 def file_in(octets: Any, content_type: str, call: Call) -> tuple[Any, Format | None, str]:

@@ -7,7 +7,7 @@ from typing import Any, Final
 from starlette.responses import JSONResponse
 
 import engine
-from service.convert import answers, areas, cutting, questions
+from service.convert import answers, areas, cutting, octets, questions
 from service.openapi import router_of
 from service.schemas.bodies import (
     ClearanceRequest,
@@ -299,8 +299,14 @@ def section(question: SectionRequest, call: CallOf) -> SectionResponse:
     return cutting.sections(question, call)
 
 
-@router.post("/v1/cut", operation_id="cut", tags=["solids cut"])
-def cut(question: CutRequest, call: CallOf) -> CutResponse:
+@router.post(
+    "/v1/cut",
+    operation_id="cut",
+    tags=["solids cut"],
+    response_model=CutResponse,
+    openapi_extra={"x-also-answers": octets.FILES_OUT},
+)
+def cut(question: CutRequest, call: CallOf) -> Any:
     """Cut a polyhedron by a half-space, box or convex region; what is left is closed by caps."""
     return cutting.cut(question, call)
 

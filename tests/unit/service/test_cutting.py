@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
+
+import engine
 
 pytestmark = pytest.mark.anyio
 
@@ -60,8 +64,8 @@ async def test_cuts(client: httpx.AsyncClient) -> None:
     half = {"type": "half_space", "normal": [0, 0, 1], "offset": -1}
     _, answer = await ask(client, "cut", solid=CUBE, region=half, keep="both")
     assert [(part["volume"], len(part["faces"]) > 0) for part in answer["parts"]] == [(0.0, False), (1.0, True)]
-    status, problem = await ask(client, "cut", solid=CUBE, region=BOX, keep="outside")
-    assert (status, problem["code"], problem["errors"][0]["pointer"]) == (422, "invalid_operation", "/keep")
+    _, answer = await ask(client, "cut", solid=CUBE, region=BOX, keep="outside")
+    assert [(part["volume"], part["area"]) for part in answer["parts"]] == [(0.875, 6.0)]
     status, problem = await ask(client, "cut", solid=BOX, region=BOX)
     assert (status, problem["errors"][0]["pointer"]) == (422, "/solid")
 
@@ -81,3 +85,32 @@ async def test_overlaps(client: httpx.AsyncClient) -> None:
     for first, second in ((flat, BOX), (BOX, flat), (CUBE, {"type": "aabb", "min": [0, 0], "max": [1, 1]})):
         status, problem = await ask(client, "overlap", first=first, second=second)
         assert (status, problem["code"], problem["errors"][0]["pointer"]) == (422, "wrong_dimension", "/second")
+
+
+@pytest.mark.parametrize("kind", ["ply", "off", "stl"])
+async def test_a_cut_is_answered_as_the_file_that_is_preferred(client: httpx.AsyncClient, kind: str) -> None:
+    """Read back it is the mesh of the JSON answer, double by double."""
+    solid = {**CUBE, "vertices": [[x / 3, y / 7, z * 1e-9] for x, y, z in CUBE["vertices"]]}
+    half = {"type": "half_space", "normal": [1, 2, 3], "offset": -0.2}
+    for keep in ("inside", "outside"):
+        question = {"solid": solid, "region": half, "keep": keep}
+        (part,) = (await client.post("/v1/cut", json=question)).json()["parts"]
+        accept = f"application/json;q=0.5, text/html, model/{kind}"
+        answer = await client.post("/v1/cut", json=question, headers={"Accept": accept})
+        assert (answer.status_code, answer.headers["content-type"]) == (200, f"model/{kind}")
+        assert "collapsed=0, folded=0" in answer.headers["geometry-accuracy"]
+        mesh = engine.read_mesh(BytesIO(answer.content))
+        vertices = np.array(part["vertices"])
+        assert (mesh.vertices[mesh.faces] == vertices[np.array(part["faces"])]).all()
+
+
+async def test_a_file_takes_one_part_and_json_is_what_others_get(client: httpx.AsyncClient) -> None:
+    question = {"solid": CUBE, "region": BOX, "keep": "both"}
+    answer = await client.post("/v1/cut", json=question, headers={"Accept": "model/ply"})
+    assert (answer.status_code, answer.json()["errors"][0]["pointer"]) == (422, "/keep")
+    for accept in ("*/*", "text/html", "model/obj", "model/ply;q=0.1, application/json", "model/ply;q=0", "\xe9;q=x,,"):
+        answer = await client.post("/v1/cut", json=question, headers={b"Accept": accept.encode("latin-1")})
+        assert (answer.status_code, len(answer.json()["parts"])) == (200, 2), accept
+    nothing = {"solid": CUBE, "region": {"type": "half_space", "normal": [0, 0, 1], "offset": -1}}
+    answer = await client.post("/v1/cut", json=nothing, headers={"Accept": "model/off"})
+    assert answer.content == b"OFF\n0 0 0\n"
