@@ -41,8 +41,11 @@ from engine.scenes.scene import Keep, Scene
 from engine.segment_clipping import clip_segments as clipping
 from engine.segment_clipping import hits as one
 from engine.segment_clipping.hits import Hits
+from engine.solid_cutting import overlap as overlaps
+from engine.solid_cutting import section as sections
+from engine.solid_cutting.planar_overlaps import check_same_length
 from engine.solids.base import Solid
-from engine.solids.checks import as_point_groups, as_points, shown
+from engine.solids.checks import as_floats, as_point_groups, as_points, shown
 from engine.types import BoolArray, FloatArray, Int8Array
 
 if TYPE_CHECKING:
@@ -203,6 +206,46 @@ def _related(shared: tuple[Any, ...], tile: Any, predicate: str, distance: float
     sides = left.to_frame("geometry"), right.to_frame("geometry")
     made = joins.sjoin(sides[0], sides[1], "inner", predicate, distance=distance, workers=1)
     return np.column_stack([rows[made.index.to_numpy()], near[made["index_right"].to_numpy()]])
+
+
+def overlap_volume(
+    client: Client, first: Any, second: Any, *, first_pose: Any = None, second_pose: Any = None, part: int = 2_000,
+    progress: Progress | None = None,
+) -> FloatArray:  # fmt: skip
+    """Return what pairs of solids have in common, lists or arrays, see `engine.overlap_volume`."""
+    return _of_pairs(client, overlaps.overlap_volume, first, second, (first_pose, second_pose), part, progress)
+
+
+def iou(
+    client: Client, first: Any, second: Any, *, first_pose: Any = None, second_pose: Any = None, part: int = 2_000,
+    progress: Progress | None = None,
+) -> FloatArray:  # fmt: skip
+    """Return the same over the volume of their union, see `engine.iou`."""
+    return _of_pairs(client, overlaps.iou, first, second, (first_pose, second_pose), part, progress)
+
+
+def _of_pairs(
+    client: Client, ask: Function, first: Any, second: Any, poses: tuple[Any, Any], part: int, progress: Any
+) -> FloatArray:
+    options = {"first_pose": poses[0], "second_pose": poses[1]}
+    ask(first[:0], second[:0], **options)  # checks the options here, not on a worker
+    check_same_length(first, second)
+    answers = _answers(client, partial(_about_rows, ask, **options), (), (first, second), part, progress)
+    return _filled(np.float64, answers, len(first))
+
+
+def section(
+    client: Client, solid: Solid, heights: object, *, normal: object = None, part: int = 16,
+    progress: Progress | None = None,
+) -> sections.Sections:  # fmt: skip
+    """Return the sections of a polyhedron at heights along a normal, see `engine.section`."""
+    rows = as_floats(heights, 1, ("heights",))
+    function = partial(_about_solids, sections.section, normal=normal)
+    parts_done = [
+        (0, function((solid,), rows[:0])),
+        *_in_order(_answers(client, function, (solid,), (rows,), part, progress)),
+    ]
+    return sections.join_sections([made for _, made in parts_done])
 
 
 def _about_rows(ask: Function, solids: tuple[Any, ...], *rows: Any, **options: Any) -> Any:

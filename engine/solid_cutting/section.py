@@ -284,6 +284,16 @@ def _sections(made: list[tuple[Seen, Plane, list[Area]]], measures: bool, budget
     return Sections(read_only(np.concatenate(rings)), offsets, summed(sizes), summed(counts), tuple(made), areas_made)
 
 
+def join_sections(parts: list[Sections]) -> Sections:
+    """Return the sections of some calls as those of one."""
+    names = ("ring_offsets", "piece_offsets", "plane_offsets")
+    rings, pieces, planes = (summed(np.concatenate([np.diff(getattr(each, name)) for each in parts])) for name in names)
+    vertices, areas, flat = (
+        read_only(np.concatenate([getattr(each, name) for each in parts])) for name in ("vertices", "areas", "flat")
+    )
+    return Sections(vertices, rings, pieces, planes, (), areas, flat)
+
+
 def _flat(view: Seen, plane: Plane, number: int) -> tuple[float, float]:
     """Return the nearest doubles of a point's coordinates in a plane, see `Sections.flat`."""
     normal, offset = plane.integers[:3], plane.integers[3]

@@ -157,7 +157,7 @@ function chooseQuestion() {
   $("operation-label").hidden = !question.operations;
   $("count-label").hidden = !question.counts;
   $("method-label").hidden = !question.methods;
-  $("turn-label").hidden = !question.seconds;
+  $("turn-label").hidden = !question.seconds && !question.turns;
   $("plain-label").hidden = !question.plain;
   if (question.counts) [$("count").min, $("count").max, $("count").value] = typeof question.counts === "function" ? question.counts(state.dimension) : question.counts;
   $("view3d").hidden = state.dimension !== 3;
@@ -309,8 +309,8 @@ function showPicture(now, drawn) {
     const rings = editable(now), edges = rings.flatMap(({ at }) => at.map((p, i) => [p, at[(i + 1) % at.length]]));
     views.plane.show(prepared2d(framed(drawn, now.frame), colors), { corners: rings.flatMap(({ at }) => at), edges, count, grid: now.snap ? 0.25 : 0 });
   } else if (views.space) {
-    const canTurn = now.question === "collide";
-    views.space.show(prepared3d(drawn, now.frame, colors), { count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: now.offset, radius: 1.5 } : null });
+    const { turns, middle } = QUESTIONS[now.question], canTurn = turns || now.question === "collide";
+    views.space.show(prepared3d(drawn, now.frame, colors), { count, radius: count > 1 ? 1.5 : 2.1, rings: canTurn ? { middle: middle?.(now) ?? now.offset, radius: 1.5 } : null });
     if (now.question === "proof" && !past.past.length) views.space.spin();
   }
 }

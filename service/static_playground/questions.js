@@ -58,6 +58,13 @@ function sceneBodies(state) {
 // The pose of the second body, where it is moved and turned by hand.
 export const secondPose = (state) => poseAt(state.frame, state.rotation, snapped(state, state.offset.slice(0, state.dimension)));
 
+// The plane that is moved along its normal and turned by hand: its middle in the picture, and where it is among the solids.
+function cuttingPlane(state) {
+  const normal = state.rotation.map((row) => row[0]), [along] = snapped(state, [normal.reduce((sum, n, k) => sum + n * state.offset[k], 0)]);
+  const middle = normal.map((n) => n * along);
+  return { normal, middle, offset: -fromView(state.frame, middle).reduce((sum, v, k) => sum + v * normal[k], 0) };
+}
+
 const IDENTITY = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 const unit = (a) => a.map((v) => v / Math.hypot(...a));
 const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -296,6 +303,37 @@ export const QUESTIONS = {
         items.push({ kind: "lines", lines: [[start, end]], color, width: Math.max(2, 6 - i) }, { kind: "points", points: [start, end], color, width: 7 });
       });
       return items;
+    },
+  },
+
+  cut: {
+    hint: "What a plane leaves of the body on the side of its normal, closed: blue, its cap green. Beside it the section. Move the plane, turn it; snapped to quarters it passes through corners and along faces.",
+    dimensions: [3],
+    firsts: (solid) => solid.mesh && !solid.crosses,
+    preferred: { 3: "knot" },
+    panes: 2,
+    turns: true,
+    middle: (state) => cuttingPlane(state).middle,
+    ask(state) {
+      const { normal, offset } = cuttingPlane(state);
+      return { path: "/v1/cut", body: { solid: state.first.asked, region: { type: "half_space", normal, offset } }, items: state.first.mesh.faces.length };
+    },
+    figures: (state, { parts: [{ volume, area, faces, collapsed, folded }] }) => ({
+      "volume inside": volume, "area of its surface": area, faces: faces.length, "flat after rounding": collapsed.length, "turned over by rounding": folded.length,
+    }),
+    further: (state, { solid, region: { normal, offset } }) => ({
+      path: "/v1/section", body: { solid, planes: [[...normal, offset]] },
+      figures({ sections: [{ pieces }] }) {
+        const rings = pieces.flatMap(({ shell, holes }) => [shell, ...holes]), total = (values) => values.reduce((sum, v) => sum + v, 0);
+        const perimeter = total(rings.flatMap((ring) => ring.map((p, i) => Math.hypot(...p.map((v, k) => v - ring.at(i - 1)[k])))));
+        return { "area of the section": total(pieces.map(({ area }) => area)), "its perimeter": perimeter, "its pieces": pieces.length, "its holes": rings.length - pieces.length };
+      },
+      draw: ({ sections: [{ pieces }] }) => outlines(pieces.flatMap(({ shell, holes }) => [shell, ...holes]), "kept", 2.5).map((item) => ({ ...item, pane: 1 })),
+    }),
+    verdict: (state, answer, figures) => `section ${figures["area of the section"]?.toPrecision(6) ?? "refused"}, volume inside ${figures["volume inside"].toPrecision(6)}`,
+    draw(state, { parts: [{ vertices, faces, origins }] }) {
+      const part = (isCap) => ({ kind: "triangles", mesh: { vertices, faces: faces.filter((face, i) => origins[i] < 0 === isCap) } });
+      return [...solid3d(state.first, "outside", 0.1).map((item) => ({ ...item, pane: 0 })), { ...part(false), color: "first", alpha: 0.6, pane: 0 }, { ...part(true), color: "kept", alpha: 0.7 }];
     },
   },
 

@@ -71,7 +71,7 @@ export const solid_types = {
     torus: { name: "torus (2,304 faces)", mesh: true, make: torus },
     knot: { name: "trefoil knot (6,400 faces)", mesh: true, make: knot },
     octahedron: { name: "octahedron", mesh: true, make: octahedron, convex: true },
-    crossing: { name: "two crossing cubes (even-odd)", mesh: true, make: crossing },
+    crossing: { name: "two crossing cubes (even-odd)", mesh: true, crosses: true, make: crossing },
     cube: { name: "box", make: cube, convex: true },
     ball: { name: "sphere", make: ball, round: true },
     floor: { name: "half-space", make: floor, convex: true, unbounded: true },

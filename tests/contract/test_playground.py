@@ -175,7 +175,7 @@ def request_of(page: Any) -> dict[str, Any]:
         ("collide", 3, "overlapping"), ("collide", 2, "overlapping"),
         ("segments", 3, "of 56 segments"), ("segments", 2, "of 56 segments"), ("polygons", 3, "of 6 polygons"),
         ("scene", 3, "first met: body"), ("scene", 2, "first met: body"),
-        ("hits", 3, "of 100 meet it"), ("distances", 3, "away"), ("distances", 2, "away"),
+        ("hits", 3, "of 100 meet it"), ("cut", 3, "volume inside"), ("distances", 3, "away"), ("distances", 2, "away"),
         ("polygons", 2, "of 6 polygons"), ("overlay", 2, "6 pieces"),
     ],
 )  # fmt: skip
@@ -206,6 +206,28 @@ def test_the_mouse_moves_the_second_body(page: Any) -> None:
     shown = figures(page)
     assert verdict(page) == f"disjoint, {float(shown['distance']):#.6g} apart"
     assert len(shown["nearest features"].split(", ")) == 2
+    page.uncheck("#snap")
+
+
+def test_a_plane_is_moved_through_a_body(page: Any) -> None:
+    """By Shift and arrow keys; the figures are those of the engine for the request shown."""
+    choose(page, "cut", 3)
+    page.select_option("#first", "octahedron")
+    page.check("#snap")
+    before = verdict(page)
+    page.focus("#view3d")
+    for _ in range(12):
+        page.keyboard.press("Shift+ArrowRight")
+    assert verdict(page) != before
+    shown, asked = figures(page), request_of(page)
+    body, region = made(asked["solid"]), engine.HalfSpace(asked["region"]["normal"], asked["region"]["offset"])
+    assert region.offset * 4 == round(region.offset * 4) != 0
+    volume, area = engine.cut(body, region).volume, engine.section(body, region).areas.sum()  # type: ignore[union-attr]
+    assert float(shown["volume inside"]) == pytest.approx(volume, rel=1e-12)  # 17 places are shown
+    assert float(shown["area of the section"]) == pytest.approx(area, rel=1e-12)
+    page.fill("#turn", "45")
+    assert verdict(page)
+    assert request_of(page)["region"]["normal"][2] != 0
     page.uncheck("#snap")
 
 

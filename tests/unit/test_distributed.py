@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,6 +104,21 @@ def test_hits_equal_one_process(client: Client, solid: engine.Polyhedron, points
     assert distributed.hits(client, lines, scene, keep="first", part=33) == scene.hits(lines, keep="first")
     met = distributed.hits(client, lines, solid, keep="any", part=33)
     np.testing.assert_array_equal(met, engine.hits(lines, solid, keep="any"))
+
+
+def test_overlaps_and_sections_equal_one_process(client: Client, solid: engine.Polyhedron, points: np.ndarray) -> None:
+    first, second = ([engine.Aabb(low - 0.7, low + 0.7) for low in some] for some in (points[:40], points[40:80]))
+    pose = engine.Pose.from_quaternion([2, 1, 0, 0], [0, 0, 0])
+    for name in ("overlap_volume", "iou"):
+        answer = getattr(distributed, name)(client, first, second, second_pose=pose, part=7)
+        np.testing.assert_array_equal(answer, getattr(engine, name)(first, second, second_pose=pose))
+    with pytest.raises(engine.UnsupportedPairError, match="as many of each"):
+        distributed.iou(client, points[:8, None, :2] + np.eye(3, 2), points[:7, None, :2] + np.eye(3, 2))
+    heights = np.linspace(-1.1, 1.1, 23)
+    made: Any = distributed.section(client, solid, heights, normal=[1, 2, 3], part=4)
+    here: Any = engine.section(solid, heights, normal=[1, 2, 3])
+    for name in ("vertices", "ring_offsets", "piece_offsets", "plane_offsets", "areas", "flat"):
+        np.testing.assert_array_equal(getattr(made, name), getattr(here, name))
 
 
 def test_overlays_equal_one_process(client: Client, points: np.ndarray) -> None:
