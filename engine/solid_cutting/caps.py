@@ -28,6 +28,7 @@ from engine.running.budget import Budget
 from engine.solid_cutting.ears import bridge_of, clip_ears
 from engine.solid_cutting.face_cuts import find_turned
 from engine.solid_cutting.plane_cut import Plane, Points, without_repeats
+from engine.solid_cutting.shells import matched
 from engine.types import FloatArray, IntArray, read_only
 
 Ring = list[int]
@@ -148,15 +149,7 @@ def _matched(view: Seen, point: int, ends: IntArray, incoming: list[int], outgoi
     def clockwise(one: Any, other: Any) -> int:
         return int(other[0] - one[0]) or sign_of(one[2] * other[1] - one[1] * other[2]) * -1
 
-    order = sorted(rays, key=cmp_to_key(clockwise))
-    waiting: list[int] = []
-    pairs: dict[int, int] = {}
-    for *_, side, is_incoming in order + order:
-        if is_incoming and side not in pairs and side not in waiting:
-            waiting.append(side)
-        elif not is_incoming and waiting and side not in pairs.values():
-            pairs[waiting.pop()] = side
-    return list(pairs.items())
+    return matched([(side, is_incoming) for *_, side, is_incoming in sorted(rays, key=cmp_to_key(clockwise))])
 
 
 def areas_of(view: Seen, rings: list[Ring], budget: Budget, is_exact: bool = False) -> tuple[list[Area], list[Ring]]:

@@ -265,9 +265,10 @@ def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     it from what is inside those before, and caps the rest. A side along a plane that a later one cuts is cut in what
     was taken away before, too. A region without interior takes nothing away.
     """
+    is_met = len(planes) == 1 or len(cut_by_planes(solid, planes, budget).triangles) > 0
     given, planes = outward(solid, budget), [plane.reversed for plane in planes]
     points, triangles, origins = Points(solid.vertices), given, np.arange(len(given))
-    if len(planes) > 1 and not len(cut_by_planes(solid, [plane.reversed for plane in planes], budget).triangles):
+    if not is_met:
         return Left(points, given, origins, np.ones(len(given), np.bool_), planes)
     parts, splits = [], [_NONE]
     for number, plane in enumerate(planes):

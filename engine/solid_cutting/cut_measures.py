@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from math import isqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -52,7 +52,7 @@ Ends = Callable[[int], tuple[Fraction, Fraction]]
 """What a value is between, by the number of bits that are spent on it."""
 
 
-def _narrowed(ends_of: Ends, rounded: Callable[[Fraction], float] = nearest_float) -> float | None:
+def narrowed(ends_of: Callable[[int], Any], rounded: Callable[[Any], float] = nearest_float) -> float | None:
     """Return what both ends of a value round to, with as many bits as it takes; None beyond `MOST_BITS`."""
     bits = 128
     while bits <= MOST_BITS:
@@ -74,7 +74,7 @@ def _parted(points: Points, triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 def volume_of_cut(points: Points, triangles: IntArray, budget: Budget, factor: Fraction = Fraction(1)) -> float:
     """Return factor times the volume of a closed mesh of points, its faces outwards."""
-    value = _narrowed(volume_between(points, triangles, budget, factor))
+    value = narrowed(volume_between(points, triangles, budget, factor))
     return nearest_float(factor * volume_in_fractions(points, triangles)) if value is None else value
 
 
@@ -142,7 +142,7 @@ def area_of_cut(points: Points, triangles: IntArray, budget: Budget) -> float:
         middle, width = known / 2 + total * unit, off / 2 + slack * unit
         return middle - width, middle + width
 
-    value = _narrowed(ends_of)
+    value = narrowed(ends_of)
     return nearest_area(_as_fractions(points, triangles)) if value is None else value
 
 
@@ -168,7 +168,7 @@ def area_of_section(view: Seen, plane: Plane, area: Area, budget: Budget) -> flo
         unit = Fraction(1, 2) / Fraction(2) ** (2 * k)
         return (total - 4 * n * (most + 1)) * unit, (total + 4 * n * (most + 1)) * unit
 
-    value = _narrowed(ends_of, rounded)
+    value = narrowed(ends_of, rounded)
     if value is None:
         corners = [[view.exact(number) for number in ring] for ring in rings]
         value = rounded(

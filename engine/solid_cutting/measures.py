@@ -20,7 +20,7 @@ from engine.solid_cutting.exact_sums import (
     exact_volume,
     nearest_area,
 )
-from engine.solid_cutting.shells import Shells, shells
+from engine.solid_cutting.shells import Shells, outward, shells
 from engine.solid_cutting.simple_measures import Measures
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
 from engine.solids.accepted import SolidLike
@@ -251,7 +251,7 @@ def _of_mesh(solid: Polyhedron, budget: Budget, what: str) -> tuple[Any, bool]:
         budget.check()
         if result is not None and _is_scaled(result, exponent):
             return (float(result) if what == "volume" else result), False
-    mesh = _exact(solid, looks, budget)
+    mesh = _exact(solid.vertices, outward(solid, budget), budget)
     if what == "volume":
         return nearest_float(exact_volume(mesh)), True
     return np.array([nearest_float(x) for x in exact_centroid(mesh)]), True
@@ -263,15 +263,11 @@ def _is_scaled(result: Any, exponent: int) -> bool:
     return bool(exponent == 0 or ((sizes > SMALLEST_NORMAL) & (sizes < np.inf)).all())
 
 
-def _exact(solid: Mesh, looks: Shells | None, budget: Budget) -> ExactMesh:
-    """Return a mesh in integers, its faces outwards if it is known which way they look."""
+def _exact(vertices: FloatArray, faces: IntArray, budget: Budget) -> ExactMesh:
+    """Return a mesh in integers."""
     budget.check()
-    used, flat = np.unique(solid.triangles, return_inverse=True)
-    faces = flat.reshape(-1, 3)
-    if looks is not None:
-        turned = looks.sides < 0 if looks.common == 0 else np.full(len(faces), looks.common < 0)
-        faces = np.where(turned[:, None], faces[:, ::-1], faces)
-    return exact_mesh(solid.vertices[used].tolist(), map(tuple, faces.tolist()))
+    used, flat = np.unique(faces, return_inverse=True)
+    return exact_mesh(vertices[used].tolist(), map(tuple, flat.reshape(-1, 3).tolist()))
 
 
 def _six_volumes(
@@ -343,7 +339,7 @@ def _area_of_mesh(solid: Mesh, budget: Budget) -> tuple[float, bool]:
             result = None if half is None else float(np.ldexp(half, 2 * exponent))
         if result is not None and _is_scaled(result, exponent):
             return result, False
-    return nearest_area(_exact(solid, None, budget)), True
+    return nearest_area(_exact(solid.vertices, solid.triangles, budget)), True
 
 
 MESH: Final = Measures(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.convex_bodies import of_bodies
 from engine.solid_cutting.cut import cut_by_planes
-from engine.solid_cutting.cut_measures import MOST_BITS, volume_between, volume_in_fractions, volume_of_cut
+from engine.solid_cutting.cut_measures import narrowed, volume_between, volume_in_fractions, volume_of_cut
 from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
 from engine.solid_cutting.planar_overlaps import (
     check_same_length,
@@ -38,7 +38,6 @@ from engine.solids.primitives import Aabb, Convex, Triangle
 from engine.types import Accuracy, FloatArray
 
 Rows = list[list[Fraction]]
-_FIRST_BITS: Final = 128
 
 
 def overlap_volume(
@@ -289,11 +288,10 @@ def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, b
     parts = [volume_between(*each, budget, factor) for each in (common, whole)]
     other = _volume_within(rows, budget)
 
-    bits = _FIRST_BITS
-    while bits <= MOST_BITS:
+    def ends_of(bits: int) -> Any:
         low, high = zip(*(part(bits) for part in parts))
-        least, most = (ratio_of(some) for some in extremes((*low, other), (*high, other)))
-        if least == most:
-            return least
-        bits *= 4
-    return ratio_of([*(factor * volume_in_fractions(*each) for each in (common, whole)), other])
+        return extremes((*low, other), (*high, other))
+
+    value = narrowed(ends_of, ratio_of)
+    exact = (factor * volume_in_fractions(*each) for each in (common, whole))
+    return ratio_of([*exact, other]) if value is None else value

@@ -257,13 +257,18 @@ def _matches(points: FloatArray, faces: IntArray, ends: IntArray, corners: IntAr
         turn = sign_of(dot(axis, cross(one[1], other[1]))) if one[0] == other[0] else other[0] - one[0]
         return -turn if turn else -1 if one[2] < other[2] else 1
 
+    ring = [key[3] for key in sorted(keys, key=cmp_to_key(compare))]
+    # the solid of a shell that looks outwards begins above a side that runs down
+    return matched([(corner, (faces[corner // 3, corner % 3] == ends[0]) == (way < 0)) for corner in ring])
+
+
+def matched(ring: list[tuple[int, bool]]) -> list[tuple[int, int]]:
+    """Return pairs of what opens, in a ring, and what closes it, matched as parentheses are."""
     waiting: list[int] = []
     pairs: dict[int, int] = {}
-    ring = [key[3] for key in sorted(keys, key=cmp_to_key(compare))]
-    for corner in ring + ring:  # the solid of a shell that looks outwards begins above a side that runs down
-        if (faces[corner // 3, corner % 3] == ends[0]) == (way < 0):
-            if corner not in pairs and corner not in waiting:
-                waiting.append(corner)
-        elif waiting and corner not in pairs.values():
-            pairs[waiting.pop()] = corner
+    for each, opens in ring + ring:
+        if opens and each not in pairs and each not in waiting:
+            waiting.append(each)
+        elif not opens and waiting and each not in pairs.values():
+            pairs[waiting.pop()] = each
     return list(pairs.items())
