@@ -265,7 +265,9 @@ def cut_outside(solid: Polyhedron, planes: list[Plane], budget: Budget) -> Left:
     it from what is inside those before, and caps the rest. A side along a plane that a later one cuts is cut in what
     was taken away before, too. A region without interior takes nothing away.
     """
-    is_met = len(planes) == 1 or len(cut_by_planes(solid, planes, budget).triangles) > 0
+    if len(planes) == 1:
+        return cut_by_planes(solid, [planes[0].reversed], budget)
+    is_met = len(cut_by_planes(solid, planes, budget).triangles) > 0
     given, planes = outward(solid, budget), [plane.reversed for plane in planes]
     points, triangles, origins = Points(solid.vertices), given, np.arange(len(given))
     if not is_met:
