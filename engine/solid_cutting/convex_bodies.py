@@ -56,7 +56,7 @@ def of_bodies(
     for key, solid in unique.items():
         if isinstance(solid, (Convex, Polyhedron)) and solid.dimension == 3:
             budget.check()
-            body = solid.prepared("convex_body", partial(_body_of, solid, budget), budget.check)
+            body = solid.prepared("overlap_body", partial(_body_of, solid, budget), budget.check)
             if body is not None:
                 numbers[key] = len(boxes) + len(bodies)
                 bodies.append(body)
