@@ -173,7 +173,8 @@ def cut(
     faces thinner than that or turn them over: `collapsed` and `folded` name them. `volume` and `area` are those of the
     exact result.
 
-    Cost: some 0.15 us a face for one plane; small meshes with a box 2 us a face inside, 6 outside, and what `volume` computes once.
+    Cost: some 0.15 us a face for one plane; small meshes with a box 2 us a face inside, 6 outside; and what `volume`
+    computes once.
 
     References
     ----------

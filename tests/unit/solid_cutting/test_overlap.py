@@ -214,14 +214,10 @@ def test_ratios_of_polygons_that_no_power_of_two_scales_exactly(far: float) -> N
 
 def test_a_solid_that_was_in_a_scene_is_overlapped() -> None:
     """What a collision keeps with a solid is not what an overlap keeps with it."""
-    cubes = [engine.Polyhedron(*cube) for cube in (CUBE, CUBE)]
+    corners = [[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)]
+    faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
+    cubes = [engine.Polyhedron(corners, faces) for _ in range(2)]
     engine.collide_scene(cubes)
     assert engine.overlap_volume(cubes[0], cubes[1]) == 1.0
     engine.collide(cubes[0], cubes[1])
     assert engine.iou(cubes[0], cubes[1]) == 1.0
-
-
-CUBE = (
-    [[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)],
-    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]],
-)
