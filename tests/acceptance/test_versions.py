@@ -5,6 +5,7 @@ Each needs a package index and compiles all kernels from nothing.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -78,11 +79,18 @@ def ask_everything(url: str) -> None:
         pieces = client.post(f"{region}/clip/segments", content=rows.tobytes(), headers=raw).raise_for_status()
         assert np.frombuffer(pieces.content).tolist() == [0.5, 0.5, 0.5, 1.0, 1.0, 1.0]
         client.post("/v1/solids/import?format=off", content=TETRAHEDRON, headers=raw).raise_for_status()
+        point = {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [1, 2]}}
+        lines = [
+            {"operation": "contains", "layer": {"type": "FeatureCollection", "features": []}, "outside": True},
+            point,
+        ]
+        text, kind = "\n".join(map(json.dumps, lines)), {"content-type": "application/x-ndjson"}
+        assert client.post("/v1/layers/stream", content=text, headers=kind).json()["point"] == {"index": 0}
         client.get(stored).raise_for_status()
         client.head(stored).raise_for_status()
         for path in ("/healthz", "/readyz", "/metrics", "/docs"):
             client.get(path).raise_for_status()
-        by_hand = {"/v1/solids/import", "/healthz", "/readyz", "/metrics"}
+        by_hand = {"/v1/solids/import", "/v1/layers/stream", "/healthz", "/readyz", "/metrics"}
         left = {path for path in document["paths"] if path not in asked | by_hand and "{" not in path}
         assert not left, left
 
