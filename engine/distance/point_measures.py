@@ -171,9 +171,9 @@ class TriangleMeasure:
             budget.check()
             if item == stop:
                 return n_exact
-            if how == DONE and n:
+            if how == DONE:
                 pairs = room.candidates.pairs[:n]
-            elif how in (BEYOND, DONE):  # or bounds left no candidate: a product of lengths underflows
+            elif how == BEYOND:
                 check_finite(points, ("points",))
                 pairs = np.zeros((len(self.body.faces), 4), np.int64)
                 pairs[:, 0] = np.arange(len(pairs))

@@ -11,7 +11,8 @@
 4. Else the candidates are bounded in double-doubles (`_refine`; the bound is that of `refined.py`), which decides the
    distance of ties too, and the feature if every corner of every candidate that is not of it lies strictly behind the
    plane at the foot across the connection (`_certify`; the margins are those of `refined.certify`).
-5. What none of these proves is left open, for integers (`points.py`).
+5. What none of these proves is left open, for integers (`points.py`), and so is what is nearer, over the size of the
+   coordinates, than squares of doubles can be small.
 
 The face is the least of the candidates'.
 
@@ -72,6 +73,8 @@ ALL_LANES: Final = (1 << LANES) - 1
 _LARGEST: Final = 1e300
 _DISTANT: Final = 1024.0
 _ABOVE_ONE: Final = 1.0 + 2.0**-20
+_SHORTEST: Final = 2.0**-200
+"""In the unit of the coordinates: what is nearer in all coordinates is measured in integers."""
 
 
 class PointRoom(NamedTuple):
@@ -285,11 +288,13 @@ def _decide(
     error = 2.0**-50 * (3.0 * mesh.extent.reach + largest_of(move)) + 2.0**-1060 if pose.is_posed else 0.0
     place = as_placement(pose, 0, move, error)
     scaled_q, slack = scaled(q, unit), 2.0 * unit * error
-    most, largest, on, is_unsure, is_over = goal.most * unit, 0.0, -1, False, False
+    most, largest, shortest, on, is_unsure, is_over = goal.most * unit, 0.0, np.inf, -1, False, False
     for k in range(n):
         t = triangle_of(mesh, pairs[k, 0])
         t = Facet(placed(t.p, place), placed(t.q, place), placed(t.r, place))
         t = relative_to(scaled_q, _scaled(t, unit))
+        size = max(largest_of(t.p), largest_of(t.q), largest_of(t.r))
+        shortest, largest = min(shortest, size), max(largest, size)
         low, high, code, is_certain = measure(t)
         is_over = n == 1 and code == FACE and is_certain and not pose.is_posed
         if low <= slack and not is_over:
@@ -303,12 +308,13 @@ def _decide(
                 code = under
         candidates.bounds[k], pairs[k, 1], pairs[k, 2] = low - slack, int(is_certain and not pose.is_posed), code
         most = min(most, high + slack)
-        largest = max(largest, largest_of(t.p), largest_of(t.q), largest_of(t.r))
     if on >= 0 and not is_unsure:
         pairs[0, 0], pairs[0, 2] = pairs[on, 0], pairs[on, 2]
         for k in range(foot.shape[0]):
             foot[k] = start[0, k]
         return 0.0, 1, True
+    if shortest < _SHORTEST:  # squares of its lengths underflow
+        return -1.0, n, False
     n = retain_below(candidates, n, most)
     if is_unsure or n == 0:
         return (np.inf if n == 0 and goal.limit < np.inf else -1.0), n, False

@@ -61,6 +61,7 @@ def boxes_toward(
     box = [load(boxes, BOX_ROWS * node + k) for k in range(BOX_ROWS)]
     along, reach = dot((x, y, z), box[:3]), dot((abs(x), abs(y), abs(z)), box[3:])
     low = -(along + reach) - margin
+    low = select(low <= np.inf, low, -np.inf)  # no number: 0 along an axis times an infinite width
     store(bounds, row, low)
     return _least_lanes(low)
 

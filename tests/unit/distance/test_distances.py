@@ -314,6 +314,27 @@ def test_points_in_the_plane_of_a_tiny_surface_far_out() -> None:
     faces = np.concatenate([starts + np.array([0, 4, 5]), starts + np.array([0, 5, 1])])
     vertices, points = flat * 1e-200, draw.normal(size=(8, 3))
     vertices[:, 0] = points[:, 0] = 1e200
-    made = engine.distances(points, engine.Surface(vertices, faces))
+    surface = engine.Surface(vertices, faces)
+    made = np.asarray(engine.distances(points, surface))
+    for point, distance in zip(points, made.tolist(), strict=True):
+        above, below = (float(np.nextafter(distance, way)) for way in (np.inf, 0.0))
+        assert [bool(engine.distances(point[None], surface, within=d)[0]) for d in (above, below)] == [True, False]
     vertices[:, 0] = points[:, 0] = 0.0
-    assert np.array_equal(np.asarray(made), engine.distances(points, engine.Surface(vertices, faces)))
+    assert np.array_equal(made, engine.distances(points, engine.Surface(vertices, faces)))
+
+
+def test_within_is_exact_where_squares_underflow() -> None:
+    """Both were True, as was 2.3789564940851e-130: over coordinates of 8e192 such lengths are below all doubles."""
+    corners = [[4.2658214930176924e-148, 1.873690219446276e-148], [1.8716041872474847e-151, 4.310389764352137e-152],
+               [6.595870684569362e-150, 7.455571912710052e-150]]  # fmt: skip
+    flat = 8.460908021322254e192
+    surface = engine.Surface([[*corner, flat] for corner in corners], [[0, 1, 2]])
+    point = [1.593739625415637e-130, 1.7661902522463715e-130, flat]
+    faces = [[[Fraction(x) for x in corner] for corner in surface.vertices.tolist()]]
+    square = min(sum(((Fraction(x) - y) ** 2 for x, y in zip(point, corner)), Fraction(0)) for corner in faces[0])
+    for limit in (2.3789564940851853e-130, 2.378956494085185e-130, 2.378956494085186e-130, 2.3789564940851e-130):
+        assert engine.distances([point], surface, within=limit).tolist() == [square <= Fraction(limit) ** 2]
+    assert {bool(engine.distances([point], surface, within=limit)[0]) for limit in (2.38e-130, 2.37e-130)} == {
+        True,
+        False,
+    }
