@@ -162,7 +162,7 @@ def _value(planes: FloatArray, face: int, point: FloatArray, at: int) -> tuple[f
 def _find_sides(
     planes: FloatArray, n_planes: int, placed: FloatArray, n: int, exact: FloatArray, at: int, sides: FloatArray
 ) -> bool:
-    """Fill sides (n_planes, n) with 1.0 or -1.0 for corners that are surely inside or outside, 0.0 for others or, where
+    """Fill sides (n_planes, n) with 1.0 or -1.0 for corners that are certainly inside or outside, 0.0 for others or, where
     it is sure, on a plane; return whether all lie outside one of the planes, or on it."""
     for face in range(n_planes):
         axis, is_beside = int(planes[face, _AXIS]), True
@@ -300,7 +300,7 @@ def _has_axis(
     placed: FloatArray, n: int, corners: IntArray, rings: IntArray, faces: tuple[int, int], others: FloatArray,
     n_others: int, other_faces: tuple[int, int], margin: float,
 ) -> bool:  # fmt: skip
-    """Return whether a plane at right angles to an edge of each body surely has them on different sides. margin: a
+    """Return whether a plane at right angles to an edge of each body certainly has them on different sides. margin: a
     bound on the error of a product, over the size of the direction."""
     for ring in range(faces[0], faces[1]):
         for start in range(rings[ring], rings[ring + 1]):

@@ -98,12 +98,13 @@ export class Lens {
 
   // Pixels a unit: from the whole body at depth 0 to the lattice of doubles at depth 1, in equal ratios.
   scale() {
-    const { width, height } = panes(this.canvas, 2)[0], side = Math.min(width, height), { size, step } = this.seen;
-    const first = side / (1.2 * size), last = (0.72 * side) / ((2 * REACH + 1) * step);
+    const { size, step } = this.seen, side = this.side(), first = this.widest(), last = (0.72 * side) / ((2 * REACH + 1) * step);
     return first * (last / first) ** this.depth;
   }
 
-  times() { return this.seen ? this.scale() * this.seen.size * 1.2 / Math.min(...["width", "height"].map((name) => panes(this.canvas, 2)[0][name])) : 1; }
+  side() { const { width, height } = panes(this.canvas, 2)[0]; return Math.min(width, height); }
+  widest() { return this.side() / (1.2 * this.seen.size); }
+  times() { return this.seen ? this.scale() / this.widest() : 1; }
 
   draw() {
     const { canvas, context, seen } = this, ratio = window.devicePixelRatio || 1;

@@ -43,7 +43,7 @@ export function restore(said, state, views, solidOf) {
     const solid = solidOf($(name).value), text = said[`${name}-rings`];
     if (!text && !solid.isEdited) continue;
     try {
-      const rings = text ? JSON.parse(text) : solid.first;
+      const rings = text ? JSON.parse(text) : solid.original;
       solid.rings.splice(0, solid.rings.length, ...rings.map((ring) => ring.map((p) => p.slice(0, 2).map(Number))));
       Object.assign(solid, { isEdited: Boolean(text), placed: null, asked: solid.json });
     } catch { fault = "the link holds rings that cannot be read; the example is shown"; }

@@ -88,7 +88,7 @@ function completed(solid) {
   else if (solid.drawn) solid.rings = solid.drawn;
   if (json.type === "sphere") Object.assign(solid, { center: json.center, radius: json.radius });
   if (json.type === "half_space") Object.assign(solid, { normal: json.normal, offset: json.offset });
-  Object.assign(solid, { asked: json, first: structuredClone(solid.rings) });
+  Object.assign(solid, { asked: json, original: structuredClone(solid.rings) });
   return solid;
 }
 
@@ -256,8 +256,8 @@ async function look(now, body, compared, differing) {
   const [exact, plain] = await Promise.all([ask("/v1/contains", JSON.stringify({ ...body, points })), ask("/v1/compare", JSON.stringify({ ...compared, points }))]);
   const on = new Set(exact.answer.boundary), wrong = new Set(plain.answer.differing), size = 2.6 / now.frame.scale;
   const places = points.map((point, i) => {
-    const isIn = exact.answer.contained[i], told = isIn !== wrong.has(i) ? "inside" : "outside";
-    return [...axes.map((k) => point[k] - p[k]), on.has(i) ? "boundary" : isIn ? "inside" : "outside", told, wrong.has(i)];
+    const isIn = exact.answer.contained[i], plainly = isIn !== wrong.has(i) ? "inside" : "outside";
+    return [...axes.map((k) => point[k] - p[k]), on.has(i) ? "boundary" : isIn ? "inside" : "outside", plainly, wrong.has(i)];
   });
   lens.open({ p, axes, lines, places, step, size }, cssColors());
   $("verdict").textContent = `Plain float64 is wrong at ${wrong.size} of the ${points.length} doubles around this point`;
@@ -430,8 +430,9 @@ function undo(said) {
   refresh();
 }
 $("undo").addEventListener("click", () => undo(past.back()));
+const isWriting = ({ tagName, type }) => /^(TEXTAREA|INPUT)$/.test(tagName) && type !== "range" && type !== "radio";
 addEventListener("keydown", (event) => {
-  if (!(event.ctrlKey || event.metaKey) || /^(TEXTAREA|INPUT)$/.test(event.target.tagName) && event.target.type !== "range" && event.target.type !== "radio") return;
+  if (!(event.ctrlKey || event.metaKey) || isWriting(event.target)) return;
   const key = event.key.toLowerCase();
   if (key !== "z" && key !== "y") return;
   event.preventDefault();
@@ -448,7 +449,7 @@ $("stage").addEventListener("drop", (event) => {
   else takeText(event.dataTransfer.getData("text"), "what was dropped");
 });
 addEventListener("paste", (event) => {
-  if (/^(TEXTAREA|INPUT)$/.test(event.target.tagName) && event.target.type !== "range" && event.target.type !== "radio") return;
+  if (isWriting(event.target)) return;
   if (event.clipboardData.files.length) openAll([...event.clipboardData.files]);
   else takeText(event.clipboardData.getData("text"), "what was pasted");
 });
