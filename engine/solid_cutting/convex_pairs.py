@@ -162,8 +162,8 @@ def _value(planes: FloatArray, face: int, point: FloatArray, at: int) -> tuple[f
 def _find_sides(
     planes: FloatArray, n_planes: int, placed: FloatArray, n: int, exact: FloatArray, at: int, sides: FloatArray
 ) -> bool:
-    """Fill sides (n_planes, n) with 1.0 or -1.0 for corners that are certainly inside or outside, 0.0 for others or, where
-    it is sure, on a plane; return whether all lie outside one of the planes, or on it."""
+    """Fill sides (n_planes, n) with 1.0 or -1.0 for corners that are certainly inside or outside, 0.0 for others or,
+    where it is certain, on a plane; return whether all lie outside one of the planes, or on it."""
     for face in range(n_planes):
         axis, is_beside = int(planes[face, _AXIS]), True
         is_sharp = axis >= 0 and exact[at + axis] > 0.0

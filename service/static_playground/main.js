@@ -234,23 +234,22 @@ async function once() {
     $("method").replaceChildren(...other.methods.map((name) => new Option(name, name, false, name === other.method)));
   }
   const figures = { ...question.figures(now, answer, other), ...also?.figures };
-  $("verdict").textContent = question.verdict(now, answer, figures, other);
   showFigures(figures, answer.accuracy, timing, seconds, items);
   showPicture(now, [...question.draw(now, answer, body, other), ...(also?.items ?? [])]);
   showLabels(question.labels?.(answer, other) ?? []);
-  await look(now, body, next?.body, other?.differing ?? []);
+  await look(now, body, next?.body, other?.differing ?? [], question.verdict(now, answer, figures, other));
   fillText();
   saveState();
 }
 
-// The lens: the doubles around one of the points that the plain method gets wrong.
-async function look(now, body, compared, differing) {
+// The verdict; or the lens and its own: the doubles around one of the points that the plain method gets wrong.
+async function look(now, body, compared, differing, words) {
   $("to-lens").hidden = !differing.length || now.lens !== null;
   const isOpen = now.lens !== null && differing.length > 0;
   for (const id of ["lens", "lens-bar"]) $(id).hidden = !isOpen;
   $("view3d").hidden = now.dimension !== 3 || isOpen;
   $("view2d").hidden = now.dimension !== 2 || isOpen;
-  if (!isOpen) { lens.close(); return; }
+  if (!isOpen) { lens.close(); $("verdict").textContent = words; return; }
   const p = body.points[differing[now.lens % differing.length]], solid = now.dimension === 2 ? { rings: body.solid.rings } : now.first;
   const { axes, lines } = boundaryNear(solid, p), { points, step } = lattice(p, axes);
   const [exact, plain] = await Promise.all([ask("/v1/contains", JSON.stringify({ ...body, points })), ask("/v1/compare", JSON.stringify({ ...compared, points }))]);
