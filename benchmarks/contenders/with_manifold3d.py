@@ -40,9 +40,13 @@ def _read(pair: Any) -> Any:
 
 
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
-    """Of polygons of several rings."""
+    """Of single rings; of polygons of several. What it cannot read ends the process."""
     box = rings_of(region)
-    return Prepared(each_or_nan(lambda rings: _combined(_read((rings, box)), "intersection").area()))
+
+    def area(rings: Any) -> float:
+        return float(_combined(_read((rings if isinstance(rings, list) else [rings], box)), "intersection").area())
+
+    return Prepared(each_or_nan(area))
 
 
 def _solids(pair: Couple) -> list[Manifold]:
