@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks import filed
 from benchmarks.measure import interval, spread
 from benchmarks.table import named
-from benchmarks.web_page import OURS, error_share, failing, faults, key_of, percent, questions, shown, times
+from benchmarks.web_page import OURS, error_share, failing, faults, key_of, percent, questions, shown, times, tone
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
@@ -60,9 +60,10 @@ def _weaknesses(contests: dict[str, list[Row]]) -> str:
         else f"**Wrong answers of {OURS}: 0 of {judged:,}.**"
     ]
     lines += [f"- {key_of(row)}: {row['errors']}" for row in wrong]
-    fastest = [(key, rows[0], max(rows, key=lambda row: row["rate"])) for key, rows in contests.items()]
+    fastest = [(key, rows[0], max((row for row in rows if row is rows[0] or not row["contender"].startswith("ours")),
+                                    key=lambda row: row["rate"])) for key, rows in contests.items()]  # fmt: skip
     slower = sorted(((best["rate"] / max(own["rate"], 1e-9), key, best) for key, own, best in fastest
-                     if best is not own), key=lambda each: -each[0])  # fmt: skip
+                     if tone(own["rate"] / best["rate"]) == "slower"), key=lambda each: -each[0])  # fmt: skip
     right = [each for each in slower if not failing(each[2])]
     for title, listed in (("faster and never wrong here", right), ("faster", [e for e in slower if failing(e[2])])):
         lines.append(f"\n**Where another is {title}** (gross; the fastest of each contest, with its errors):\n")

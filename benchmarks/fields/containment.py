@@ -95,8 +95,9 @@ def shifted(points: np.ndarray, size: float | np.ndarray, step: float) -> np.nda
 
 
 def nearness(points: np.ndarray, subject: Any) -> float | None:
-    """Return how far points are from the boundary of a body: the median, of the largest side of their box."""
-    if isinstance(subject, engine.Triangle):  # stands for the prism over it
+    """Return how far points are from the boundary of a body: the median, of the largest side of their box; None where
+    a body stands for more than itself, as a triangle for the prism over it, and planes for their half-spaces."""
+    if isinstance(subject, engine.Triangle | engine.Convex):
         return None
     away = engine.distances(points, solid_of(subject), to="boundary")
     return float(np.median(away) / np.ptp(points, axis=0).max())

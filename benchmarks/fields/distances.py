@@ -69,9 +69,10 @@ def _hard(size: Size, name: str, gap: float) -> Contest:
         return other, _exact(other, mesh)
 
     about = f"{len(mesh.faces)} faces, points off them by {gap:g} of the radius before rounding"
-    return Contest("distances", name, True, points, _exact(points, mesh), distances,
+    exact = _exact(points, mesh)
+    return Contest("distances", name, True, points, exact, distances,
                    field_of("point distances", mesh, tuple(PEERS), 1), about, request=partial(_asked, mesh, points),
-                   moved=None if gap else moved, near=gap)  # fmt: skip
+                   moved=None if gap else moved, near=float(np.median(exact)) / 2.0)  # fmt: skip
 
 
 def _within(size: Size) -> Contest:

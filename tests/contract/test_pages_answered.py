@@ -62,6 +62,8 @@ def is_shown(path: str, answer: dict[str, Any], exact: Any) -> bool:
             return answer["contained"] == [bool(exact)]
         case "/v1/collide":
             return (answer["collisions"][0]["relation"] != "disjoint") == bool(exact)
+        case "/v1/distances":
+            return answer["within"] == [bool(exact)] if "within" in answer else answer["distances"] == [exact]
         case "/v1/clearance":
             return answer["clearances"][0]["distance"] == exact
         case "/v1/clip/segments":
