@@ -28,7 +28,7 @@ from engine.segment_clipping.on_boundary.boundary_cut import sort_crossings
 from engine.segment_clipping.on_boundary.contacts import CROSSED, Bit, Kind, Place, are_same_point, decode_place
 from engine.segment_clipping.on_boundary.crossing_values import Vector, cross_exactly, dot, is_item_safe, normal_of
 from engine.segment_clipping.on_boundary.mesh_contacts import Waiting, append_contacts
-from engine.segment_clipping.on_boundary.triangle_contacts import corner, triangle_at
+from engine.segment_clipping.on_boundary.triangle_contacts import are_flush, corner, triangle_at
 from engine.segment_clipping.pieces import put_point, slack_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, IntArray, Point3
 
@@ -97,6 +97,16 @@ def _collect_crossings(mesh: PlacedMesh, p: Point3, q: Point3, blur: float, is_a
 
 
 @inline
+def _are_one_point(mesh: PlacedMesh, cuts: Any, first: int, second: int) -> bool:
+    """Return whether two crossings that round alike are proven to be one point: by their codes, or of triangles in one
+    plane, which the segment crosses if it passes the inside of one."""
+    code, its = cuts.codes[first], cuts.codes[second]
+    if are_same_point(mesh.elements, cuts.met[first], code, cuts.met[second], its):
+        return True
+    return (code == CROSSED or its == CROSSED) and are_flush(mesh.elements, cuts.met[first], cuts.met[second])
+
+
+@inline
 def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_closed: bool) -> int:
     """Merge those of n sorted crossings that are one point; return the number of crossings left, or UNSURE. is_in: the
     segment starts inside. Where the location does not flip, the segment touches a closed mesh from outside in a point
@@ -109,9 +119,7 @@ def _merge_touches(mesh: PlacedMesh, scratch: Scratch, n: int, is_in: bool, is_c
         first, turns = order[begin], False
         if place < n and cuts.t[order[place]] == cuts.t[first]:
             other = order[place]
-            if not are_same_point(
-                mesh.elements, cuts.met[first], cuts.codes[first], cuts.met[other], cuts.codes[other]
-            ):
+            if not _are_one_point(mesh, cuts, first, other):
                 return UNSURE
             continue
         for rank in range(begin, place):
@@ -220,11 +228,9 @@ def crossings_in(
     for i in range(n_met):
         if not _cut_at(mesh, segments, item, i, frame, scratch):
             return UNSURE, False
-    touches = False
+    touches = not sort_crossings(scratch.cuts, n_met)
     for i in range(n_met):
         touches |= scratch.cuts.codes[i] != CROSSED
-    if not sort_crossings(scratch.cuts, n_met) and not touches:
-        return UNSURE, False
     return (_merge_touches(mesh, scratch, n_met, is_in, is_closed) if touches else n_met), is_in
 
 

@@ -28,7 +28,7 @@ from engine.segment_clipping.on_boundary.contacts import Kind, Place, are_same_p
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, local_segment, shear_of
 from engine.segment_clipping.on_boundary.prepared_boundary import Mesh
-from engine.segment_clipping.on_boundary.triangle_contacts import corner
+from engine.segment_clipping.on_boundary.triangle_contacts import are_flush, corner
 from engine.types import OPEN, FlagArray, FloatArray, IntArray, Point3
 
 ALL, FIRST, ANY, NEAR = 0, 1, 2, 3
@@ -187,7 +187,8 @@ def _write_hits(
     mesh: Mesh, rims: FlagArray, cuts: Crossings, n: int, keep: int, source: int, out: Rows, row: int
 ) -> int:
     """Write the hits that n contacts make to `out` from `row` on, with FIRST the first; return the next row, or UNSURE
-    if contacts that are not proven apart may be different points."""
+    if contacts that are not proven apart may be different points. The line lies in the plane of no triangle that it has
+    a contact with, so it meets triangles of one plane in one point."""
     cuts.order[0] = 0
     if n > 1:
         _sort(cuts, n)
@@ -198,7 +199,10 @@ def _write_hits(
         while place < n and not _are_apart(cuts, cuts.order[place], first):
             i = cuts.order[place]
             element, code = cuts.met[i], cuts.codes[i]
-            if i != first and not are_same_point(mesh.elements, cuts.met[first], cuts.codes[first], element, code):
+            if i != first and not (
+                are_same_point(mesh.elements, cuts.met[first], cuts.codes[first], element, code)
+                or are_flush(mesh.elements, cuts.met[first], element)
+            ):
                 return UNSURE
             turns ^= code & 1
             if decode_place(code) < Place.START:

@@ -249,3 +249,11 @@ def corner(elements: FloatArray, element: int, place: int) -> Point3:
 def triangle_at(elements: FloatArray, element: int) -> tuple[Point3, Point3, Point3]:
     """Return the corners of triangle ``element`` (k, 3, 3)."""
     return corner(elements, element, 0), corner(elements, element, 1), corner(elements, element, 2)
+
+
+@called
+def are_flush(elements: FloatArray, first: int, second: int) -> bool:
+    """Return whether two triangles are proven to lie in one plane. The caller guarantees that the first has an area."""
+    a, b, c = triangle_at(elements, first)
+    d, e, f = triangle_at(elements, second)
+    return orient3d(a, b, c, d) == 0 and orient3d(a, b, c, e) == 0 and orient3d(a, b, c, f) == 0

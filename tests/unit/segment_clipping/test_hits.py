@@ -84,11 +84,15 @@ def meshes() -> dict[str, tuple[Any, Any]]:
     plain = grid * [1, 1, 0]
     soup = draw.integers(-3, 4, (12, 3)).astype(float), [draw.choice(12, 3, False).tolist() for _ in range(12)]
     half = np.vstack([grid, (grid[0] + grid[4]) / 2, grid[0]])
+    stack = np.concatenate([cube[0], np.add(cube[0], [4, 0, 0]), np.add(cube[0], [0, 4, 0])])
+    stacked = stack, [[8 * k + i for i in each] for k in range(3) for each in cube[1]]  # faces flush
+    turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
     odd = [*tin, tin[0], [0, 16, 5], [0, 16, 4], [0, 17, 4]]  # twice, cut elsewhere, without area, a side of no length
     return {
         "cube": cube, "terrain": (grid, tin), "plane": (plain, tin), "soup": soup, "odd": (half, odd),
         "stretched": (grid * [1.0, 2.0**-30, 12345.678], tin), "far": (0.1 * half + [1e6, -1e6, 1e6], odd),
         "denormal": (5e-324 * cube[0], cube[1]), "huge": (1e300 * cube[0], cube[1]), "decimal": (cube[0] / 3, cube[1]),
+        "stacked": stacked, "turned": (stacked[0] @ turn, stacked[1]),
     }  # fmt: skip
 
 
@@ -108,6 +112,18 @@ def lines_through(vertices: Any, triangles: Any, n: int, seed: int) -> Any:
              (a, a)][k % 9]
         )  # fmt: skip
     return np.array(found) + 0.0
+
+
+@pytest.mark.parametrize("name", ["stacked", "turned"])
+def test_flush_faces_are_crossed_without_integers(name: str) -> None:
+    surface, draw = engine.Surface(*MESHES[name]), np.random.default_rng(3)
+    centre, size = surface.vertices.mean(axis=0), np.ptp(surface.vertices, axis=0).max()
+    lines = centre + size * draw.uniform(-1, 1, (200, 2, 3))
+    found, accuracy = engine.hits(lines, surface, report=True)
+    assert accuracy.n_rational == 0
+    assert len({*zip(found.source.tolist(), found.t.tolist())}) == len(found)  # two sheets are one hit
+    _, accuracy = engine.Scene([surface]).clip_segments(lines, report=True)
+    assert accuracy.n_rational == 0
 
 
 @pytest.mark.parametrize("is_ray", [False, True])
