@@ -21,6 +21,12 @@ os.environ.setdefault("GEOMETRY_WORKERS", "1")  # services that tests start have
 WHOLE_SUITE = 4000
 """Tests from which on a run will need nearly every kernel."""
 
+LONGEST = (
+    "test_wheel", "test_live", "test_warmup", "test_jit", "test_registry", "test_deadlines_in_process", "test_types",
+    "test_start", "test_site", "test_detail", "test_distributed", "test_jobs", "test_schemathesis", "test_size",
+)  # fmt: skip
+"""Files that take 10 s and more: begun first, so that at the end no process is left alone with one."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--full", action="store_true", help="run the large samples too (minutes to hours)")
@@ -40,6 +46,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             left_out |= {*group[group[0].get_closest_marker("some").args[0] :]}  # type: ignore[union-attr]
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
+    items.sort(key=lambda item: LONGEST.index(item.path.stem) if item.path.stem in LONGEST else len(LONGEST))
     for item in items:
         if item.get_closest_marker("data") and not DATA.is_dir():
             item.add_marker(pytest.mark.skip(reason=f"no shared data at {DATA}"))
