@@ -112,13 +112,14 @@ def build_bvh(boxes: FloatArray) -> Bvh:
         while state[0] > 0:  # bound: each turn ends a node
             poll()
             _build_binary_tree(items, halves, stack, state)
-        nodes, child = np.empty((state[1], 6, WIDTH), np.float32), np.empty((state[1], WIDTH), np.int32)
+        room = int(state[1])  # a bound; what is left untouched takes no memory
+        nodes, child = rows_of((room, 6, WIDTH), np.float32), rows_of((room, WIDTH), np.int32)
         stack[0], state[:] = 0, 1
         while state[0] > 0:  # bound: each turn fills a node
             poll()
             _collapse_to_eight(items, halves, nodes, child, stack, state)
     origin.setflags(write=False)
-    return Bvh(cache_aligned(nodes[: state[1]]), cache_aligned(child[: state[1]]), origin, scale)
+    return Bvh(read_only(nodes[: state[1]]), read_only(child[: state[1]]), origin, scale)
 
 
 def build_stretched_bvh(boxes: FloatArray) -> tuple[Bvh, FloatArray, FloatArray]:
@@ -151,9 +152,14 @@ def _stretch(boxes: FloatArray, stretch: FloatArray) -> None:
             boxes[item, 3 + axis] *= stretch[axis]
 
 
+def rows_of(shape: tuple[int, ...], dtype: Any) -> Any:
+    """Return an uninitialised array, aligned to a cache line unless it has few rows."""
+    return aligned(shape, dtype) if shape[0] > _FEW_ROWS else np.empty(shape, dtype)
+
+
 def cache_aligned(array: Any) -> Any:
     """Return a read-only copy of an array, aligned to a cache line unless it is small."""
-    aligned_copy = aligned(array.shape, array.dtype) if len(array) > _FEW_ROWS else np.empty_like(array)
+    aligned_copy = rows_of(array.shape, array.dtype)
     aligned_copy[:] = array
     aligned_copy.setflags(write=False)
     return aligned_copy
@@ -258,7 +264,8 @@ def _collapse_to_eight(
     / 8 nodes. stack: (binary node, node to be filled). state (2,): length of the stack, and number of nodes filled or
     on it, read and written."""
     n_stack, n_nodes = state[0], state[1]
-    gathered, left, runs = np.empty(WIDTH, np.int64), halves.left, halves.runs
+    gathered, areas = np.empty(WIDTH, np.int64), np.empty(WIDTH, np.float32)
+    left, runs = halves.left, halves.runs
     for _ in range(_WORK // WIDTH):
         if n_stack == 0:
             break
@@ -266,26 +273,27 @@ def _collapse_to_eight(
         half, node = stack[n_stack, 0], stack[n_stack, 1]
         for lane in range(WIDTH):
             child[node, lane] = EMPTY
-            boxes[node, :3, lane] = 0.0
-            boxes[node, 3:, lane] = UNUSED
+            for row in range(6):
+                boxes[node, row, lane] = 0.0 if row < 3 else UNUSED
         if left[half] < 0:
             for place in range(runs[half, 0], runs[half, 1]):
                 lane = place - runs[half, 0]
                 child[node, lane] = -1 - items.order[place]
                 _set_lane(boxes, node, lane, items.boxes, place)
             continue
-        gathered[0], gathered[1] = left[half], left[half] + 1
-        n_gathered = 2
-        for _ in range(WIDTH - 2):
+        n_gathered, largest = 1, 0
+        gathered[0] = half
+        while largest >= 0 and n_gathered < WIDTH:
+            opened = left[gathered[largest]]
+            for place in (largest, n_gathered):
+                gathered[place], is_open = opened, left[opened] >= 0
+                areas[place] = _half_area(halves.boxes, opened) if is_open else np.float32(-1.0)
+                opened += 1
+            n_gathered += 1
             largest, area = -1, np.float32(-1.0)
             for lane in range(n_gathered):
-                if left[gathered[lane]] >= 0 and _half_area(halves.boxes, gathered[lane]) > area:
-                    largest, area = lane, _half_area(halves.boxes, gathered[lane])
-            if largest < 0:
-                break
-            opened = left[gathered[largest]]
-            gathered[largest], gathered[n_gathered] = opened, opened + 1
-            n_gathered += 1
+                if areas[lane] > area:
+                    largest, area = lane, areas[lane]
         for lane in range(n_gathered):
             child[node, lane] = n_nodes
             _set_lane(boxes, node, lane, halves.boxes, gathered[lane])

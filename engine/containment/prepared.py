@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import Axis, cell_of, make_axis
-from engine.bounding.bvh import WIDTH, build_stretched_bvh, cache_aligned
+from engine.bounding.bvh import WIDTH, build_stretched_bvh, rows_of
 from engine.compiling.jit import entry_of, inline, kernel
 from engine.containment.methods.polygon_ray_parity import MIXED, Rings, locate_in_runs
 from engine.containment.methods.polyhedron_ray_parity import fill_triangle_boxes, reorder_by_tree
@@ -271,11 +271,12 @@ def _build_tree(solid: Polyhedron, check: Check) -> TriangleTree:
     low, high = (float(x.min()), float(y.min()), float(z.min())), (float(u.max()), float(v.max()), float(w.max()))
     tree, origin, scale = build_stretched_bvh(boxes)
     check()
-    child, blocks = np.empty_like(tree.child), np.zeros((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
+    child, blocks = np.empty_like(tree.child), rows_of((len(tree.child), OVERHEAD_ROWS, WIDTH), np.float32)
+    blocks[:] = 0.0
     reorder_by_tree(solid.vertices, solid.triangles, tree, origin, scale, child, triangles, blocks)
     check()
     places = tuple(origin.tolist()), tuple(scale.tolist()), low, high
-    return TriangleTree(solid.vertices, triangles, tree.boxes, child, cache_aligned(blocks), *places)
+    return TriangleTree(solid.vertices, triangles, tree.boxes, child, read_only(blocks), *places)
 
 
 def tree_row(tree: TriangleTree) -> tuple[tuple[int, ...], tuple[int, ...], tuple[float, ...]]:
