@@ -212,6 +212,8 @@ def _sentence(item: Any, parent: Any) -> str:
         return "a solid is an object with a field 'type' that names what it is, for example 'sphere'"
     if item["type"] in ("model_type", "model_attributes_type"):
         return "expected a JSON object"
+    if item["type"] == "value_error":
+        return str(item["ctx"]["error"])
     return str(item["msg"]).replace("Input should be", "expected")
 
 

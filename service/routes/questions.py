@@ -149,10 +149,16 @@ def clearance(question: ClearanceRequest, call: CallOf) -> ClearanceResponse:
 
 @router.post("/v1/distances", operation_id="distances", tags=["clearance"])
 def distances(question: DistancesRequest, call: CallOf) -> DistancesResponse:
-    """Tell for each point how far it is from the solid, with a sign if wanted; whether at most a distance; or the
-    nearest points too."""
-    solid = questions.to_solid(question.solid, call, ("solid",))
-    points = questions.to_items(question.points, solid.dimension, call)
+    """Tell for each point how far it is from the solid or the lines, with a sign if wanted; whether at most a distance;
+    or the nearest points too."""
+    solid: Any
+    if question.lines is None:
+        solid = questions.to_solid(question.solid, call, ("solid",))
+        dimension = solid.dimension
+    else:
+        lines = questions.to_items(question.lines, 2, call)
+        solid, dimension = {"type": "MultiLineString", "coordinates": list(lines)}, 2
+    points = questions.to_items(question.points, dimension, call)
     options: dict[str, Any] = {"to": question.to or "solid", "within": question.within}
     options |= {"signed": bool(question.signed), "nearest": bool(question.nearest)}
     if question.pose is not None:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from service.schemas.arrays import DIMENSION, POINTS, Array, Axis, Numbers
 from service.schemas.base import Accuracy, AtMost, Count, Schema, optional, with_example
+from service.schemas.geojson import OrGeoJson
 from service.schemas.solids import (
     Body,
     Booleans,
@@ -97,9 +98,13 @@ class DistancesRequest(Schema):
             "to": "boundary",
             "nearest": True,
         },
+        {"lines": [[[0, 0], [4, 0], [4, 3]], [[9, 9], [9, 5]]], "points": [[5, 1], [8, 9]], "nearest": True},
     )
 
-    solid: Solid = Field(description="Neither implicit nor csg; a triangle of space is flat here.")
+    solid: Solid = optional("Neither implicit nor csg; a triangle of space is flat here. Either this or `lines`.")
+    lines: Annotated[
+        Array, Numbers(Axis(1, "max_points"), Axis(2, "max_points"), DIMENSION, ragged=True), OrGeoJson("LineString")
+    ] = optional("Polylines of the plane, two positions or more each, or GeoJSON of lines: distances from the nearest.")
     points: Points = Field(description="Positions of the solid's dimension, or GeoJSON of points.")
     pose: RigidPose = optional("Where the solid is; where its coordinates have it, unless given.")
     to: Literal["solid", "boundary"] = optional("solid, unless given: points in it are 0 away.")
@@ -108,6 +113,12 @@ class DistancesRequest(Schema):
         "A distance: the answer is then for each point whether it is at most so far away, decided exactly."
     )
     nearest: bool = optional("Also the nearest points, and what of the solid they lie on.")
+
+    @model_validator(mode="after")
+    def _has_one_target(self) -> DistancesRequest:
+        if (self.solid is None) == (self.lines is None):
+            raise ValueError("distances are measured from one of solid and lines; give one of the two")
+        return self
 
 
 class NearestFeature(Schema):

@@ -49,6 +49,43 @@ async def test_nearest_points_with_faces_and_features_under_a_pose(client: httpx
     ]  # fmt: skip
 
 
+WAYS = [[[0, 0], [4, 0], [4, 3]], [[9, 9], [9, 5]]]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [WAYS, {"type": "MultiLineString", "coordinates": WAYS},
+     {"type": "Feature", "geometry": {"type": "MultiLineString", "coordinates": WAYS}, "properties": None}],
+)  # fmt: skip
+async def test_lines_of_the_plane_in_place_of_a_solid(client: httpx.AsyncClient, lines: Any) -> None:
+    question = {"lines": lines, "points": [[5, 1], [9, 12], [12, 9]]}
+    answer = await client.post("/v1/distances", json={**question, "nearest": True})
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["distances"] == [1.0, 3.0, 3.0]
+    assert answer.json()["nearest"] == [[4, 1], [9, 9], [9, 9]]
+    assert answer.json()["features"] == [{"kind": "edge", "indices": [1, 2]}, *[{"kind": "vertex", "indices": [3]}] * 2]
+    answer = await client.post("/v1/distances", json={**question, "within": 2.9999999999999996})
+    assert answer.json()["within"] == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("question", "pointer"),
+    [
+        ({}, ""),
+        ({"lines": WAYS, "solid": BOX}, ""),
+        ({"lines": []}, "/lines"),
+        ({"lines": [WAYS[0], [[1, 1]]]}, "/lines/1"),
+        ({"lines": [[[0, 0, 0], [1, 1, 1]]]}, "/lines/0"),
+        ({"lines": WAYS, "signed": True}, "/signed"),
+    ],
+)
+async def test_what_is_no_target_is_refused(client: httpx.AsyncClient, question: Any, pointer: str) -> None:
+    answer = await client.post("/v1/distances", json={"points": [[1, 1]], **question})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["pointer"] == pointer
+    assert "Value error" not in answer.text
+
+
 @pytest.mark.parametrize(
     ("question", "pointer"),
     [
