@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -15,6 +16,7 @@ from engine.errors import UnsupportedSolidError
 from engine.predicates.error_free import two_diff
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options
+from engine.scenes.near_boxes import near_pairs, scratch_for
 from engine.scenes.posed_cut import _turned
 from engine.scenes.table import _frame_of
 from engine.segment_clipping import hits as on_one
@@ -25,12 +27,14 @@ from engine.solids.checks import as_point_groups
 from engine.solids.columns import Columns
 from engine.solids.pose import Pose
 from engine.solids.registry import refused, row_of
-from engine.types import Accuracy, BoolArray, FloatArray, Int8Array, IntArray, read_only
+from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
 
 if TYPE_CHECKING:
     from engine.scenes.placements import Placements
 
-_ROWS: Final = 1 << 16
+_PAIRS: Final = 1 << 18
+"""Pairs of lines and bodies that are looked at together."""
+_BYTES_OF_PAIR: Final = 40
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -106,28 +110,50 @@ def _on_bodies(lines: Lines, scene: Placements, keep: int, budget: Budget, worke
         if row_of(solid).hits is None:
             error = refused(solid, "hits does not take", lambda row: row.hits)
             raise UnsupportedSolidError(f"solids[{body}]: {error.message}", ("solids", body))
-    n, parts, starts = len(lines.rows), list[Hits](), dict[int, Any]()
-    met, is_open, near = np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_)
-    bodies: list[IntArray] = []
-    for body, box in enumerate(scene.boxes(budget) if len(scene.base.solids) else ()):
-        _are_near(lines, box, near, budget)
-        items = np.flatnonzero(near > met if keep == ANY else near)
-        if not len(items):
-            continue
-        solid, pose = scene.placed(body)
-        make: Any = row_of(solid).hits
-        target, some = make(solid, budget), _lines_on(lines, items, pose)
-        columns, left = find(some, target, keep, budget, workers)
-        is_open[items[left]] = True
-        if keep == ANY:
-            met[items[columns]] = True
-            continue
-        hits = _with_faces(columns, target, pose, budget)
-        hits.source[:] = items[hits.source]
-        parts.append(hits)
-        bodies.append(np.full(len(hits), body))
-        starts[body] = partial(_exact_start, some, items, target, budget)
-    return (met if keep == ANY else _merged(parts, bodies, starts, keep)), int(is_open.sum())
+    met, is_open = (np.zeros(len(lines.rows), np.bool_) for _ in range(2))
+    merged = [_merged([], [], {}, keep)]
+    for near, groups in _near(lines, scene, budget):
+        parts, bodies, starts = list[Hits](), list[IntArray](), dict[int, Any]()
+        for rows in groups:
+            body, items = int(near[rows[0], 1]), near[rows, 0]
+            items = items[~met[items]]
+            if not len(items):
+                continue
+            solid, pose = scene.placed(body)
+            make: Any = row_of(solid).hits
+            target, some = make(solid, budget), _lines_on(lines, items, pose)
+            columns, left = find(some, target, keep, budget, workers)
+            is_open[items[left]] = True
+            if keep == ANY:
+                met[items[columns]] = True
+                continue
+            hits = _with_faces(columns, target, pose, budget)
+            hits.source[:] = items[hits.source]
+            parts.append(hits)
+            bodies.append(np.full(len(hits), body))
+            starts[body] = partial(_exact_start, some, items, target, budget)
+        merged.append(_merged(parts, bodies, starts, keep))
+    joint = SceneHits(*(np.concatenate([getattr(each, name) for each in merged]) for name in SceneHits.__slots__))
+    return (met if keep == ANY else joint), int(is_open.sum())
+
+
+def _near(lines: Lines, scene: Placements, budget: Budget) -> Iterator[tuple[IntArray, list[IntArray]]]:
+    """Yield, for some lines after others, rows (line, body) of bodies whose boxes a line may meet, and the rows of each
+    body in turn, its lines in order."""
+    n = np.zeros(2, np.int64)
+    if not len(scene.base.solids):
+        return
+    words, scratch = scene.words(budget), scratch_for(scene.n_rows)
+    while n[0] < len(lines.rows):  # bound: each turn takes a line at least
+        room = min(max(_PAIRS, scene.n_rows), scene.n_rows * (len(lines.rows) - int(n[0])))
+        budget.take(_BYTES_OF_PAIR * room)
+        pairs = np.empty((room, 2), np.int64)
+        entry_of(near_pairs)(lines.rows, lines.is_ray, words, scratch, budget.flag, pairs, n)
+        budget.check()
+        near = pairs[: n[1]]
+        near[:, 1] = scene.names_of(near[:, 1])
+        order = np.argsort(near[:, 1], kind="stable")
+        yield near, np.split(order, np.flatnonzero(np.diff(near[order, 1])) + 1) if len(near) else []
 
 
 def _lines_on(lines: Lines, items: IntArray, pose: Pose | None) -> Lines:
@@ -193,23 +219,6 @@ def _merged(parts: list[Hits], bodies: list[IntArray], starts: dict[int, Any], k
     if keep == FIRST:
         order = order[np.append(True, source[order][1:] != source[order][:-1])[: len(order)]]
     return SceneHits(source[order], body[order], *(column[order] for column in others))
-
-
-def _are_near(lines: Lines, box: FloatArray, near: BoolArray, budget: Budget) -> None:
-    """Set near (n,) to whether each line may meet a box (2, 3): slabs, widened by far more than rounds here; what is no
-    number separates nothing."""
-    for first in range(0, len(near), _ROWS):
-        budget.check()
-        p, q = lines.rows[first : first + _ROWS].swapaxes(0, 1)
-        with np.errstate(all="ignore"):
-            slack, way = 2.0**-40 * np.maximum(abs(p), abs(box).max(axis=0)) + 2.0**-1000, q if lines.is_ray else q - p
-            low, high = box[0] - slack - p, box[1] + slack - p
-            way = np.where(np.isfinite(way), way, np.nan)
-            ends = np.stack([low / way, high / way])
-            enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
-            is_apart = (enter - leave > 2.0**-40 * (abs(enter) + abs(leave)) + 2.0**-1000) | (leave < 0.0)
-            is_apart |= ((way == 0.0) & ((low > 0.0) | (high < 0.0))).any(axis=1)
-            near[first : first + _ROWS] = ~(is_apart | (enter > (np.inf if lines.is_ray else 1.0)))
 
 
 @kernel

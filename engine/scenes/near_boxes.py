@@ -16,9 +16,10 @@ from engine.compiling.jit import inline, kernel, merged
 from engine.lanes.boxes import BOX_ROWS, EMPTY, enter_boxes, inside_box
 from engine.lanes.lanes import array_at, lowest_bit
 from engine.segment_clipping.on_boundary.boundary_cut import Crossings
-from engine.segment_clipping.on_boundary.mesh_contacts import Way, local_segment
+from engine.segment_clipping.on_boundary.mesh_contacts import LIMIT, Way, local_segment
+from engine.segment_clipping.on_boundary.triangle_contacts import corner
 from engine.segment_clipping.pieces import Pieces, point_of
-from engine.types import FloatArray, Int32Array, IntArray, Point3
+from engine.types import FlagArray, FloatArray, Int32Array, IntArray, Point3
 
 MOST_MET: Final = 512
 """Most triangles of one body that a segment may cross; with more it is UNDECIDED."""
@@ -95,6 +96,8 @@ N_BODIES, LOW, HIGH, N_NODES, BOXES, CHILD, BOUNDED, N_LISTED, LISTED, NUMBERS, 
 NUMBERS: address of (4,), inverse and origin. NAMES: of (n,), indices of moved bodies. PLACED: of the rows of their
 `Table`."""
 _MOST_WAY: Final = 2.0**1000
+_FAR: Final = 2.0**38
+"""Size in tree coordinates from which a line is said to be near every body."""
 _SLACK: Final = 2.0**-20
 """Enlargement of a box in tree coordinates (at most 2 where it matters) that covers its rounding to float32."""
 
@@ -157,8 +160,26 @@ def begin_way(bodies: BodyTree, way: Way, scratch: Scratch) -> None:
 
 
 @inline
-def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last: float, scratch: Scratch) -> int:
-    """Return the next body whose box the segment may enter before parameter `last`, roughly in order of entry,
+def way_of_line(lines: FloatArray, item: int, is_ray: bool, bodies: BodyTree) -> tuple[Way, bool]:
+    """Return line ``item``, two ends or the start and direction of a ray, in the coordinates of a tree, a ray as far as
+    it may meet a box; and whether these are small enough for a `Way`."""
+    x, origin, (p, q) = bodies.inverse, bodies.tree.origin, (corner(lines, item, 0), corner(lines, item, 1))
+    start = Point3(p.x * x - origin[0] * x, p.y * x - origin[1] * x, p.z * x - origin[2] * x)
+    way = Point3(q.x * x, q.y * x, q.z * x)
+    if not is_ray:
+        way = Point3(way.x - p.x * x, way.y - p.y * x, way.z - p.z * x)
+    size, length = max(abs(start.x), abs(start.y), abs(start.z)), max(abs(way.x), abs(way.y), abs(way.z))
+    reach = (size + 4.0 * LIMIT) / length if is_ray and length > 0.0 else 1.0
+    far = Point3(start.x + reach * way.x, start.y + reach * way.y, start.z + reach * way.z)
+    is_small = size < _FAR and reach < np.inf and max(abs(far.x), abs(far.y), abs(far.z)) < 2.0 * _FAR
+    return local_segment(start, far, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.0), is_small
+
+
+@inline
+def next_body(
+    lines: FloatArray, item: int, is_ray: bool, bodies: BodyTree, way: Way, last: float, scratch: Scratch
+) -> int:
+    """Return the next body whose box a segment, or ray, may enter before parameter `last`, roughly in order of entry,
     continuing the traversal of `begin_way`; -1 if there is no more."""
     depths = scratch.depths
     while depths[0] > 0:  # bound: each node, and each body, waits once
@@ -172,7 +193,7 @@ def next_body(segments: FloatArray, item: int, bodies: BodyTree, way: Way, last:
     while depths[1] > 0:
         depths[1] -= 1
         body = bodies.listed[depths[1]]
-        if _in_its_box(segments, item, bodies, body):
+        if _in_its_box(lines, item, is_ray, bodies, body):
             return body
     return -1
 
@@ -186,29 +207,58 @@ def near_bodies(segments: FloatArray, item: int, words: IntArray, room: IntArray
         bodies, n_before = tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
         way = way_of(segments, item, bodies)
         begin_way(bodies, way, scratch)
-        body = next_body(segments, item, bodies, way, np.float32(1.0), scratch)
+        body = next_body(segments, item, False, bodies, way, np.float32(1.0), scratch)
         while body >= 0:
             scratch.near[n_near] = n_before + body
             n_near += side == 1 or not has_moved(words, body)
-            body = next_body(segments, item, bodies, way, np.float32(1.0), scratch)
+            body = next_body(segments, item, False, bodies, way, np.float32(1.0), scratch)
     return n_near
 
 
 @inline
-def _in_its_box(segments: FloatArray, item: int, bodies: BodyTree, body: int) -> bool:
-    """Return whether a segment may meet the box of a body (slab test, in doubles). (box - start) / (end - start) is off
+def _in_its_box(lines: FloatArray, item: int, is_ray: bool, bodies: BodyTree, body: int) -> bool:
+    """Return whether a segment, or ray, may meet the box of a body (slab test, in doubles). (box - start) / way is off
     by 4 units of rounding on each axis, or 2^-1074 on underflow; differences beyond `_MOST_WAY`, which may be infinite,
     decide nothing."""
-    meet, enters, leaves = True, 0.0, 1.0
-    for k in range(segments.shape[2]):
-        start, end = segments[item, 0, k], segments[item, 1, k]
-        low, high = bodies.low[body, k], bodies.high[body, k]
+    meet, enters, leaves = True, 0.0, np.inf if is_ray else 1.0
+    for k in range(lines.shape[2]):
+        start, end = lines[item, 0, k], lines[item, 1, k]
+        low, high, way = bodies.low[body, k], bodies.high[body, k], end if is_ray else end - start
+        if is_ray:
+            end = start if way == 0.0 else np.inf if way > 0.0 else -np.inf
         meet &= (min(start, end) <= high) & (max(start, end) >= low)
-        way = end - start
         if way != 0.0 and abs(way) <= _MOST_WAY:
             first, second = (low - start) / way, (high - start) / way
             enters, leaves = max(enters, min(first, second)), min(leaves, max(first, second))
     return meet and not enters > leaves + 2.0**-48 * (abs(enters) + abs(leaves)) + 2.0**-1000
+
+
+@kernel
+def near_pairs(
+    lines: FloatArray, is_ray: bool, words: IntArray, room: IntArray, stop: FlagArray, pairs: IntArray, n: IntArray
+) -> None:
+    """Fill pairs (k, 2) with each line (m, 2, 3), from number n[0] on, and the bodies whose boxes it may meet, as
+    kernels number them; n (2,) is on return the next line, fewer than m if there is no room, and the number of pairs.
+    words: both rows of `words_of`. room: of `scratch_for`. Caller guarantees room for one line and every body."""
+    scratch, n_all, n[1] = scratch_at(room), words[0, N_BODIES] + words[1, N_BODIES], 0
+    for item in range(n[0], lines.shape[0]):
+        n[0] = item
+        if stop[0] or n[1] + n_all > pairs.shape[0]:
+            return
+        for side in range(1 + (words[1, N_BODIES] > 0)):
+            bodies, n_before = tree_in(words[side], 3), side * words[0, N_BODIES]
+            way, is_small = way_of_line(lines, item, is_ray, bodies)
+            begin_way(bodies, way, scratch)
+            turn = 0
+            while True:  # bound: each body once
+                body = next_body(lines, item, is_ray, bodies, way, np.float32(1.0), scratch) if is_small else turn
+                turn += 1
+                if body < 0 or turn > words[side, N_BODIES]:
+                    break
+                if side == 1 or not has_moved(words, body):
+                    pairs[n[1], 0], pairs[n[1], 1] = item, n_before + body
+                    n[1] += 1
+    n[0] = lines.shape[0]
 
 
 @inline

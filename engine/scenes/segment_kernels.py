@@ -223,7 +223,7 @@ def _search_tree(
     scratch, bodies, n_before = scratch_at(room), tree_in(words[side], segments.shape[2]), side * words[0, N_BODIES]
     way, last = way_of(segments, item, bodies), np.float32(1.0)
     begin_way(bodies, way, scratch)
-    body = next_body(segments, item, bodies, way, last, scratch)
+    body = next_body(segments, item, False, bodies, way, last, scratch)
     while body >= 0:
         if side == 1 or not has_moved(words, body):
             state = _query_body(words, n_before + body, segments, item, is_any, room, stop)
@@ -231,7 +231,7 @@ def _search_tree(
                 return state
             if not is_any:
                 last = _first_hit_bound(scratch, bodies, way)
-        body = next_body(segments, item, bodies, way, last, scratch)
+        body = next_body(segments, item, False, bodies, way, last, scratch)
     return SETTLED
 
 

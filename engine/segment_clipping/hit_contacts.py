@@ -11,7 +11,8 @@ vector product from a compressed expansion is within 8 u^2 of itself, which `dot
 
 Under a pose p and e are double-doubles, off by `blur` at most: each of the six products of a determinant, with factors
 below M, moves by 3 blur (M + blur)^2, all of them by less than `_BLUR` blur (M + blur)^2. A sign that this leaves open,
-and a triangle in the line's plane or without area, are DEGENERATE: exact_hits.py decides.
+and a triangle in the line's plane or without area, are DEGENERATE: exact_hits.py decides. Signs that are proven leave t
+open by as much as v and w are, relative to w: far ends and earlier hits are compared with that in mind.
 
 Source: T. Moller, B. Trumbore, Fast, minimum storage ray/triangle intersection, 1997. Changed: all is exact.
 """
@@ -233,10 +234,11 @@ def triangle_hit(elements: FloatArray, element: int, is_safe: bool, line: Line, 
     wh, wl = dd_add(ab[0], ab[1], bc[0], bc[1])
     wh, wl = dd_add(wh, wl, ca[0], ca[1])
     w = wh, wl, ab[2] + bc[2] + ca[2] + _RELATIVE * abs(wh)
-    t, is_last = v[0] / wh, False
-    if t > most * (1.0 + _NEAR_ONE) or (not line.is_ray and t > 1.0 + _NEAR_ONE):
+    t, is_last, sure = v[0] / wh, False, abs(wh) - w[2]
+    off = 1.01 * (v[2] + abs(t) * w[2]) / sure if sure > 0.0 else np.inf
+    if t - off > most * (1.0 + _NEAR_ONE) or (not line.is_ray and t - off > 1.0 + _NEAR_ONE):
         return _NO_HIT
-    if not line.is_ray and t > 1.0 - _NEAR_ONE:
+    if not line.is_ray and t + off > 1.0 - _NEAR_ONE:
         if line.is_placed:
             return _OPEN_HIT
         q = (line.q.x, 0.0), (line.q.y, 0.0), (line.q.z, 0.0)

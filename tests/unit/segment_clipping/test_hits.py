@@ -150,15 +150,41 @@ def test_equal_to_rationals(name: str, is_ray: bool) -> None:
         assert any_of[k] == bool(rows)
 
 
-def test_poses_are_exact() -> None:
-    turned = engine.Pose.from_quaternion([3, 1, 2, -1], [0.3, -7, 1e3])
-    rotation = [vector(row) for row in turned.rotation.tolist()]
-    surface = engine.Surface(*MESHES["odd"])
-    images = [
+def images_under(pose: engine.Pose, surface: Any) -> list[Any]:
+    """Return the corners of the triangles of a surface under a pose, as fractions."""
+    rotation = [vector(row) for row in pose.rotation.tolist()]
+    return [
         [add(tuple(sum((x * y for x, y in zip(row, vector(corner))), Q(0)) for row in rotation),
-             vector(turned.translation.tolist())) for corner in each]
+             vector(pose.translation.tolist())) for corner in each]
         for each in surface.vertices[surface.triangles].tolist()
     ]  # fmt: skip
+
+
+def test_ends_near_a_placed_surface_of_lines_that_begin_far_away() -> None:
+    """Signs are proven there while t is not: it was taken for less, or more, than 1."""
+    turned, draw = engine.Pose.from_quaternion([3, 1, 2, -1], [0.3, -7, 2]), np.random.default_rng(11)
+    surface = engine.Surface(*MESHES["terrain"])
+    images, scene = images_under(turned, surface), engine.Scene([surface], [turned])
+    corners = np.array([[[float(x) for x in corner] for corner in each] for each in images])
+    targets = np.einsum("nk,nkj->nj", draw.dirichlet([1, 1, 1], 120), corners[draw.integers(len(corners), size=120)])
+    ways = draw.normal(size=(120, 3)) * 10.0 ** draw.uniform(6, 13, (120, 1))
+    beyond = draw.choice([-1, 1], (120, 1)) * 10.0 ** -draw.uniform(0, 8, (120, 1))
+    ends = targets + ways / abs(ways).max(axis=1, keepdims=True) * beyond
+    lines = np.stack([targets + ways, ends], axis=1)
+    found, first, any_of = scene.hits(lines), scene.hits(lines, keep="first"), scene.hits(lines, keep="any")
+    for k, (p, q) in enumerate(lines.tolist()):
+        expected = reference.hits(vector(p), sub(vector(q), vector(p)), False, images, surface.triangle_faces.tolist())
+        rows = [(float(each.t), each.triangle, each.kind) for each in expected]
+        for answer, wanted in ((found, rows), (first, rows[:1])):
+            columns = (answer.t, answer.triangle, answer.kind)
+            assert list(zip(*(column[answer.source == k].tolist() for column in columns))) == wanted
+        assert any_of[k] == bool(rows)
+
+
+def test_poses_are_exact() -> None:
+    turned = engine.Pose.from_quaternion([3, 1, 2, -1], [0.3, -7, 1e3])
+    surface = engine.Surface(*MESHES["odd"])
+    images = images_under(turned, surface)
     corners = np.array([[[float(x) for x in corner] for corner in each] for each in images]).reshape(-1, 3)
     lines = lines_through(corners, np.arange(len(corners)).reshape(-1, 3), 27, 6)
     found = engine.Scene([CUBE, surface], [None, turned]).hits(lines)
