@@ -30,6 +30,7 @@ Source: I. E. Sutherland, G. W. Hodgman, Reentrant polygon clipping, 1974; S. Go
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Final
 
 from engine.compiling.jit import called, inline, kernel
@@ -56,31 +57,38 @@ CORNER: Final = 8
 """Numbers of a corner of a polygon: as placed, then its value (high, low)."""
 _TINY: Final = 2.0**-900
 
+Body = namedtuple("Body", "corners rings placed exact planes sides")
+"""One body of a pair: corners and rings as `overlap_bodies` takes them, the rest filled here.
+
+| field | contents |
+| --- | --- |
+| placed (n, 6) | corners under its pose less the origin |
+| exact (3,) | 1.0 where all of them are exact on an axis |
+| planes (m, 13) | those of its faces |
+| sides (.., ..) | for each plane of the other body the sides of its own corners |
+"""
+
 
 @inline
-def _place(
-    points: FloatArray, first: int, n: int, pose: FloatArray, origin: FloatArray, placed: FloatArray,
-    exact: FloatArray, at: int,
-) -> float:  # fmt: skip
-    """Fill placed (n, 6) with corners under a pose less the origin, exact[at + axis] with 1.0 if all are exact on an
-    axis; return eta."""
+def _place(points: FloatArray, pose: FloatArray, origin: FloatArray, body: Body) -> float:
+    """Fill placed and exact of a body with corners `points`; return eta."""
     eta, is_posed = 0.0, pose[12] != 0.0
     for axis in range(3):
         r = axis * 3
         n_ones = int(abs(pose[r]) == 1.0) + int(abs(pose[r + 1]) == 1.0) + int(abs(pose[r + 2]) == 1.0)
         n_zeros = int(pose[r] == 0.0) + int(pose[r + 1] == 0.0) + int(pose[r + 2] == 0.0)
         is_exact = not is_posed or (n_ones == 1 and n_zeros == 2)
-        for k in range(n):
-            h, low = points[first + k, axis], points[first + k, axis + 3]
+        for k in range(points.shape[0]):
+            h, low = points[k, axis], points[k, axis + 3]
             size = abs(h)
             if is_posed:
                 h = low = size = 0.0
                 for j in range(3):
                     if pose[r + j] != 0.0:
-                        ph, pl = dd_scale(points[first + k, j], points[first + k, j + 3], pose[r + j])
+                        ph, pl = dd_scale(points[k, j], points[k, j + 3], pose[r + j])
                         h, low = dd_add(h, low, ph, pl)
                         size += abs(ph)
-                        is_exact = is_exact and points[first + k, j + 3] == 0.0
+                        is_exact = is_exact and points[k, j + 3] == 0.0
                 h, rest = two_sum(h, pose[9 + axis])
                 low, lost = two_sum(low, rest)
                 is_exact = is_exact and lost == 0.0
@@ -89,10 +97,10 @@ def _place(
             h, rest = two_sum(h, -origin[axis])
             low, lost = two_sum(low, rest)
             is_exact = is_exact and lost == 0.0
-            placed[k, axis], placed[k, axis + 3] = fast_two_sum(h, low)
+            body.placed[k, axis], body.placed[k, axis + 3] = fast_two_sum(h, low)
             if not is_exact:
                 eta = max(eta, 64.0 * U2 * (size + abs(origin[axis])) + abs(lost))
-        exact[at + axis] = 1.0 if is_exact else 0.0
+        body.exact[axis] = 1.0 if is_exact else 0.0
     return eta
 
 
@@ -101,101 +109,101 @@ def _difference(placed: FloatArray, a: int, b: int, axis: int) -> tuple[float, f
     return dd_sub(placed[a, axis], placed[a, axis + 3], placed[b, axis], placed[b, axis + 3])
 
 
+@inline
+def _turn(placed: FloatArray, a: int, b: int, c: int, axis: int) -> tuple[float, float]:
+    """Return (b - a) x (c - a) along an axis, as a double-double."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    ph, pl = dd_mul(*_difference(placed, b, a, i), *_difference(placed, c, a, j))
+    qh, ql = dd_mul(*_difference(placed, b, a, j), *_difference(placed, c, a, i))
+    return dd_sub(ph, pl, qh, ql)
+
+
 @called
-def _set_planes(
-    placed: FloatArray, corners: IntArray, rings: IntArray, first: int, n: int, exact: FloatArray, at: int,
-    eta: float, span: float, planes: FloatArray,
-) -> bool:  # fmt: skip
-    """Fill planes (n, 13) with those of the faces from ring `first` on; return False for one without a sure normal."""
-    for face in range(n):
-        start, size = rings[first + face], rings[first + face + 1] - rings[first + face]
+def _set_planes(body: Body, eta: float, span: float) -> bool:
+    """Fill the planes of a body; return False for a face without a sure normal."""
+    placed, corners = body.placed, body.corners
+    for face in range(body.planes.shape[0]):
+        plane, start, size = body.planes[face], body.rings[face], body.rings[face + 1] - body.rings[face]
         a, b, c = corners[start], corners[start + size // 3], corners[start + 2 * size // 3]
         far = near = most = 0.0
         for axis in range(3):
             far = max(far, abs(placed[b, axis] - placed[a, axis]))
             near = max(near, abs(placed[c, axis] - placed[a, axis]))
         for axis in range(3):
-            i, j = (axis + 1) % 3, (axis + 2) % 3
-            ph, pl = dd_mul(*_difference(placed, b, a, i), *_difference(placed, c, a, j))
-            qh, ql = dd_mul(*_difference(placed, b, a, j), *_difference(placed, c, a, i))
-            planes[face, axis], planes[face, axis + 3] = dd_sub(ph, pl, qh, ql)
-            most = max(most, abs(planes[face, axis]))
+            plane[axis], plane[axis + 3] = _turn(placed, a, b, c, axis)
+            most = max(most, abs(plane[axis]))
         tilt = 1.01 * (48.0 * U2 * far * near + 8.0 * eta * (far + near)) + _TINY
-        planes[face, _AXIS] = -1.0
+        plane[_AXIS] = -1.0
         for axis in range(3):
-            is_flat = exact[at + axis] > 0.0
+            is_flat = body.exact[axis] > 0.0
             for k in range(size):
                 corner = corners[start + k]
                 is_flat = is_flat and placed[corner, axis] == placed[a, axis]
                 is_flat = is_flat and placed[corner, axis + 3] == placed[a, axis + 3]
             if is_flat:
-                if not abs(planes[face, axis]) > tilt:
+                if not abs(plane[axis]) > tilt:
                     return False
-                way = 1.0 if planes[face, axis] > 0.0 else -1.0
+                way = 1.0 if plane[axis] > 0.0 else -1.0
                 for k in range(PLACED):
-                    planes[face, k] = way if k == axis else 0.0
-                planes[face, _AXIS], planes[face, _WAY], tilt, most = float(axis), way, 0.0, 1.0
+                    plane[k] = way if k == axis else 0.0
+                plane[_AXIS], plane[_WAY], tilt, most = float(axis), way, 0.0, 1.0
         if not most > 4.0 * tilt:
             return False
         h, low = 0.0, 0.0
         for axis in range(3):
-            ph, pl = dd_mul(planes[face, axis], planes[face, axis + 3], placed[a, axis], placed[a, axis + 3])
+            ph, pl = dd_mul(plane[axis], plane[axis + 3], placed[a, axis], placed[a, axis + 3])
             h, low = dd_add(h, low, ph, pl)
-        planes[face, _VALUE], planes[face, _VALUE + 1] = h, low
-        planes[face, _SLACK] = 3.0 * span * tilt + 3.0 * most * (4.0 * eta + 128.0 * U2 * span) + _TINY
-        planes[face, _TILT] = tilt
-        planes[face, _ROUGH] = 2.0**-47 * most * span + planes[face, _SLACK]
+        plane[_VALUE], plane[_VALUE + 1], plane[_TILT] = h, low, tilt
+        plane[_SLACK] = 3.0 * span * tilt + 3.0 * most * (4.0 * eta + 128.0 * U2 * span) + _TINY
+        plane[_ROUGH] = 2.0**-47 * most * span + plane[_SLACK]
     return True
 
 
 @inline
-def _value(planes: FloatArray, face: int, point: FloatArray, at: int) -> tuple[float, float]:
+def _value(plane: FloatArray, points: FloatArray, at: int) -> tuple[float, float]:
     """Return how far within a plane a point is, times the length of its normal, as a double-double."""
-    h, low = planes[face, _VALUE], planes[face, _VALUE + 1]
+    h, low = plane[_VALUE], plane[_VALUE + 1]
     for axis in range(3):
-        ph, pl = dd_mul(planes[face, axis], planes[face, axis + 3], point[at, axis], point[at, axis + 3])
+        ph, pl = dd_mul(plane[axis], plane[axis + 3], points[at, axis], points[at, axis + 3])
         h, low = dd_sub(h, low, ph, pl)
     return h, low
 
 
 @called
-def _find_sides(
-    planes: FloatArray, n_planes: int, placed: FloatArray, n: int, exact: FloatArray, at: int, sides: FloatArray
-) -> bool:
-    """Fill sides (n_planes, n) with 1.0 or -1.0 for corners that are certainly inside or outside, 0.0 for others or,
-    where it is certain, on a plane; return whether all lie outside one of the planes, or on it."""
-    for face in range(n_planes):
-        axis, is_beside = int(planes[face, _AXIS]), True
-        is_sharp = axis >= 0 and exact[at + axis] > 0.0
-        for k in range(n):
+def _find_sides(body: Body, planes: FloatArray) -> bool:
+    """Fill the sides of a body at the planes of the other: 1.0 or -1.0 for corners that are certainly inside or
+    outside, 0.0 for others or, where it is certain, on a plane; return whether all lie outside one of the planes, or on
+    it."""
+    placed = body.placed
+    for face in range(planes.shape[0]):
+        plane, is_beside = planes[face], True
+        axis = int(plane[_AXIS])
+        is_sharp = axis >= 0 and body.exact[axis] > 0.0
+        for k in range(placed.shape[0]):
             if is_sharp:
-                h, _ = _value(planes, face, placed, k)  # two terms: its sign is exact
+                h, _ = _value(plane, placed, k)  # two terms: its sign is exact
                 side = 1.0 if h > 0.0 else -1.0 if h < 0.0 else 0.0
                 is_beside = is_beside and h <= 0.0
             else:
-                h = planes[face, _VALUE] - (
-                    planes[face, 0] * placed[k, 0] + planes[face, 1] * placed[k, 1] + planes[face, 2] * placed[k, 2]
-                )
-                side = 1.0 if h > planes[face, _ROUGH] else -1.0 if -h > planes[face, _ROUGH] else 0.0
+                h = plane[_VALUE] - (plane[0] * placed[k, 0] + plane[1] * placed[k, 1] + plane[2] * placed[k, 2])
+                side = 1.0 if h > plane[_ROUGH] else -1.0 if -h > plane[_ROUGH] else 0.0
                 is_beside = is_beside and side < 0.0
-            sides[face, k] = side
+            body.sides[face, k] = side
         if is_beside:
             return True
     return False
 
 
 @inline
-def _cut(
-    planes: FloatArray, face: int, polygon: FloatArray, n: int, made: FloatArray, extent: float
-) -> tuple[int, float]:
+def _cut(plane: FloatArray, polygon: FloatArray, n: int, made: FloatArray, extent: float) -> tuple[int, float]:
     """Write what a plane leaves of a polygon of n corners to `made`; return how many corners it has, -1 for a polygon
     that may be in the plane, and a bound on twice the area that is wrong."""
     least = most = 0.0
     for k in range(n):
-        h, low = _value(planes, face, polygon, k)
+        h, low = _value(plane, polygon, k)
         polygon[k, 6], polygon[k, 7] = h, low
         least, most = (h, h) if k == 0 else (min(least, h), max(most, h))
-    slack = planes[face, _SLACK]
+    slack = plane[_SLACK]
     if most < -slack:
         return 0, 0.0
     if not most - least > 8.0 * slack and not least > slack:
@@ -219,59 +227,59 @@ def _cut(
 
 
 @inline
-def _twice_area(polygon: FloatArray, n: int, axis: int) -> tuple[float, float]:
-    """Return twice the area of a polygon seen along an axis, as a double-double."""
-    i, j, h, low = (axis + 1) % 3, (axis + 2) % 3, 0.0, 0.0
+def _add_cone(
+    polygon: FloatArray, n: int, axis: int, height: tuple[float, float, float], wrong: float, share: float,
+    sums: FloatArray, at: int,
+) -> None:  # fmt: skip
+    """Add 6 volumes of the cone from the origin over a polygon, seen along an axis, to sums[at : at + 3], a
+    double-double and a bound. height: n.v / n_k (high, low), and its error; wrong: error of twice the area; share: of
+    the product."""
+    h, low = 0.0, 0.0
     for k in range(1, n - 1):
-        ph, pl = dd_mul(*_difference(polygon, k, 0, i), *_difference(polygon, k + 1, 0, j))
-        qh, ql = dd_mul(*_difference(polygon, k, 0, j), *_difference(polygon, k + 1, 0, i))
-        ph, pl = dd_sub(ph, pl, qh, ql)
+        ph, pl = _turn(polygon, 0, k, k + 1, axis)
         h, low = dd_add(h, low, ph, pl)
-    return h, low
+    size = abs(height[0])
+    error = 1.01 * (size * wrong + height[2] * (abs(h) + wrong)) + share * abs(height[0] * h)
+    h, low = dd_mul(height[0], height[1], h, low)
+    sums[at], sums[at + 1] = dd_add(sums[at], sums[at + 1], h, low)
+    sums[at + 2] += error + _TINY
 
 
 @called
 def _add_faces(
-    placed: FloatArray, corners: IntArray, rings: IntArray, first: int, n: int, planes: FloatArray,
-    others: FloatArray, n_others: int, sides: FloatArray, polygons: FloatArray, numbers: tuple[float, float, bool],
-    sums: FloatArray,
-) -> bool:  # fmt: skip
-    """Add the faces of a body, cut by the planes `others`, to sums[0:3], 6 volumes as a double-double and a bound, and
-    uncut to sums[3:6]; return False where a face may be in a plane. numbers: D, eta, whether it is the first body."""
-    span, eta, is_first = numbers
-    for face in range(n):
-        start, size = rings[first + face], rings[first + face + 1] - rings[first + face]
+    own: Body, other: Body, polygons: FloatArray, numbers: tuple[float, float, bool], sums: FloatArray
+) -> bool:
+    """Add the faces of a body, cut by the planes of the other, to sums[0:3], 6 volumes as a double-double and a bound,
+    and uncut to sums[3:6]; return False where a face may be in a plane. numbers: D, eta, whether it is the first
+    body."""
+    (span, eta, is_first), placed, corners, n_others = numbers, own.placed, own.corners, other.planes.shape[0]
+    share = 32.0 * (own.planes.shape[0] + n_others) * U2
+    for face in range(own.planes.shape[0]):
+        plane, start, size = own.planes[face], own.rings[face], own.rings[face + 1] - own.rings[face]
         axis, extent = 0, 0.0
         for k in range(1, 3):
-            axis = k if abs(planes[face, k]) > abs(planes[face, axis]) else axis
+            axis = k if abs(plane[k]) > abs(plane[axis]) else axis
         polygon, made = polygons[0], polygons[1]
         for k in range(size):
             for place in range(PLACED):
                 polygon[k, place] = placed[corners[start + k], place]
                 extent = max(extent, abs(polygon[k, place] - polygon[0, place]))
-        over_h, over_l = planes[face, axis], planes[face, axis + 3]
-        height_h, height_l = dd_div(planes[face, _VALUE], planes[face, _VALUE + 1], over_h, over_l)
-        height_error = 3.0 * planes[face, _SLACK] / abs(over_h) + 17.0 * U2 * abs(height_h)
+        h, low = dd_div(plane[_VALUE], plane[_VALUE + 1], plane[axis], plane[axis + 3])
+        height = h, low, 3.0 * plane[_SLACK] / abs(plane[axis]) + 17.0 * U2 * abs(h)
         rounding = (320.0 * U2 * span + 8.0 * eta) * extent
-        h, low = _twice_area(polygon, size, axis)
-        wrong = size * rounding
-        error = 1.01 * (abs(height_h) * wrong + height_error * (abs(h) + wrong)) + 32.0 * (n + n_others) * U2 * abs(
-            height_h * h
-        )
-        h, low = dd_mul(height_h, height_l, h, low)
-        sums[3], sums[4] = dd_add(sums[3], sums[4], h, low)
-        sums[5] += error + _TINY
+        _add_cone(polygon, size, axis, height, size * rounding, share, sums, 3)
         wrong, n_left = 0.0, size
-        for other in range(n_others):
-            if planes[face, _AXIS] >= 0.0 and planes[face, _AXIS] == others[other, _AXIS]:
-                value, _ = _value(others, other, placed, corners[start])
-                if value < 0.0 or (value == 0.0 and not (is_first and planes[face, _WAY] == others[other, _WAY])):
+        for item in range(n_others):
+            theirs = other.planes[item]
+            if plane[_AXIS] >= 0.0 and plane[_AXIS] == theirs[_AXIS]:
+                value, _ = _value(theirs, placed, corners[start])
+                if value < 0.0 or (value == 0.0 and not (is_first and plane[_WAY] == theirs[_WAY])):
                     n_left = 0
                     break
                 continue
             n_in = n_out = 0
             for k in range(size):
-                side = sides[other, corners[start + k]]
+                side = own.sides[item, corners[start + k]]
                 n_in += side > 0.0
                 n_out += side < 0.0
             if n_out == size:
@@ -279,49 +287,45 @@ def _add_faces(
                 break
             if n_in == size or n_left < 3:
                 continue
-            n_left, strip = _cut(others, other, polygon, n_left, made, extent)
+            n_left, strip = _cut(theirs, polygon, n_left, made, extent)
             if n_left < 0:
                 return False
             wrong += strip
             polygon, made = made, polygon
         wrong += 1.01 * (size + 2.0 * n_others) * rounding
-        h, low = _twice_area(polygon, n_left, axis)
-        error = 1.01 * (abs(height_h) * wrong + height_error * (abs(h) + wrong)) + 32.0 * (n + n_others) * U2 * abs(
-            height_h * h
-        )
-        h, low = dd_mul(height_h, height_l, h, low)
-        sums[0], sums[1] = dd_add(sums[0], sums[1], h, low)
-        sums[2] += error + _TINY
+        _add_cone(polygon, n_left, axis, height, wrong, share, sums, 0)
     return True
 
 
+@inline
+def _reach(placed: FloatArray, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the least and the greatest dot product of a body's corners and a direction."""
+    low = high = x * placed[0, 0] + y * placed[0, 1] + z * placed[0, 2]
+    for k in range(1, placed.shape[0]):
+        at = x * placed[k, 0] + y * placed[k, 1] + z * placed[k, 2]
+        low, high = min(low, at), max(high, at)
+    return low, high
+
+
 @called
-def _has_axis(
-    placed: FloatArray, n: int, corners: IntArray, rings: IntArray, faces: tuple[int, int], others: FloatArray,
-    n_others: int, other_faces: tuple[int, int], margin: float,
-) -> bool:  # fmt: skip
+def _has_axis(own: Body, other: Body, margin: float) -> bool:
     """Return whether a plane at right angles to an edge of each body certainly has them on different sides. margin: a
     bound on the error of a product, over the size of the direction."""
-    for ring in range(faces[0], faces[1]):
-        for start in range(rings[ring], rings[ring + 1]):
-            a, b = corners[start], corners[start + 1 if start + 1 < rings[ring + 1] else rings[ring]]
-            for other_ring in range(other_faces[0], other_faces[1]):
-                for other in range(rings[other_ring], rings[other_ring + 1]):
-                    c = corners[other]
-                    d = corners[other + 1 if other + 1 < rings[other_ring + 1] else rings[other_ring]]
+    p, q = own.placed, other.placed
+    for ring in range(own.planes.shape[0]):
+        for start in range(own.rings[ring], own.rings[ring + 1]):
+            a, b = own.corners[start], own.corners[start + 1 if start + 1 < own.rings[ring + 1] else own.rings[ring]]
+            for their in range(other.planes.shape[0]):
+                for k in range(other.rings[their], other.rings[their + 1]):
+                    c = other.corners[k]
+                    d = other.corners[k + 1 if k + 1 < other.rings[their + 1] else other.rings[their]]
                     if b < a or d < c:
                         continue
-                    ux, uy, uz = placed[b, 0] - placed[a, 0], placed[b, 1] - placed[a, 1], placed[b, 2] - placed[a, 2]
-                    vx, vy, vz = others[d, 0] - others[c, 0], others[d, 1] - others[c, 1], others[d, 2] - others[c, 2]
+                    ux, uy, uz = p[b, 0] - p[a, 0], p[b, 1] - p[a, 1], p[b, 2] - p[a, 2]
+                    vx, vy, vz = q[d, 0] - q[c, 0], q[d, 1] - q[c, 1], q[d, 2] - q[c, 2]
                     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-                    low = high = nx * placed[0, 0] + ny * placed[0, 1] + nz * placed[0, 2]
-                    for k in range(1, n):
-                        at = nx * placed[k, 0] + ny * placed[k, 1] + nz * placed[k, 2]
-                        low, high = min(low, at), max(high, at)
-                    other_low = other_high = nx * others[0, 0] + ny * others[0, 1] + nz * others[0, 2]
-                    for k in range(1, n_others):
-                        at = nx * others[k, 0] + ny * others[k, 1] + nz * others[k, 2]
-                        other_low, other_high = min(other_low, at), max(other_high, at)
+                    low, high = _reach(p, nx, ny, nz)
+                    other_low, other_high = _reach(q, nx, ny, nz)
                     gap = max(other_low - high, low - other_high)
                     if gap > margin * (abs(nx) + abs(ny) + abs(nz)):
                         return True
@@ -330,47 +334,32 @@ def _has_axis(
 
 @called
 def _value_of_pair(
-    corners: IntArray, rings: IntArray, bodies: IntArray, a: int, b: int, placed: FloatArray, planes: FloatArray,
-    sides: FloatArray, polygons: FloatArray, exact: FloatArray, errors: tuple[float, float], is_ratio: bool,
-    sums: FloatArray,
-) -> float:  # fmt: skip
+    own: Body, other: Body, polygons: FloatArray, errors: tuple[float, float], is_ratio: bool, sums: FloatArray
+) -> float:
     """Return the value of one pair of placed bodies. errors: eta, D."""
     eta, span = errors
     margin = 2.0**-48 * span + 4.0 * eta
-    first, n, n_planes = bodies[a, 1], bodies[a, 2], bodies[a, 3]
-    other_first, n_other, n_other_planes = bodies[b, 1], bodies[b, 2], bodies[b, 3]
     for axis in range(3):
-        low = high = placed[0, 0, axis]
-        for k in range(1, n):
-            low, high = min(low, placed[0, k, axis]), max(high, placed[0, k, axis])
-        other_low = other_high = placed[1, 0, axis]
-        for k in range(1, n_other):
-            other_low, other_high = min(other_low, placed[1, k, axis]), max(other_high, placed[1, k, axis])
+        low = high = own.placed[0, axis]
+        for k in range(1, own.placed.shape[0]):
+            low, high = min(low, own.placed[k, axis]), max(high, own.placed[k, axis])
+        other_low = other_high = other.placed[0, axis]
+        for k in range(1, other.placed.shape[0]):
+            other_low, other_high = min(other_low, other.placed[k, axis]), max(other_high, other.placed[k, axis])
         if low - other_high > margin or other_low - high > margin:
             return 0.0
-    if not _set_planes(placed[0], corners, rings, first, n_planes, exact, 0, eta, span, planes[0]):
+    if not _set_planes(own, eta, span) or not _set_planes(other, eta, span):
         return float("nan")
-    if not _set_planes(placed[1], corners, rings, other_first, n_other_planes, exact, 3, eta, span, planes[1]):
-        return float("nan")
-    if _find_sides(planes[1], n_other_planes, placed[0], n, exact, 0, sides[0]):
-        return 0.0
-    if _find_sides(planes[0], n_planes, placed[1], n_other, exact, 3, sides[1]):
+    if _find_sides(own, other.planes) or _find_sides(other, own.planes):
         return 0.0
     for k in range(6):
         sums[k] = 0.0
-    if not _add_faces(placed[0], corners, rings, first, n_planes, planes[0], planes[1], n_other_planes, sides[0],
-                      polygons, (span, eta, True), sums):  # fmt: skip
+    if not _add_faces(own, other, polygons, (span, eta, True), sums):
         return float("nan")
-    if not _add_faces(placed[1], corners, rings, other_first, n_other_planes, planes[1], planes[0], n_planes, sides[1],
-                      polygons, (span, eta, False), sums):  # fmt: skip
+    if not _add_faces(other, own, polygons, (span, eta, False), sums):
         return float("nan")
     if not abs(sums[0]) > sums[2]:
-        ends = first + n_planes, other_first + n_other_planes
-        if _has_axis(
-            placed[0], n, corners, rings, (first, ends[0]), placed[1], n_other, (other_first, ends[1]), margin
-        ):
-            return 0.0
-        return float("nan")
+        return 0.0 if _has_axis(own, other, margin) else float("nan")
     return certified(sums, 6.0, is_ratio)
 
 
@@ -392,29 +381,28 @@ def overlap_bodies(
     | poses (2, 13) | of all first and of all second bodies: rotation, translation, 0.0 for none |
     | placed (2, .., 6), planes (2, .., 13), sides (2, .., ..), polygons (2, .., 8) | scratch |
     """
-    n_open, origin, exact, sums = 0, workspace(3), workspace(6), workspace(6)
+    n_open, origin, exact, their_exact, sums = 0, workspace(3), workspace(3), workspace(3), workspace(6)
     for item in range(pairs.shape[0]):
         if flag[0] != 0:
             break
+        first, second = bodies[pairs[item, 0]], bodies[pairs[item, 1]]
         for axis in range(3):
-            at = points[bodies[pairs[item, 0], 0], axis]
+            at = points[first[0], axis]
             if poses[0, 12] != 0.0:
                 at = poses[0, 9 + axis]
                 for k in range(3):
-                    at += poses[0, 3 * axis + k] * points[bodies[pairs[item, 0], 0], k]
+                    at += poses[0, 3 * axis + k] * points[first[0], k]
             origin[axis] = at
-        eta = span = 0.0
-        for side in range(2):
-            body = pairs[item, side]
-            more = _place(points, bodies[body, 0], bodies[body, 2], poses[side], origin, placed[side], exact, 3 * side)
-            eta = max(eta, more)
-            for k in range(bodies[body, 2]):
-                for axis in range(3):
-                    span = max(span, abs(placed[side, k, axis]))
-        value = _value_of_pair(
-            corners, rings, bodies, pairs[item, 0], pairs[item, 1], placed, planes, sides, polygons, exact,
-            (eta, 1.01 * span), is_ratio, sums,
-        )  # fmt: skip
+        faces, theirs = rings[first[1] : first[1] + first[3] + 1], rings[second[1] : second[1] + second[3] + 1]
+        own = Body(corners, faces, placed[0, : first[2]], exact, planes[0, : first[3]], sides[0])
+        other = Body(corners, theirs, placed[1, : second[2]], their_exact, planes[1, : second[3]], sides[1])
+        eta = _place(points[first[0] : first[0] + first[2]], poses[0], origin, own)
+        eta = max(eta, _place(points[second[0] : second[0] + second[2]], poses[1], origin, other))
+        span = 0.0
+        for body in (own.placed, other.placed):
+            for k in range(body.shape[0]):
+                span = max(span, abs(body[k, 0]), abs(body[k, 1]), abs(body[k, 2]))
+        value = _value_of_pair(own, other, polygons, (eta, 1.01 * span), is_ratio, sums)
         values[item] = value
         n_open += value != value
     return n_open
