@@ -43,7 +43,7 @@ from engine.segment_clipping import hits as one
 from engine.segment_clipping.hits import Hits
 from engine.solid_cutting import overlap as overlaps
 from engine.solid_cutting import section as sections
-from engine.solid_cutting.planar_overlaps import check_same_length
+from engine.solid_cutting.overlap_batches import check_same_length
 from engine.solids.base import Solid
 from engine.solids.checks import as_floats, as_point_groups, as_points, shown
 from engine.types import BoolArray, FloatArray, Int8Array

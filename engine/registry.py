@@ -18,8 +18,8 @@ from engine.polygon_clipping import planes
 from engine.segment_clipping import clip_segments as segments
 from engine.segment_clipping import hits, profiles
 from engine.segment_clipping.on_boundary import boundary
+from engine.solid_cutting import exact_measures as simple
 from engine.solid_cutting import measures
-from engine.solid_cutting import simple_measures as simple
 from engine.solids import bounds
 from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit

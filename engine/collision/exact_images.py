@@ -33,12 +33,25 @@ def image_point(point: Point, pose: Pose | None) -> Vector:
 
 def image_half_space(half_space: HalfSpace, pose: Pose | None) -> HalfSpaceImage:
     """Return normal and offset of the exact image of a half-space under a pose, up to a positive factor."""
-    n, d = as_vector(half_space.normal), Fraction(half_space.offset)
+    return image_plane((as_vector(half_space.normal), Fraction(half_space.offset)), pose)
+
+
+def image_plane(plane: HalfSpaceImage, pose: Pose | None) -> HalfSpaceImage:
+    """Return normal and offset of the exact image of a plane under a pose, times det R."""
     if pose is None:
-        return n, d
+        return plane
     adjugated, determinant = adjugate([as_vector(row) for row in pose.rotation.tolist()])
-    image = tuple(dot(n, column) for column in zip(*adjugated))
-    return image, d * determinant - dot(image, as_vector(pose.translation))
+    image = tuple(dot(plane[0], column) for column in zip(*adjugated))
+    return image, plane[1] * determinant - dot(image, as_vector(pose.translation))
+
+
+def plane_in_frame(plane: HalfSpaceImage, pose: Pose | None) -> HalfSpaceImage:
+    """Return (N, D), exact, with N . p + D the plane's value at the image of p under a pose."""
+    if pose is None:
+        return plane
+    normal, move = plane[0], as_vector(pose.translation.tolist())
+    turned = tuple(dot(normal, as_vector(column)) for column in pose.rotation.T.tolist())
+    return turned, plane[1] + dot(normal, move)
 
 
 def value_at(half_space: HalfSpaceImage, point: Vector) -> Fraction:

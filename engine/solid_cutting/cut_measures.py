@@ -27,7 +27,7 @@ from engine.errors import NotRepresentableError
 from engine.predicates.rational import cross, minus, nearest_float, squared_length
 from engine.running.budget import Budget
 from engine.solid_cutting.caps import Area, Seen
-from engine.solid_cutting.exact_sums import ExactMesh, exact_mesh, exact_volume, nearest_area, nearest_root_over
+from engine.solid_cutting.exact_measures import ExactMesh, exact_mesh, exact_volume, nearest_area, nearest_root_over
 from engine.solid_cutting.plane_cut import Plane, Points
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_volume
 from engine.types import IntArray, read_only

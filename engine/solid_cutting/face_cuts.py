@@ -1,4 +1,4 @@
-"""Compiled: the sides of vertices, the faces that a plane leaves whole, and where edges cross it.
+"""Compiled: sides of vertices, faces that a plane leaves whole, where edges cross it, faces that are certainly apart.
 
 Cut points are double-doubles. With weights w = |value of the plane| at both ends p and q, each known to b,
 
@@ -6,13 +6,17 @@ Cut points are double-doubles. With weights w = |value of the plane| at both end
     x = p + t (q - p)         error: |q - p| that of t, and `POINT_BOUND` (cut_point.py)
 
 and the double nearest to x is certain where the bound says so; the caller computes the others in integers.
+
+Faces are apart where a plane of one has all other corners of the other strictly on one side; of two that share an edge
+the far corner is enough. The filter of orient3d decides (S. Gottschalk, Separating axis theorem, 1996).
 """
 
 from __future__ import annotations
 
-from engine.compiling.jit import kernel
+from engine.compiling.jit import inline, kernel
 from engine.predicates.cut_point import POINT_BOUND, TINY, point_along
 from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_sub, fast_two_sum, is_correctly_rounded
+from engine.predicates.orientation import orient3d_filter
 from engine.predicates.side import dd_value, side_of_plane, side_of_plane_filter
 from engine.predicates.vectors import as_point3, corners_of, minus
 from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, Int8Array, IntArray
@@ -135,3 +139,27 @@ def find_shapes(
         turn = left - right if n[axis] > 0.0 else right - left
         is_sure = abs(n[axis]) > 2.0**-48 * sizes + TINY and abs(turn) > 2.0**-50 * (abs(left) + abs(right)) + TINY
         shapes[item] = UNDECIDED if not is_sure else 1 if turn > 0.0 else -1
+
+
+@inline
+def _is_beside(points: FloatArray, faces: IntArray, face: int, other: int) -> bool:
+    """Return whether all corners of `other` that are not corners of `face` lie strictly on one side of its plane."""
+    a, b, c = corners_of(points, faces, face)
+    side = 0
+    for k in range(3):
+        corner = faces[other, k]
+        if corner != faces[face, 0] and corner != faces[face, 1] and corner != faces[face, 2]:
+            sign = orient3d_filter(a, b, c, as_point3(points, corner))
+            if sign == UNDECIDED or (side != 0 and sign != side):
+                return False
+            side = sign
+    return side != 0
+
+
+@kernel
+def find_candidates(points: FloatArray, faces: IntArray, pairs: IntArray, may_meet: BoolArray) -> None:
+    """Fill may_meet (n,) with whether pairs (n, 2) of faces may meet besides their common corners."""
+    for item in range(pairs.shape[0]):
+        first, second = pairs[item, 0], pairs[item, 1]
+        is_apart = _is_beside(points, faces, first, second) or _is_beside(points, faces, second, first)
+        may_meet[item] = not is_apart

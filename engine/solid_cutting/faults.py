@@ -8,27 +8,20 @@ from s on through that point one leaves one of them first, by its edge opposite 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from engine.bounding.box_grid import all_pairs_of_boxes, pairs_of_boxes
 from engine.collision.codes import DISJOINT, TOUCHING
-from engine.collision.collide import collide
 from engine.collision.triangles import collide_triangles
 from engine.compiling.jit import entry_of
-from engine.containment.locate import locate
-from engine.errors import EngineError
 from engine.polygon_clipping.planes import orientations
-from engine.predicates.rational import cross, scaled_integers
+from engine.predicates.rational import cross, scaled_integers, sign_of
 from engine.running.budget import Budget, polled
-from engine.solid_cutting.face_pairs import find_candidates
-from engine.solids.mesh import Polyhedron
-from engine.types import FloatArray, IntArray, Rcc8, read_only
-
-_POLLED: Final = 1 << 10
-"""Turns of a loop in Python between two checks of the deadline."""
+from engine.solid_cutting.exact_measures import exact_faces, exact_volume
+from engine.solid_cutting.face_cuts import find_candidates
+from engine.types import FloatArray, IntArray, read_only
 
 
 class Edges(NamedTuple):
@@ -105,41 +98,6 @@ def shells_of(edges: Edges, budget: Budget) -> list[IntArray]:
     return np.split(order, np.flatnonzero(np.diff(labels[order])) + 1) if len(order) else []
 
 
-def nesting(
-    points: FloatArray, faces: IntArray, shells: list[IntArray], budget: Budget
-) -> Iterator[tuple[IntArray, bool]]:
-    """Yield the closed shells, each with whether it is turned: its volume should be above 0 within an even number of
-    others, and below 0 within an odd one."""
-    closed = []
-    for shell in shells:
-        budget.check()
-        try:
-            closed.append((shell, Polyhedron(points, faces[shell], deadline=budget.left(), cancel=budget.cancel)))
-        except EngineError:
-            budget.check()
-    used = [np.unique(faces[shell]) for shell, _ in closed]
-    low, high = (np.array([pick(points[k], axis=0) for k in used]).reshape(-1, 3) for pick in (np.min, np.max))
-    inside: dict[int, list[int]] = defaultdict(list)
-    for i, j in all_pairs_of_boxes(low, high, budget).tolist() if closed else ():
-        for one, other in ((i, j), (j, i)):
-            if (low[other] <= low[one]).all() and (high[one] <= high[other]).all():
-                inside[one].append(other)
-    for number, (shell, _) in enumerate(closed):
-        depth = 0
-        for other in inside[number]:
-            budget.check()
-            limits: Any = {"deadline": budget.left(), "cancel": budget.cancel}
-            places = locate(points[used[number]], closed[other][1], **limits)
-            strict = places[places != 0]
-            if len(strict):
-                depth += bool(strict[0] > 0)
-            else:  # all its corners are on the other's faces
-                lies = collide(closed[number][1], closed[other][1], detail=True, **limits).detail
-                depth += lies in (Rcc8.TPP, Rcc8.NTPP)
-        volume = sign_of_volume(points, faces[shell], budget)
-        yield shell, volume != 0 and (volume > 0) is (depth % 2 == 1)
-
-
 def sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
     """Return the sign of the volume that triangles run around, exactly."""
     with np.errstate(all="ignore"):
@@ -149,15 +107,8 @@ def sign_of_volume(points: FloatArray, faces: IntArray, budget: Budget) -> int:
         total = float(parts.sum())
     if np.isfinite(bound) and abs(total) > bound * 8:
         return 1 if total > 0 else -1
-    used, rows = np.unique(faces, return_inverse=True)
-    numbers = scaled_integers(points[used].ravel().tolist())
-    places = [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
-    exact = 0
-    for number, (i, j, k) in enumerate(rows.reshape(-1, 3).tolist()):
-        if number % _POLLED == 0:
-            budget.check()
-        exact += sum(x * y for x, y in zip(places[i], cross(places[j], places[k])))
-    return (exact > 0) - (exact < 0)
+    budget.check()
+    return sign_of(exact_volume(exact_faces(points, faces)))
 
 
 def crossings(

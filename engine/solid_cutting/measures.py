@@ -13,15 +13,14 @@ from engine.errors import NotRepresentableError, WrongDimensionError
 from engine.predicates.rational import SMALLEST_NORMAL, exponent_of, nearest_float, shifted
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options
-from engine.solid_cutting.exact_sums import (
-    ExactMesh,
+from engine.solid_cutting.exact_measures import (
+    Measures,
     exact_centroid,
-    exact_mesh,
+    exact_faces,
     exact_volume,
     nearest_area,
 )
 from engine.solid_cutting.shells import Shells, outward, shells
-from engine.solid_cutting.simple_measures import Measures
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
 from engine.solids.accepted import SolidLike
 from engine.solids.base import Solid
@@ -251,7 +250,8 @@ def _of_mesh(solid: Polyhedron, budget: Budget, what: str) -> tuple[Any, bool]:
         budget.check()
         if result is not None and _is_scaled(result, exponent):
             return (float(result) if what == "volume" else result), False
-    mesh = _exact(solid.vertices, outward(solid, budget), budget)
+    budget.check()
+    mesh = exact_faces(solid.vertices, outward(solid, budget))
     if what == "volume":
         return nearest_float(exact_volume(mesh)), True
     return np.array([nearest_float(x) for x in exact_centroid(mesh)]), True
@@ -261,13 +261,6 @@ def _is_scaled(result: Any, exponent: int) -> bool:
     """Return whether scaling back by 2^exponent rounded nothing."""
     sizes = np.abs(result)
     return bool(exponent == 0 or ((sizes > SMALLEST_NORMAL) & (sizes < np.inf)).all())
-
-
-def _exact(vertices: FloatArray, faces: IntArray, budget: Budget) -> ExactMesh:
-    """Return a mesh in integers."""
-    budget.check()
-    used, flat = np.unique(faces, return_inverse=True)
-    return exact_mesh(vertices[used].tolist(), map(tuple, flat.reshape(-1, 3).tolist()))
 
 
 def _six_volumes(
@@ -339,7 +332,8 @@ def _area_of_mesh(solid: Mesh, budget: Budget) -> tuple[float, bool]:
             result = None if half is None else float(np.ldexp(half, 2 * exponent))
         if result is not None and _is_scaled(result, exponent):
             return result, False
-    return nearest_area(_exact(solid.vertices, solid.triangles, budget)), True
+    budget.check()
+    return nearest_area(exact_faces(solid.vertices, solid.triangles)), True
 
 
 MESH: Final = Measures(

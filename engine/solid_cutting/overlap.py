@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 
 from engine.collision.collide import posed, read_pair
+from engine.collision.exact_images import as_vector, image_plane, plane_in_frame
 from engine.errors import UnsupportedPairError, WrongDimensionError
 from engine.polygon_clipping.planes import plan_of
-from engine.predicates.rational import cross, determinant, dot, nearest_float, scaled_integers
+from engine.predicates.rational import Number, determinant, nearest_float, scaled_integers
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Progress, check_options
-from engine.solid_cutting.convex_bodies import of_bodies
 from engine.solid_cutting.cut import cut_by_planes
 from engine.solid_cutting.cut_measures import narrowed, volume_between, volume_in_fractions, volume_of_cut
-from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
-from engine.solid_cutting.planar_overlaps import (
+from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces, product, sides_of
+from engine.solid_cutting.overlap_batches import (
     check_same_length,
     extremes,
+    of_bodies,
     overlap_of_polygons,
     overlaps_of_arrays,
     ratio_of,
 )
 from engine.solid_cutting.plane_cut import Points, plane_of
 from engine.solid_cutting.shells import outward
-from engine.solid_cutting.simple_measures import product, sides_of
 from engine.solids.accepted import PoseLike, SolidLike
 from engine.solids.base import Solid, named
 from engine.solids.convexity import convexity
@@ -230,29 +230,18 @@ def _rows_of(solid: Solid, pose: Pose | None, budget: Budget) -> Rows | None:
     """Return the planes of a convex solid under a pose, exact; None if it is not convex."""
     if not isinstance(solid, (Aabb, Convex)) and not (isinstance(solid, Polyhedron) and convexity(solid) is not None):
         return None
-    return [_moved([Fraction(x) for x in row], pose) for row in plan_of(solid, budget.check).rows]
+    planes = (_as_plane(row) for row in plan_of(solid, budget.check).rows)
+    return [[*normal, offset] for normal, offset in (image_plane(plane, pose) for plane in planes)]
 
 
-def _moved(row: list[Fraction], pose: Pose | None) -> list[Fraction]:
-    """Return the row of a plane under a pose: that of R^-1 (x - t), times the determinant of R."""
-    if pose is None:
-        return row
-    turn, move = _numbers(pose)
-    *normal, offset = row
-    columns = [tuple(line[k] for line in turn) for k in range(len(turn))]
-    adjugate: list[tuple[Fraction, ...]]
-    if len(turn) == 3:  # the rows of the adjugate are cross products of the columns
-        adjugate = [*(cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3))]
-    else:
-        adjugate = [(columns[1][1], -columns[1][0]), (-columns[0][1], columns[0][0])]
-    made = [sum((normal[k] * adjugate[k][j] for k in range(len(turn))), Fraction(0)) for j in range(len(turn))]
-    return [*made, offset * determinant(turn) - dot(made, move)]
+def _as_plane(row: Sequence[Number]) -> tuple[tuple[Fraction, ...], Fraction]:
+    *normal, offset = as_vector(row)
+    return tuple(normal), offset
 
 
-def _numbers(pose: Pose) -> tuple[list[tuple[Fraction, ...]], list[Fraction]]:
-    return [tuple(map(Fraction, line)) for line in pose.rotation.tolist()], [
-        Fraction(x) for x in pose.translation.tolist()
-    ]
+def _determinant(pose: Pose | None) -> Fraction:
+    rows = [] if pose is None else pose.rotation.tolist()
+    return Fraction(determinant([as_vector(row) for row in rows]))
 
 
 def _volume_within(rows: Rows, budget: Budget) -> Fraction:
@@ -262,7 +251,7 @@ def _volume_within(rows: Rows, budget: Budget) -> Fraction:
 
 def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
     """Return the exact volume of a convex solid under a pose."""
-    factor = Fraction(1) if pose is None else Fraction(determinant(_numbers(pose)[0]))
+    factor = _determinant(pose)
     if isinstance(solid, Aabb):
         return factor * product(sides_of(solid))
     own: Rows = [[Fraction(x) for x in row] for row in plan_of(solid, budget.check).rows]
@@ -271,14 +260,9 @@ def _own_volume(solid: Solid, pose: Pose | None, budget: Budget) -> Fraction:
 
 def _of_mesh(solid: Polyhedron, pose: Pose | None, rows: Rows, is_ratio: bool, budget: Budget) -> float:
     """Return what a polyhedron has in common with a convex region, whose planes are brought into its coordinates."""
-    factor = Fraction(1)
-    own = rows
-    if pose is not None:
-        turn, move = _numbers(pose)
-        factor = Fraction(determinant(turn))
-        columns = [tuple(line[k] for line in turn) for k in range(3)]
-        own = [[*(dot(row[:3], column) for column in columns), dot(row[:3], move) + row[3]] for row in rows]
-    left = cut_by_planes(solid, [plane_of(scaled_integers(row)) for row in own], budget)
+    factor = _determinant(pose)
+    own = [plane_in_frame(_as_plane(row), pose) for row in rows]
+    left = cut_by_planes(solid, [plane_of(scaled_integers([*normal, offset])) for normal, offset in own], budget)
     common = left.points, left.triangles
     if not len(left.triangles):
         return 0.0

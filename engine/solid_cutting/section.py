@@ -14,7 +14,7 @@ from engine.running.budget import Budget, Cancel, current, polled, reading
 from engine.running.parallel import Progress, check_options
 from engine.solid_cutting.caps import Area, Seen
 from engine.solid_cutting.cut_measures import area_of_section
-from engine.solid_cutting.exact_sums import nearest_root_over
+from engine.solid_cutting.exact_measures import nearest_root_over
 from engine.solid_cutting.plane_cut import Plane, plane_of
 from engine.solid_cutting.slices import slices_at
 from engine.solids.accepted import SolidLike

@@ -17,6 +17,7 @@ Source: E. A. F. Muecke, Shapes and implementations in three-dimensional geometr
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cmp_to_key
 from typing import Any, Final, NamedTuple
 
@@ -25,7 +26,7 @@ import numpy as np
 from engine.bounding.box_grid import all_pairs_of_boxes
 from engine.collision.collide import collide
 from engine.containment.locate import locate
-from engine.errors import InvalidInputError
+from engine.errors import EngineError, InvalidInputError
 from engine.predicates.rational import cross, dot, minus, scaled_integers, sign_of
 from engine.running.budget import Budget
 from engine.solid_cutting.faults import Edges, are_flat, crossings, edges_of, shells_of, sign_of_volume
@@ -93,7 +94,7 @@ def _shells_of(solid: Polyhedron, budget: Budget) -> Shells:
             raise _crossing(solid, still[0] if len(still) else within[0])
         contacts = np.concatenate([contacts, _neighbours(edges, part_of)])
     number_of = np.cumsum(used := np.array([is_solid[part].any() for part in parts])) - 1  # others bound nothing
-    bodies = [_Shell(solid, part) for part, is_used in zip(parts, used) if is_used]
+    bodies = [_Shell(points, faces, part) for part, is_used in zip(parts, used) if is_used]
     depths = _depths(solid, bodies, number_of[part_of[contacts]], budget, contacts)
     sides = np.ones(len(faces), np.int8)
     for body, depth in zip(bodies, depths):
@@ -156,24 +157,46 @@ def _crossing(solid: Polyhedron, pair: IntArray) -> InvalidInputError:
 
 
 class _Shell:
-    """One shell of a solid; `body` is it as a polyhedron, made at first use."""
+    """One shell: the triangles `part` of a mesh; `body` is it as a polyhedron, made at first use."""
 
-    def __init__(self, solid: Polyhedron, part: IntArray) -> None:
-        self.solid, self.part = solid, part
-        self.vertices = np.unique(solid.triangles[part])
-        self.low = solid.vertices[self.vertices].min(axis=0)
-        self.high = solid.vertices[self.vertices].max(axis=0)
+    def __init__(self, points: FloatArray, faces: IntArray, part: IntArray) -> None:
+        self.points, self.faces, self.part = points, faces[part], part
+        self.vertices = np.unique(self.faces)
+        self.low, self.high = (pick(points[self.vertices], axis=0) for pick in (np.min, np.max))
+        self.is_odd = (self.faces == np.roll(self.faces, 1, axis=1)).any(axis=1)
+        """Of triangles that name a vertex twice: they use each edge both ways."""
         self._body: Polyhedron | None = None
 
     def body(self, budget: Budget) -> Polyhedron:
         if self._body is None:
-            faces = self.solid.triangles[self.part]
-            faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]  # others use each edge both ways
-            self._body = Polyhedron(self.solid.vertices, faces, deadline=budget.left(), cancel=budget.cancel)
+            faces = self.faces[~self.is_odd]
+            self._body = Polyhedron(self.points, faces, deadline=budget.left(), cancel=budget.cancel)
         return self._body
 
-    def is_within_box_of(self, other: _Shell) -> bool:
-        return bool((other.low <= self.low).all() and (self.high <= other.high).all())
+
+def nesting(
+    points: FloatArray, faces: IntArray, parts: list[IntArray], budget: Budget
+) -> Iterator[tuple[IntArray, bool]]:
+    """Yield the closed ones of shells, which may cross here, each with whether it is turned: its volume should be above
+    0 within an even number of others, and below 0 within an odd one."""
+    closed = []
+    for shell in (_Shell(points, faces, part) for part in parts):
+        budget.check()
+        try:
+            closed += [shell] if not shell.is_odd.any() and shell.body(budget) else []
+        except EngineError:
+            budget.check()
+    depths = [0] * len(closed)
+    low, high = (np.array([getattr(shell, name) for shell in closed]).reshape(-1, 3) for name in ("low", "high"))
+    for i, j in all_pairs_of_boxes(low, high, budget).tolist() if closed else ():
+        for one, other in ((i, j), (j, i)):
+            lies = _lies_within(closed[one], closed[other], budget)
+            if lies == 0:  # all its corners are on the other's faces
+                lies = _detail_of(closed[one], closed[other], budget) in (Rcc8.TPP, Rcc8.NTPP)
+            depths[one] += lies > 0
+    for shell, depth in zip(closed, depths):
+        volume = sign_of_volume(points, shell.faces, budget)
+        yield shell.part, volume != 0 and (volume > 0) is (depth % 2 == 1)
 
 
 def _depths(
@@ -194,8 +217,7 @@ def _depths(
                 depths[i] += lies[0] == 1
                 depths[j] += lies[1] == 1
                 continue
-        limits: Any = {"deadline": budget.left(), "cancel": budget.cancel}
-        relation = collide(bodies[i].body(budget), bodies[j].body(budget), detail=True, **limits).detail
+        relation = _detail_of(bodies[i], bodies[j], budget)
         if relation == Rcc8.PO:
             pair = contacts[touching[i, j]] if (i, j) in touching else np.array([bodies[k].part[0] for k in (i, j)])
             raise _crossing(solid, pair)
@@ -204,11 +226,16 @@ def _depths(
     return depths
 
 
+def _detail_of(one: _Shell, other: _Shell, budget: Budget) -> Rcc8 | None:
+    limits: Any = {"deadline": budget.left(), "cancel": budget.cancel}
+    return collide(one.body(budget), other.body(budget), detail=True, **limits).detail
+
+
 def _lies_within(one: _Shell, other: _Shell, budget: Budget) -> int:
     """Return 1 if a shell that crosses no other lies within another, -1 if not, 0 if all its vertices are on that."""
-    if not one.is_within_box_of(other):
+    if (one.low < other.low).any() or (other.high < one.high).any():
         return -1
-    points = one.solid.vertices[one.vertices]
+    points = one.points[one.vertices]
     for some in (points[:1], points):
         places = locate(some, other.body(budget), deadline=budget.left(), cancel=budget.cancel)
         if places.any():

@@ -1,4 +1,10 @@
-"""The rings of sections by parallel planes: `sweep.py` finds them; a plane on which they touch is done by itself.
+"""The rings of sections by parallel planes, all in one sweep; a plane on which they touch is done by itself.
+
+Planes are numbered along their normal. Each vertex has a rank, the number of planes that it is strictly beyond, so a
+face crosses the planes from its least rank to its greatest. Two faces share each edge; so from a face that crosses a
+plane its section goes on, across the side that runs from what is outside to what is inside, to the face on its other
+side, until it is back at the first. A corner on a plane is outside, and the sides that end there are cut at it; a plane
+where a section comes to a corner again is done by itself (`is_open`).
 
 Source: S. McMains, C. Sequin, A coherent sweep plane slicer for layered manufacturing, 1999.
 """
@@ -10,14 +16,151 @@ from typing import Final
 
 import numpy as np
 
-from engine.compiling.jit import entry_of
+from engine.compiling.jit import entry_of, kernel
+from engine.predicates.side import side_of_plane
+from engine.predicates.vectors import as_point3
 from engine.running.budget import Budget
 from engine.solid_cutting.caps import Area, Ring, Seen, areas_of, rings_of, seen
 from engine.solid_cutting.plane_cut import Plane, Points, cut_triangles
 from engine.solid_cutting.shells import outward, shells
-from engine.solid_cutting.sweep import chain_faces, count_faces, fill_faces, rank_vertices, turn_rings
 from engine.solids.mesh import Polyhedron
-from engine.types import BoolArray, FloatArray, IntArray, read_only
+from engine.types import UNDECIDED, BoolArray, FlagArray, FloatArray, HalfSpace3, Int8Array, IntArray, read_only
+
+_POLL = 0xFFF
+
+
+@kernel
+def rank_vertices(
+    vertices: FloatArray, normal: FloatArray, heights: FloatArray, ranks: IntArray, is_on: BoolArray, flag: FlagArray
+) -> bool:
+    """Fill ranks (n,), how many of the heights, ascending, are below normal . vertex, and is_on (n,), whether it is the
+    next one; return whether all were decided."""
+    for vertex in range(vertices.shape[0]):
+        if vertex & _POLL == 0 and flag[0] != 0:
+            return False
+        low, high, point = 0, heights.shape[0], as_point3(vertices, vertex)
+        is_on[vertex] = False
+        while low < high:  # bound: the range is halved
+            middle = (low + high) // 2
+            side = side_of_plane(HalfSpace3(normal[0], normal[1], normal[2], -heights[middle]), point)
+            if side == UNDECIDED:
+                return False
+            if side > 0:
+                low = middle + 1
+            else:
+                high = middle
+                is_on[vertex] = side == 0
+                if side == 0:
+                    low = middle
+        ranks[vertex] = low
+    return True
+
+
+@kernel
+def count_faces(triangles: IntArray, ranks: IntArray, counts: IntArray, flag: FlagArray) -> None:
+    """Add to counts (planes + 2,) the faces that cross plane k at k + 2."""
+    for face in range(triangles.shape[0]):
+        if face & _POLL == 0 and flag[0] != 0:
+            return
+        a, b, c = ranks[triangles[face, 0]], ranks[triangles[face, 1]], ranks[triangles[face, 2]]
+        for plane in range(min(a, b, c), max(a, b, c)):
+            counts[plane + 2] += 1
+
+
+@kernel
+def fill_faces(triangles: IntArray, ranks: IntArray, places: IntArray, crossing: IntArray, flag: FlagArray) -> None:
+    """Fill crossing with the faces that cross each plane, plane by plane, ascending. places: where the faces of plane
+    k go at k + 1, which is moved to where they end."""
+    for face in range(triangles.shape[0]):
+        if face & _POLL == 0 and flag[0] != 0:
+            return
+        a, b, c = ranks[triangles[face, 0]], ranks[triangles[face, 1]], ranks[triangles[face, 2]]
+        for plane in range(min(a, b, c), max(a, b, c)):
+            crossing[places[plane + 1]] = face
+            places[plane + 1] += 1
+
+
+@kernel
+def chain_faces(
+    triangles: IntArray, across: IntArray, ranks: IntArray, is_on: BoolArray, firsts: IntArray, crossing: IntArray,
+    marks: IntArray, vertex_marks: IntArray, cuts: IntArray, ring_ends: IntArray, ring_planes: IntArray,
+    is_open: BoolArray, flag: FlagArray,
+) -> int:  # fmt: skip
+    """Write the rings of all planes; return how many there are.
+
+    across (m, 3): the face beyond side k. firsts: where the faces of each plane begin in `crossing`. marks (m,),
+    vertex_marks (n,): scratch, 0. cuts (k, 3), by point of a ring: the end inside, the end outside, or the corner on
+    the plane and -1; the plane. ring_ends: where rings end in cuts. is_open: planes that are left to the caller.
+    """
+    n_points, n_rings = 0, 0
+    for plane in range(is_open.shape[0]):
+        if flag[0] != 0:
+            break
+        for item in range(firsts[plane], firsts[plane + 1]):
+            first = crossing[item]
+            if marks[first] == plane + 1:
+                continue
+            face, start, last, ring_first, is_back = first, n_points, -1, -1, False
+            for _ in range(firsts[plane + 1] - firsts[plane]):
+                marks[face] = plane + 1
+                side = 0
+                for k in range(3):
+                    is_up = ranks[triangles[face, k]] <= plane and ranks[triangles[face, (k + 1) % 3]] > plane
+                    side = k if is_up else side
+                outside, inside = triangles[face, side], triangles[face, (side + 1) % 3]
+                is_corner = is_on[outside] and ranks[outside] == plane
+                is_again = is_corner and vertex_marks[outside] == plane + 1
+                if is_again and last != outside:
+                    is_open[plane] = is_open[plane] or outside != ring_first
+                    is_back = True
+                elif not is_again:
+                    is_open[plane] = is_open[plane] or is_back
+                    if is_corner:
+                        vertex_marks[outside] = plane + 1
+                        ring_first = outside if n_points == start else ring_first
+                    cuts[n_points, 0], cuts[n_points, 1] = (
+                        outside if is_corner else inside,
+                        -1 if is_corner else outside,
+                    )
+                    cuts[n_points, 2] = plane
+                    n_points += 1
+                last = outside if is_corner else -1
+                face = across[face, side]
+                if face == first:
+                    break
+            is_open[plane] = is_open[plane] or face != first
+            if n_points - start < 3:  # there and back
+                n_points = start
+            else:
+                ring_ends[n_rings], ring_planes[n_rings] = n_points, plane
+                n_rings += 1
+    return n_rings
+
+
+@kernel
+def turn_rings(points: FloatArray, i: int, j: int, ends: IntArray, firsts: IntArray, signs: Int8Array) -> None:
+    """Fill firsts with the leftmost point of each ring, seen on axes i and j, the lowest of these; and signs with that
+    of its area, 0 where rounding may have changed it. points: those of all rings, up to `ends`.
+
+    Differences are off by u of the largest coordinates, products and sums of n by n 2^-50 of the span squared.
+    """
+    start = 0
+    for ring in range(ends.shape[0]):
+        stop, size, span, area = ends[ring], 0.0, 0.0, 0.0
+        first = stop - 1
+        x0, y0 = points[start, i], points[start, j]
+        for k in range(start, stop):
+            after = k + 1 if k + 1 < stop else start
+            x, y = points[k, i], points[k, j]
+            if x < points[first, i] or (x == points[first, i] and y < points[first, j]):
+                first = k
+            size = max(size, abs(x), abs(y))
+            span = max(span, abs(x - x0), abs(y - y0))
+            area += (x - x0) * (points[after, j] - y0) - (points[after, i] - x0) * (y - y0)
+        bound = (stop - start) * 2.0**-49 * (span * size + span * span) + 2.0**-1000
+        firsts[ring], signs[ring] = first, 1 if area > bound else -1 if -area > bound else 0
+        start = stop
+
 
 Slice = tuple[Seen, Plane, list[Area]]
 _BYTES: Final = 100

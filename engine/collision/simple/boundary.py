@@ -16,7 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from engine.collision.exact_images import HalfSpaceImage, Vector, as_vector, image_point, rounded, value_at
+from engine.collision.exact_images import (
+    HalfSpaceImage,
+    Vector,
+    as_vector,
+    image_point,
+    plane_in_frame,
+    rounded,
+    value_at,
+)
 from engine.collision.meshes.exact_body import ExactBody, exact_pair, faces_in
 from engine.collision.meshes.exact_regions import cells_of, sides_at
 from engine.collision.meshes.mesh_arrays import NO_AREA, STATE_STACKED, MeshArrays, MeshBody, mesh_body_of
@@ -195,10 +203,7 @@ def signs_of(plane: HalfSpaceImage, points: FloatArray, pose: Pose | None, work:
 def pulled_back(plane: HalfSpaceImage, pose: Pose | None) -> tuple[HalfSpaceImage, FloatArray, float]:
     """Return ((N, D), weights, offset). (N, D): exact, with N . p + D the plane's value at the image of p under the
     pose; weights, offset: N and D as doubles, the largest magnitude scaled to 1."""
-    normal, offset = plane
-    if pose is not None:
-        offset += dot(normal, as_vector(pose.translation.tolist()))
-        normal = tuple(dot(normal, as_vector(column)) for column in pose.rotation.T.tolist())
+    normal, offset = plane_in_frame(plane, pose)
     largest = max(abs(value) for value in (*normal, offset))
     return (normal, offset), np.array([float(value / largest) for value in normal]), float(offset / largest)
 

@@ -10,9 +10,9 @@ import pytest
 
 import engine
 from engine.collision.collide import posed
+from engine.collision.exact_images import image_plane
 from engine.running.budget import Budget
-from engine.solid_cutting.exact_sums import exact_volume, mesh_of_half_spaces
-from engine.solid_cutting.overlap import _moved
+from engine.solid_cutting.exact_measures import exact_volume, mesh_of_half_spaces
 from tests.reference.cutting import convex_overlap, cut_volume, nearest, points_of, ring_area, signed_volume
 from tests.unit.solid_cutting.bodies import CUBE, block, joined, star
 
@@ -111,11 +111,16 @@ def poses(draw: np.random.Generator) -> Any:
 def exact(first: Any, second: Any, moves: tuple[Any, Any]) -> list[Fraction]:
     """Return what two convex bodies have in common, and each alone, by double description."""
     rows = [
-        [_moved([Fraction(x) for x in row], posed(move, body, "pose")) for row in rows_of(body)]
+        [[*normal, offset] for row in rows_of(body) for normal, offset in [moved(row, posed(move, body, "pose"))]]
         for body, move in zip((first, second), moves)
     ]
     meshes = [mesh_of_half_spaces(some, Budget()) for some in (rows[0] + rows[1], *rows)]
     return [Fraction(0) if mesh is None else exact_volume(mesh) for mesh in meshes]
+
+
+def moved(row: Any, pose: Any) -> Any:
+    *normal, offset = map(Fraction, row)
+    return image_plane((tuple(normal), offset), pose)
 
 
 def rows_of(body: Any) -> Any:
