@@ -23,12 +23,7 @@ from engine.collision.outline_batch import outline_arrays
 from engine.collision.simple import closed_forms as forms
 from engine.collision.simple.against_ball import body_sphere_parts, collide_body_sphere
 from engine.collision.simple.boundary import live_parts
-from engine.errors import (
-    InvalidInputError,
-    UnsupportedPairError,
-    UnsupportedSolidError,
-    WrongDimensionError,
-)
+from engine.errors import InvalidInputError, UnsupportedPairError, UnsupportedSolidError, WrongDimensionError
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Options, Progress, check_options
 from engine.solids.accepted import PoseLike, SolidLike

@@ -19,15 +19,7 @@ from engine.collision.meshes.mesh_pair import SPACE, search_goal
 from engine.collision.meshes.parity import states_of
 from engine.collision.meshes.placement import PoseArrays
 from engine.collision.meshes.pose_batch import ONE_SETTLES, relate_poses
-from engine.collision.result import (
-    RELATIONS,
-    SWAPPED_RELATION,
-    UNCOUNTED,
-    Collision,
-    PoseRelations,
-    Work,
-    has_faces,
-)
+from engine.collision.result import RELATIONS, SWAPPED_RELATION, UNCOUNTED, Collision, PoseRelations, Work, has_faces
 from engine.collision.simple.against_ball import centers_in_frame, named, relate_balls
 from engine.collision.simple.closed_forms import relation_closed_form
 from engine.compiling.jit import entry_of

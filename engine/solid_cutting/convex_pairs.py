@@ -34,17 +34,7 @@ from collections import namedtuple
 from typing import Final
 
 from engine.compiling.jit import called, inline, kernel
-from engine.predicates.error_free import (
-    U2,
-    dd_add,
-    dd_div,
-    dd_mul,
-    dd_scale,
-    dd_sub,
-    fast_two_sum,
-    two_sum,
-    workspace,
-)
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_scale, dd_sub, fast_two_sum, two_sum, workspace
 from engine.solid_cutting.sums import certified
 from engine.types import FlagArray, FloatArray, IntArray
 

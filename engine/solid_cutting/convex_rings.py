@@ -23,15 +23,7 @@ from __future__ import annotations
 from typing import Final
 
 from engine.compiling.jit import called, inline, kernel
-from engine.predicates.error_free import (
-    U2,
-    dd_add,
-    dd_div,
-    dd_mul,
-    dd_sub,
-    two_diff,
-    workspace,
-)
+from engine.predicates.error_free import U2, dd_add, dd_div, dd_mul, dd_sub, two_diff, workspace
 from engine.predicates.orientation import BOUND_2D, GUARD_2D, orient2d_exact
 from engine.solid_cutting.sums import certified, cross_of
 from engine.types import UNDECIDED, FlagArray, FloatArray, Point2

@@ -13,13 +13,7 @@ from engine.errors import NotRepresentableError, WrongDimensionError
 from engine.predicates.rational import SMALLEST_NORMAL, exponent_of, nearest_float, shifted
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options
-from engine.solid_cutting.exact_measures import (
-    Measures,
-    exact_centroid,
-    exact_faces,
-    exact_volume,
-    nearest_area,
-)
+from engine.solid_cutting.exact_measures import Measures, exact_centroid, exact_faces, exact_volume, nearest_area
 from engine.solid_cutting.shells import Shells, outward, shells
 from engine.solid_cutting.sums import LOST_TO_ROOTS, bound_of, sum_area, sum_moments, sum_volume
 from engine.solids.accepted import SolidLike

@@ -305,7 +305,4 @@ def _flat(view: Seen, plane: Plane, number: int) -> tuple[float, float]:
     first = square * place[i] + normal[i] * offset * w
     along = tuple(int(k == i) for k in range(3))
     second = dot(cross(normal, along), place[:3])
-    return (
-        nearest_root_over(first, square * rest, square * rest * w),
-        nearest_root_over(second, rest, rest * w),
-    )
+    return (nearest_root_over(first, square * rest, square * rest * w), nearest_root_over(second, rest, rest * w))

@@ -22,15 +22,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import NamedTuple
 
-from engine.collision.meshes.exact_body import (
-    Corners,
-    ExactBody,
-    Plane,
-    Vector,
-    drop_axis,
-    rounded_outward,
-    value_at,
-)
+from engine.collision.meshes.exact_body import Corners, ExactBody, Plane, Vector, drop_axis, rounded_outward, value_at
 from engine.predicates.orientation import tie_sign_exact
 from engine.predicates.rational import cross, dot, minus, sign_of
 from engine.running.budget import Budget
