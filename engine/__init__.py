@@ -53,7 +53,7 @@ from engine.scenes.distances import SceneDistances
 from engine.scenes.ends import ScenePieces
 from engine.scenes.hits import SceneHits
 from engine.scenes.locate import SceneLocations
-from engine.scenes.locate_scene import locate_scene
+from engine.scenes.point_queries import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import SegmentPieces, clip_segments
 from engine.segment_clipping.hits import HitKind, Hits, hits

@@ -35,7 +35,7 @@ from engine.polygon_overlay.overlay import overlay, union_all
 from engine.running.budget import Budget
 from engine.running.parallel import check_options
 from engine.scenes.collide_scene import collide_scene
-from engine.scenes.locate_scene import locate_scene
+from engine.scenes.point_queries import locate_scene
 from engine.scenes.scene import Scene
 from engine.segment_clipping.clip_segments import clip_segments
 from engine.segment_clipping.hits import hits

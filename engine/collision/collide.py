@@ -408,17 +408,16 @@ def detail_of(first: Solid, second: Solid, poses: result.Poses, relation: Relati
 
 def has_interior(solid: Solid, budget: Budget) -> bool:
     """Return whether a solid contains an open set; cached."""
-    return solid.prepared("has_interior", lambda: _has_interior(solid, budget), budget.check)
 
+    def find() -> bool:
+        if isinstance(solid, (HalfSpace, Sphere)):
+            return isinstance(solid, HalfSpace) or solid.radius > 0.0
+        if isinstance(solid, Aabb):
+            return bool((solid.min < solid.max).all())
+        if solid.dimension == 2:
+            is_simple = bool(outline_arrays(solid, budget)[2].any())
+            return is_simple or bool(live_edges(outline_of(solid, None, budget), budget))
+        mesh = mesh_body_of(solid)
+        return mesh.has_inside and any(any(live_parts(mesh, face, budget)) for face in range(len(mesh.faces)))
 
-def _has_interior(solid: Solid, budget: Budget) -> bool:
-    if isinstance(solid, HalfSpace):
-        return True
-    if isinstance(solid, Sphere):
-        return solid.radius > 0.0
-    if isinstance(solid, Aabb):
-        return bool((solid.min < solid.max).all())
-    if solid.dimension == 2:
-        return bool(outline_arrays(solid, budget)[2].any()) or bool(live_edges(outline_of(solid, None, budget), budget))
-    mesh = mesh_body_of(solid)
-    return mesh.has_inside and any(any(live_parts(mesh, face, budget)) for face in range(len(mesh.faces)))
+    return solid.prepared("has_interior", find, budget.check)

@@ -32,14 +32,10 @@ from engine.solids.pose import Pose, motion_of
 from engine.solids.poses import Poses, as_pose_arrays, check_pose_arrays
 from engine.solids.primitives import Sphere
 from engine.solids.rotations import is_certified_rotation
-from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
+from engine.types import Accuracy, FloatArray, IntArray, read_only
 
-_Answers = (
-    tuple[PoseRelations, one_pair.Witnesses]
-    | tuple[PoseRelations, Int8Array]
-    | tuple[PoseRelations, one_pair.Witnesses, Int8Array]
-)
-PoseCollisions = PoseRelations | _Answers
+PoseCollisions = PoseRelations | tuple[Any, ...]
+"""Relations; then witnesses, then details, where asked for."""
 
 
 @overload

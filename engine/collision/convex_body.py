@@ -72,25 +72,24 @@ class ConvexBody:
 
 def convex_body_of(solid: Solid) -> ConvexBody | None:
     """Return the convex body of a solid of space; None if it is not provably convex. Cached."""
-    return solid.prepared("convex_body", lambda: _build_body(solid))
 
+    def build() -> ConvexBody | None:
+        if isinstance(solid, Sphere) and solid.dimension == 3 and solid.radius > 0.0:
+            return _ball(solid)
+        if isinstance(solid, Aabb) and solid.dimension == 3 and bool((solid.min < solid.max).all()):
+            with np.errstate(all="ignore"):
+                center = 0.5 * solid.min + 0.5 * solid.max
+            if bool(((solid.min < center) & (center < solid.max)).all()):
+                return _hull(corners_of_box(solid.min, solid.max), BOX_TRIANGLES.reshape(-1, 3), center)
+        if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
+            certificate = convexity(solid)
+            if certificate is not None:
+                triangles = solid.triangles if certificate.is_outward else solid.triangles[:, ::-1]
+                used, numbered = np.unique(triangles, return_inverse=True)
+                return _hull(solid.vertices[used], numbered.reshape(-1, 3), certificate.center)
+        return None
 
-def _build_body(solid: Solid) -> ConvexBody | None:
-    """Build the convex body of a solid of space; None if it is not provably convex."""
-    if isinstance(solid, Sphere) and solid.dimension == 3 and solid.radius > 0.0:
-        return _ball(solid)
-    if isinstance(solid, Aabb) and solid.dimension == 3 and bool((solid.min < solid.max).all()):
-        with np.errstate(all="ignore"):
-            center = 0.5 * solid.min + 0.5 * solid.max
-        if bool(((solid.min < center) & (center < solid.max)).all()):
-            return _hull(corners_of_box(solid.min, solid.max), BOX_TRIANGLES.reshape(-1, 3), center)
-    if isinstance(solid, Polyhedron) and len(solid.triangles) <= MOST_FACES:
-        certificate = convexity(solid)
-        if certificate is not None:
-            triangles = solid.triangles if certificate.is_outward else solid.triangles[:, ::-1]
-            used, numbered = np.unique(triangles, return_inverse=True)
-            return _hull(solid.vertices[used], numbered.reshape(-1, 3), certificate.center)
-    return None
+    return solid.prepared("convex_body", build)
 
 
 def _ball(ball: Sphere) -> ConvexBody:

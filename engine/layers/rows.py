@@ -31,7 +31,7 @@ from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
 from engine.polygon_overlay.touching import Touching, collapsed, concatenate_touching, touching
 from engine.running.budget import polled
-from engine.scenes.locate_scene import locate_scene
+from engine.scenes.point_queries import locate_scene
 from engine.solids.accepted import PointsLike
 from engine.solids.checks import shown
 from engine.solids.polygon import Polygon

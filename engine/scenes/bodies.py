@@ -16,14 +16,15 @@ import numpy as np
 from engine.bounding.aabb import place_boxes
 from engine.bounding.bvh import UNUSED, WIDTH, Bvh, build_bvh
 from engine.collision.batches import SceneBatches, SceneBodies, bodies_of, check_collidable, distinct_of
+from engine.collision.collide import posed
 from engine.compiling.jit import entry_of
 from engine.containment.locators import Locator, locator_of
 from engine.containment.methods.filters import frames_of
 from engine.containment.methods.rational_locate import Check, fold_csg_tree, is_located
 from engine.containment.posed_locators import posed_locator
-from engine.errors import EngineError
+from engine.errors import EngineError, InvalidArrayError, WrongDimensionError
 from engine.lanes.boxes import BOX_ROWS, EMPTY
-from engine.running.budget import Budget
+from engine.running.budget import Budget, polled
 from engine.running.parallel import run_chunks
 from engine.scenes.location_tables import LocateTables, Tables, moved_boxes
 from engine.scenes.near_boxes import BodyTree, put_keys
@@ -33,8 +34,10 @@ from engine.solids.base import Preparing, Solid
 from engine.solids.csg import Csg
 from engine.solids.implicit import Implicit
 from engine.solids.pose import Pose, motions_of
+from engine.solids.poses import Poses
 from engine.solids.primitives import Sphere
 from engine.solids.registry import own_box, row_of
+from engine.solids.shapes import as_solid
 from engine.types import FloatArray, IntArray, read_only
 
 _LISTED: Final = 4
@@ -55,20 +58,22 @@ class Bodies(Preparing):
 
     def arrays(self, budget: Budget) -> SceneBodies:
         """Return the bodies as flat arrays; caller guarantees at least one body."""
-        return self.prepared("arrays", lambda: self._as_arrays(budget), budget.check)
 
-    def _as_arrays(self, budget: Budget) -> SceneBodies:
-        return bodies_of(self.solids, self.poses, *distinct_of(self.solids), budget.check)
+        def build() -> SceneBodies:
+            return bodies_of(self.solids, self.poses, *distinct_of(self.solids), budget.check)
+
+        return self.prepared("arrays", build, budget.check)
 
     def tree(self, budget: Budget) -> BodyTree:
         """Return the tree over the boxes of the bodies; caller guarantees at least one body."""
-        return self.prepared("tree", lambda: self._as_tree(budget), budget.check)
 
-    def _as_tree(self, budget: Budget) -> BodyTree:
-        arrays = self.arrays(budget)
-        boxes = arrays.low.copy(), arrays.high.copy()
-        self._place_odd(np.arange(len(arrays.kinds)), self.poses, *boxes, budget)
-        return body_tree(*boxes, _LISTED)
+        def build() -> BodyTree:
+            arrays = self.arrays(budget)
+            boxes = arrays.low.copy(), arrays.high.copy()
+            self._place_odd(np.arange(len(arrays.kinds)), self.poses, *boxes, budget)
+            return body_tree(*boxes, _LISTED)
+
+        return self.prepared("tree", build, budget.check)
 
     def _place_odd(
         self, names: IntArray, poses: Sequence[Pose | None], low: FloatArray, high: FloatArray, budget: Budget
@@ -176,6 +181,32 @@ class Bodies(Preparing):
     def check_cut(self, budget: Budget) -> None:
         """Raise unless segments can be clipped to every body."""
         self.prepared("cut", lambda: check_cut(self.solids), budget.check)
+
+
+def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Pose | None, ...]]:
+    """Return solids of one dimension and a pose or None for each; other shapes are read by `engine.solids.shapes`."""
+    if not isinstance(solids, (list, tuple)):
+        raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
+    solids = list(solids)
+    for index, solid in enumerate(polled(solids)):
+        if not isinstance(solid, Solid):
+            solid = solids[index] = as_solid(solid, "solids", index)
+        if solid.dimension != solids[0].dimension:
+            raise WrongDimensionError(
+                f"solids[{index}] is {solid.dimension}D, solids[0] {solids[0].dimension}D; use one dimension",
+                ("solids", index),
+            )
+    solids = tuple(solids)
+    if poses is None:
+        return solids, (None,) * len(solids)
+    poses = list(poses) if isinstance(poses, Poses) else poses
+    if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):
+        given = f"{len(poses)}" if isinstance(poses, (list, tuple)) else type(poses).__name__
+        raise InvalidArrayError(f"poses must be a list of {len(solids)}, one for each solid, got {given}", ("poses",))
+    is_plain = not set(map(type, poses)) - {Pose, type(None)}
+    if is_plain and all(each is None or len(each.translation) == solids[0].dimension for each in poses):
+        return solids, tuple(poses)
+    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(zip(polled(poses), solids)))
 
 
 def body_box(solid: Solid, pose: Pose | None, check: Check) -> tuple[FloatArray, FloatArray]:

@@ -223,7 +223,10 @@ def collide_bodies(
         answers = Answers(budget, boolean, relations, named, details)
         _settle(bodies, pairs, answers, workers, progress)
         works += answers.works
-        near = None if gap is None else _measure_gaps(batches, pairs, answers, gap, workers)
+        near = None
+        if gap is not None:
+            near, apart = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
+            near[apart] = distances_below(batches, pairs[apart], gap, not boolean, budget, workers)
         parts.append(_select_pairs(bodies, pairs, answers, near))
         budget.take((_BYTES + _BYTES_OF_WITNESS * witnesses) * len(parts[-1].first))
     budget.check()
@@ -252,17 +255,6 @@ def _settle(
         answers.settle(left[start:stop], pair_of)
 
     run_chunks(task, len(left), budget=answers.budget, first_chunk=4, workers=workers, progress=progress)
-
-
-def _measure_gaps(
-    batches: SceneBatches, pairs: IntArray, answers: Answers, gap: float, workers: int | None
-) -> FloatArray:
-    """Return the distance of each pair (n, 2) of a block: 0.0 if they meet, infinite if not below the gap. answers: the
-    relations of the pairs, and options."""
-    distances, disjoint = np.zeros(len(pairs)), np.flatnonzero(answers.relations == Relation.DISJOINT)
-    is_measured = not answers.boolean
-    distances[disjoint] = distances_below(batches, pairs[disjoint], gap, is_measured, answers.budget, workers)
-    return distances
 
 
 def _select_pairs(bodies: SceneBodies, pairs: IntArray, answers: Answers, near: FloatArray | None) -> ScenePairs:

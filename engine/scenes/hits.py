@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from engine.predicates.error_free import two_diff
 from engine.running.budget import Budget, Cancel, reading
 from engine.running.parallel import Progress, check_options
 from engine.scenes.near_boxes import near_pairs, scratch_for
+from engine.scenes.placements import Placements
 from engine.scenes.posed_cut import _turned
 from engine.scenes.table import _frame_of
 from engine.segment_clipping import hits as on_one
@@ -28,9 +29,6 @@ from engine.solids.columns import Columns
 from engine.solids.pose import Pose
 from engine.solids.registry import refused, row_of
 from engine.types import Accuracy, FloatArray, Int8Array, IntArray, read_only
-
-if TYPE_CHECKING:
-    from engine.scenes.placements import Placements
 
 _PAIRS: Final = 1 << 18
 """Pairs of lines and bodies that are looked at together."""

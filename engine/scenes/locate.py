@@ -61,11 +61,8 @@ class SceneLocations(Ragged):
     _not_rows: ClassVar[tuple[str, ...]] = ("indices", "on_boundary")
     _rows: ClassVar[str] = "points"
     offsets: IntArray
-    """``(n_points + 1,)`` int64."""
     indices: IntArray
-    """``(n_held,)`` int64: positions in the list of solids."""
     on_boundary: BoolArray
-    """``(n_held,)``: True where the point is on the body's boundary, False where it is inside."""
 
     def __len__(self) -> int:
         return len(self.offsets) - 1

@@ -16,11 +16,10 @@ from engine.errors import (
     IndexOutOfRangeError,
     InvalidArrayError,
     InvalidOperationError,
-    WrongDimensionError,
 )
-from engine.running.budget import Budget, Cancel, polled
+from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
-from engine.scenes.bodies import Bodies
+from engine.scenes.bodies import Bodies, checked_bodies
 from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, meets_any
 from engine.scenes.collide_scene import PairQuery, ScenePairs, collide_bodies, pair_keys
 from engine.scenes.ends import ScenePieces, merge_parts, sort_pieces
@@ -32,8 +31,6 @@ from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.base import Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, shown
 from engine.solids.pose import Pose
-from engine.solids.poses import Poses
-from engine.solids.shapes import as_solid
 from engine.types import Accuracy, BoolArray, FloatArray
 
 _BYTES_OF_POSE: Final = 1000
@@ -78,8 +75,7 @@ class Scene(PointQueries):
     hits = hits
 
     def __init__(self, solids: SolidsLike, poses: PosesLike | None = None) -> None:
-        bodies = Bodies(*checked_bodies(solids, poses))
-        object.__setattr__(self, "_placements", Placements(bodies, {}))
+        super().__init__(Placements(Bodies(*checked_bodies(solids, poses)), {}))
 
     def __len__(self) -> int:
         return len(self.solids)
@@ -148,7 +144,7 @@ class Scene(PointQueries):
             if type(pose) is not Pose or len(pose.translation) != solids[0].dimension:
                 given[body] = posed(pose, solids[body], "poses", body)
         scene = object.__new__(Scene)
-        object.__setattr__(scene, "_placements", self._placements.after(given))
+        PointQueries.__init__(scene, self._placements.after(given))
         return scene
 
     def collide(
@@ -350,32 +346,6 @@ class Scene(PointQueries):
                 raise IndexOutOfRangeError(message, (name, place))
             indices.add(int(body))
         return sorted(indices)
-
-
-def checked_bodies(solids: Any, poses: Any) -> tuple[tuple[Solid, ...], tuple[Pose | None, ...]]:
-    """Return solids of one dimension and a pose or None for each; other shapes are read by `engine.solids.shapes`."""
-    if not isinstance(solids, (list, tuple)):
-        raise InvalidArrayError(f"solids must be a list of solids, got {type(solids).__name__}", ("solids",))
-    solids = list(solids)
-    for index, solid in enumerate(polled(solids)):
-        if not isinstance(solid, Solid):
-            solid = solids[index] = as_solid(solid, "solids", index)
-        if solid.dimension != solids[0].dimension:
-            raise WrongDimensionError(
-                f"solids[{index}] is {solid.dimension}D, solids[0] {solids[0].dimension}D; use one dimension",
-                ("solids", index),
-            )
-    solids = tuple(solids)
-    if poses is None:
-        return solids, (None,) * len(solids)
-    poses = list(poses) if isinstance(poses, Poses) else poses
-    if not isinstance(poses, (list, tuple)) or len(poses) != len(solids):
-        given = f"{len(poses)}" if isinstance(poses, (list, tuple)) else type(poses).__name__
-        raise InvalidArrayError(f"poses must be a list of {len(solids)}, one for each solid, got {given}", ("poses",))
-    is_plain = not set(map(type, poses)) - {Pose, type(None)}
-    if is_plain and all(each is None or len(each.translation) == solids[0].dimension for each in poses):
-        return solids, tuple(poses)
-    return solids, tuple(posed(each, solid, "poses", k) for k, (each, solid) in enumerate(zip(polled(poses), solids)))
 
 
 def _renamed(error: EngineError, bodies: list[int]) -> EngineError:

@@ -44,9 +44,8 @@ FACE_FACE, EDGE_FACE, VERTEX_FACE, EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX, CONTAI
 N_NAMED = 32
 BOTH = 3
 
-_BAD, FLUSH, N_SIGNS = 9, 10, 11
-"""Slots of the work space after nine signs. _BAD: 1 if a sign is undecided; FLUSH: bits of the corners that lie in the
-plane of the other face, 3 bits a face."""
+_BAD, N_SIGNS = 9, 10
+"""Slot of the work space after nine signs: 1 if a sign is undecided."""
 
 
 @called
@@ -194,7 +193,7 @@ def classify_contact(
     poses: FloatArray, t: Facet, axis: int, u: Facet, their_axis: int, error: float, work: Int8Array
 ) -> tuple[int, int]:
     """Return (kind, bits) of the contact of two faces with area that have a common point. axis, their_axis: along them
-    the projections of t and u have an area. Sets ``work[FLUSH]`` to the corners in the other's plane, 3 bits a face.
+    the projections of t and u have an area.
 
     | result | meaning |
     | --- | --- |
@@ -202,12 +201,11 @@ def classify_contact(
     | bits | open faces that the other face may cut: 1 for t, 2 for u, 3 (BOTH) for both or if undecided |
     | | 0 if the faces share a single point, or a part of their borders only |
     """
-    work[_BAD] = work[FLUSH] = 0
+    work[_BAD] = 0
     sides, their_sides = sides_of(poses, u, t, error), sides_of(poses, t, u, error)
     for k in range(3):
         if sides[k] == UNDECIDED or their_sides[k] == UNDECIDED:
             return UNSETTLED, BOTH
-        work[FLUSH] |= int(sides[k] == 0) << k | int(their_sides[k] == 0) << 3 + k
     own, their = single_coplanar_corner(sides), single_coplanar_corner(their_sides)
     for k in range(3):
         is_common = own >= 0 and is_same(corner(t, own), corner(u, k))

@@ -80,7 +80,7 @@ Descent = namedtuple("Descent", "stack frames work poses signs")
 | frames | (2, 22, 8) float32 | see `lanes/boxes.py` |
 | work | (28, 8) float32 | of `lanes/boxes.py` and `lanes/faces.py`, for one pair of nodes |
 | poses | (2, 12) float64 | rotation and translation of either body, for exact signs |
-| signs | (11,) int8 | of `contact_kinds.py` |
+| signs | (10,) int8 | of `contact_kinds.py` |
 """
 
 Contacts = namedtuple("Contacts", "pairs kinds met")

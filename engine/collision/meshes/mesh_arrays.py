@@ -99,19 +99,15 @@ class MeshBody:
 
 def mesh_body_of(solid: Solid) -> MeshBody:
     """Return the mesh of a polyhedron, surface or 3D box, built at the first call and cached with the solid."""
-    return solid.prepared("mesh_body", lambda: build_mesh_body(solid))
 
-
-def build_mesh_body(solid: Solid) -> MeshBody:
-    """Build the mesh of a polyhedron, surface or 3D box."""
-    if isinstance(solid, Aabb):
-        vertices, triangles, faces = _box_triangles(solid)
-        has_inside = bool((solid.min < solid.max).all())
-    else:
+    def build() -> MeshBody:
+        if isinstance(solid, Aabb):
+            return mesh_body_of_triangles(*_box_triangles(solid), bool((solid.min < solid.max).all()))
         assert isinstance(solid, Mesh)
-        vertices, triangles, faces = solid.vertices, solid.triangles, solid.triangle_faces
-        has_inside = isinstance(solid, Polyhedron)
-    return mesh_body_of_triangles(vertices, triangles, faces, has_inside)
+        given = solid.vertices, solid.triangles, solid.triangle_faces
+        return mesh_body_of_triangles(*given, isinstance(solid, Polyhedron))
+
+    return solid.prepared("mesh_body", build)
 
 
 def mesh_body_of_triangles(vertices: FloatArray, triangles: IntArray, faces: IntArray, has_inside: bool) -> MeshBody:

@@ -21,7 +21,7 @@ from engine.collision.meshes.mesh_arrays import MeshArrays
 from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_point, to_local_frame
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.separated import FEW, kind_of_pair, touches_in_planes
-from engine.collision.meshes.touching import DECIDED, N_FACES, are_separated, flush, relate_by_contacts
+from engine.collision.meshes.touching import N_FACES, are_separated, flush, relate_by_contacts
 from engine.collision.meshes.triangle_triangle import COMMON_AREA, COPLANAR, CORNER, CROSSING, off_plane_point
 from engine.compiling.jit import called, inline, kernel
 from engine.predicates.vectors import as_point3
@@ -65,8 +65,7 @@ def relation_apart(first: MeshArrays, second: MeshArrays, place: dual.Place) -> 
 @called
 def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> None:
     """Fill the row (N_COLUMNS,) of a pair from all its n contacts in ``s.contacts``, choosing the witness among the
-    first n_named. Sorts the contacts. If a class is UNDECIDED the row stays as it is; else the class of each contact
-    examined becomes DECIDED + bits, 3 a face, of the corners in the other face's plane."""
+    first n_named. Sorts the contacts. If a class is UNDECIDED the row stays as it is."""
     pairs, kinds, _ = s.contacts
     first, second = s.first, s.second
     has_crossing = False
@@ -75,31 +74,22 @@ def write_contact_row(s: dual.Search, n: int, n_named: int, row: IntArray) -> No
             return
         has_crossing |= kinds[item] == CROSSING
     sort_named_first(first.faces, second.faces, pairs, kinds, n)
-    is_free, is_named, best, face, their_face = True, n_named > 0, contact.VERTEX_VERTEX + 1, 0, 0
-    for item in range(n):
+    best, face, their_face = contact.VERTEX_VERTEX + 1, 0, 0
+    for item in range(min(n, n_named)):
         i, j = pairs[item, 0], pairs[item, 1]
-        if kinds[item] >= CORNER:
-            kind, may_cut, common = contact.VERTEX_VERTEX, 0, kinds[item] - CORNER
-            s.descent.signs[contact.FLUSH] = 1 << common // 3 | 8 << common % 3
-        elif kinds[item] == COMMON_AREA:
-            kind, may_cut = contact.FACE_FACE, contact.BOTH
-            s.descent.signs[contact.FLUSH] = 63
-        else:
-            kind, may_cut = kind_of_pair(s, i, j)
-        kinds[item] = DECIDED | s.descent.signs[contact.FLUSH]
+        kind = contact.VERTEX_VERTEX
+        if kinds[item] < CORNER:
+            kind = contact.FACE_FACE if kinds[item] == COMMON_AREA else kind_of_pair(s, i, j)[0]
         f, g = first.faces[i], second.faces[j]
-        if item < n_named and (kind < best or (kind == best and (f < face or (f == face and g < their_face)))):
+        if kind < best or (kind == best and (f < face or (f == face and g < their_face))):
             best, face, their_face = kind, f, g
-        is_free, is_named = is_free and may_cut == 0, is_named and best != UNSETTLED
         if s.flag[0] != 0:
             return
-        if kind == contact.FACE_FACE or not (
-            is_free or (item + 1 < n_named and best > contact.EDGE_FACE)
-        ):  # none later is stronger
+        if best <= contact.EDGE_FACE:  # none later is stronger
             break
-    if is_named:
+    if n_named > 0 and best != UNSETTLED:
         row[KIND], row[FIRST_FACE], row[SECOND_FACE] = best, face, their_face
-    row[RELATION] = relate_by_contacts(s, n, is_free, has_crossing)
+    row[RELATION] = relate_by_contacts(s, n, has_crossing)
 
 
 @called

@@ -40,7 +40,6 @@ def kind_of_pair(s: dual.Search, i: int, j: int) -> tuple[int, int]:
     be cut; UNSETTLED and BOTH if one has no area."""
     t, u, axis, their_axis = dual.exact_faces(s, i, j)
     if axis < 0 or their_axis < 0:
-        s.descent.signs[contact.FLUSH] = 0
         return UNSETTLED, contact.BOTH
     return contact.classify_contact(s.descent.poses, t, axis, u, their_axis, dual.exact_error(s), s.descent.signs)
 

@@ -115,7 +115,7 @@ def decide_contact(s: Search, item: int) -> tuple[int, bool]:
     TOUCHING: it does not; UNSETTLED: undecided. shares: whether its faces share an area. Its class becomes DECIDED +
     bits, 3 a face, of the corners that lie on the other closed face."""
     i, j, kinds = s.contacts.pairs[item, 0], s.contacts.pairs[item, 1], s.contacts.kinds
-    if CORNER <= kinds[item] < DECIDED:
+    if kinds[item] >= CORNER:
         common = kinds[item] - CORNER
         kinds[item] = DECIDED | 1 << common // 3 | 8 << common % 3
         return TOUCHING, False
@@ -161,18 +161,12 @@ def relate_clean(s: Search, n: int) -> int:
 
 
 @allocating
-def relate_by_contacts(s: Search, n: int, is_free: bool, has_crossing: bool) -> int:
-    """Return OVERLAPPING or TOUCHING if the n contacts of two placed bodies decide it, else UNSETTLED. is_free: no
-    contact is flush or cuts an open face; the classes are then DECIDED + bits of the corners in the plane of the other
-    face. has_crossing: some contact is a crossing, though none proves overlapping."""
-    both = s.first.has_inside and s.second.has_inside
-    if both and is_free:
-        relation = relate_by_locations(s, n, np.empty(0, np.bool_))
-        if relation != UNSETTLED:
-            return relation
+def relate_by_contacts(s: Search, n: int, has_crossing: bool) -> int:
+    """Return OVERLAPPING or TOUCHING if the n contacts of two placed bodies decide it, else UNSETTLED. has_crossing:
+    some contact is a crossing, though none proves overlapping."""
     if are_separated(s, min(N_FACES, n)):
         return TOUCHING
-    return relate_clean(s, n) if both and not is_free and not has_crossing else UNSETTLED
+    return relate_clean(s, n) if s.first.has_inside and s.second.has_inside and not has_crossing else UNSETTLED
 
 
 DECIDED = 64
@@ -221,7 +215,7 @@ def where_faces_are(
     | UNDECIDED | else |
 
     ``s.contacts``: column `own` of pairs (n, 2) has the faces; kinds (n,) are DECIDED + bits, 3 a face, of the corners
-    on the other face or in its plane. shares (n,): whether the faces of a contact share an area; empty: none does.
+    on the other face. shares (n,): whether the faces of a contact share an area.
     Scratch, 6 n slots or more: hash tables (`hash_slot`) of vertices, known, with is_flush, whether one touches the
     other body, and of the faces that share an area, sharing."""
     contacts, flush, met = s.contacts
@@ -233,7 +227,7 @@ def where_faces_are(
             if flush[item] >> (3 * own + k) & 1:
                 at = hash_slot(known, source.triangles[contacts[item, own], k])
                 known[at], is_flush[at] = source.triangles[contacts[item, own], k], True
-        if len(shares) > 0 and shares[item]:
+        if shares[item]:
             sharing[hash_slot(sharing, contacts[item, own])] = contacts[item, own]
     defect, before = defect_of(target), -1
     for item in range(n + source.components.shape[0]):
@@ -287,7 +281,7 @@ def has_interior_beside(s: Search, source: MeshArrays, face: int) -> bool:
 @allocating
 def relate_by_locations(s: Search, n: int, shares: BoolArray) -> int:
     """Return OVERLAPPING or TOUCHING if the locations of the faces in the n contacts decide it, else UNSETTLED. shares
-    (n,): whether the two faces of a contact share an area; empty: none does."""
+    (n,): whether the two faces of a contact share an area."""
     n_places = 16
     while n_places < 6 * n:
         n_places *= 2

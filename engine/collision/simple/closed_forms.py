@@ -43,20 +43,19 @@ def form_of(solid: Solid) -> FloatArray | None:
     solids. Cached."""
     if solid.type not in FORMS:
         return None
-    return solid.prepared("form", lambda: _form(solid))
 
+    def build() -> FloatArray | None:
+        d, form = solid.dimension, np.zeros(relations.N_NUMBERS)
+        if isinstance(solid, Sphere):
+            form[:d] = form[relations.HIGH : relations.HIGH + d] = solid.center
+            form[relations.RADIUS :] = solid.radius, 1.0
+            return read_only(form)
+        if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
+            form[:d], form[relations.HIGH : relations.HIGH + d] = solid.min, solid.max
+            return read_only(form)
+        return None
 
-def _form(solid: Solid) -> FloatArray | None:
-    """Build the numbers of a ball or a box that is not flat, None for other solids."""
-    d, form = solid.dimension, np.zeros(relations.N_NUMBERS)
-    if isinstance(solid, Sphere):
-        form[:d] = form[relations.HIGH : relations.HIGH + d] = solid.center
-        form[relations.RADIUS :] = solid.radius, 1.0
-        return read_only(form)
-    if isinstance(solid, Aabb) and bool((solid.min < solid.max).all()):
-        form[:d], form[relations.HIGH : relations.HIGH + d] = solid.min, solid.max
-        return read_only(form)
-    return None
+    return solid.prepared("form", build)
 
 
 def closed_form_or(otherwise: result.PairFunction) -> result.PairFunction:

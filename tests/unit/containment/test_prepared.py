@@ -13,7 +13,7 @@ from engine.containment.locate import locate
 from engine.containment.locators import locator_of
 from engine.containment.prepared import rings_of, tree_of
 from engine.errors import DeadlineExceededError
-from engine.scenes.locate_scene import locate_scene
+from engine.scenes.point_queries import locate_scene
 from engine.solids.base import Solid
 from engine.solids.mesh import Polyhedron
 from engine.solids.polygon import Polygon
