@@ -109,7 +109,7 @@ def clip_small_batch(segments: Any, scene: Placements, keep: str) -> ScenePieces
         pieces, words = merge_parts(parts, segments.shape[2]), scene.words(UNLIMITED)
         return sort_pieces(pieces, segments, words, lambda: _exact_ends(segments, scene, UNLIMITED))
     words, room, reached = scene.words(UNLIMITED), scratch_for(scene.n_rows), _IN_ROWS.copy()
-    state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
+    state, out = np.empty(n, np.uint8), _NONE if is_any else firsts_for(n, segments.shape[2])
     entry_of(find_first)(segments, order, n, words, room, is_any, UNLIMITED.flag, state, out, reached)
     _, wanted, _, n_met, n_open, _ = reached.tolist()
     if wanted or (n_open and not np.isfinite(segments).all()):
@@ -161,7 +161,7 @@ def _first_hits(
     """Return, by segment, its state (MET, OPEN, SETTLED: meets none), and the first pieces of those that are MET, not
     computed if `is_any`."""
     n, words, order = len(segments), scene.words(budget), order_of(segments, 0.0, scene.where(budget), budget, workers)
-    state, out = np.empty(n, np.uint8), _NONE if is_any else _firsts_for(n, segments.shape[2])
+    state, out = np.empty(n, np.uint8), _NONE if is_any else firsts_for(n, segments.shape[2])
 
     def task(first: int, last: int) -> None:
         reached, room = np.array([first, 0, 0, 0, 0, 0]), scratch_for(scene.n_rows)
@@ -178,14 +178,14 @@ def _first_hits(
     return state, out if is_any or len(met) == n else [each.take(met, axis=0) for each in out]
 
 
-def _firsts_for(n: int, dimension: int) -> Firsts:
+def firsts_for(n: int, dimension: int) -> Firsts:
     """Allocate room for the first piece of n segments."""
     ends, pairs = (n, dimension), (n, 2)
     owners, points = (np.empty(n, np.int64), np.empty(n, np.int64)), (np.empty(ends), np.empty(ends))
     return Firsts(*owners, *points, np.empty(pairs), np.empty(pairs, np.int64), np.empty(pairs, np.int64))
 
 
-_NONE: Final = _firsts_for(0, 3)
+_NONE: Final = firsts_for(0, 3)
 _IN_ROWS: Final = read_only(np.array([0, 0, 0, 0, 0, 1]))
 """Initial counters of `find_first` for a small batch."""
 

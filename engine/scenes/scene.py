@@ -11,22 +11,16 @@ import numpy as np
 from engine.collision.codes import TOUCHING, UNSETTLED
 from engine.collision.collide import posed
 from engine.distance.clearance import checked_distance
-from engine.errors import (
-    EngineError,
-    IndexOutOfRangeError,
-    InvalidArrayError,
-    InvalidOperationError,
-)
+from engine.errors import EngineError, IndexOutOfRangeError, InvalidArrayError, InvalidOperationError
 from engine.running.budget import Budget, Cancel
 from engine.running.parallel import Options, Progress, check_options, is_unlimited
 from engine.scenes.bodies import Bodies, checked_bodies
-from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, meets_any
+from engine.scenes.clip import Counts, clip_all, clip_first, clip_small_batch, firsts_for, meets_any
 from engine.scenes.collide_scene import PairQuery, ScenePairs, collide_bodies, pair_keys
-from engine.scenes.ends import ScenePieces, merge_parts, sort_pieces
+from engine.scenes.ends import ScenePieces
 from engine.scenes.hits import hits
 from engine.scenes.placements import Placements
 from engine.scenes.point_queries import PointQueries
-from engine.segment_clipping.exact_pieces import ONE, ZERO
 from engine.solids.accepted import PosesLike, SolidsLike
 from engine.solids.base import Solid, _collect_arrays
 from engine.solids.checks import as_point_groups, shown
@@ -314,9 +308,7 @@ class Scene(PointQueries):
             self._placements.base.check_cut(budget)
             result: ScenePieces | BoolArray
             if not len(self):
-                nothing = np.zeros((2, 0), np.int64)
-                result = sort_pieces(merge_parts([], array.shape[2]), array, nothing, lambda: lambda *_: (ZERO, ONE))
-                result = np.zeros(n, np.bool_) if keep == "any" else result
+                result = np.zeros(n, np.bool_) if keep == "any" else ScenePieces(*firsts_for(0, array.shape[2]))
             else:
                 cut: Any = {"all": clip_all, "first": clip_first, "any": meets_any}[keep]
                 result = cut(array, self._placements, counts, budget, workers)

@@ -31,8 +31,7 @@ from engine.scenes.near_boxes import (
     tree_in,
     way_of,
 )
-from engine.scenes.posed_cut import between_planes, in_ball
-from engine.scenes.posed_mesh import UNSURE, WANTS_BODY, crossings_in
+from engine.scenes.posed_cut import UNSURE, WANTS_BODY, between_planes, crossings_in, in_ball
 from engine.segment_clipping.on_boundary.boundary_cut import SETTLED, Crossings, emit
 from engine.segment_clipping.on_boundary.crossing_values import is_item_safe
 from engine.segment_clipping.on_boundary.mesh_contacts import Way

@@ -12,7 +12,7 @@ from engine.containment.methods.rational_locate import exact_inverse, to_world_f
 from engine.containment.prepared import tree_of, tree_row
 from engine.predicates.expansion import LARGEST, SMALLEST
 from engine.predicates.rational import nearest_pair
-from engine.scenes.posed_mesh import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
+from engine.scenes.posed_cut import MESH_WORDS, PLACES, TREE, TREE_PLACES, WANTS_TREE
 from engine.segment_clipping.on_boundary.prepared_boundary import boundary_of
 from engine.solids.base import Solid
 from engine.solids.mesh import Polyhedron

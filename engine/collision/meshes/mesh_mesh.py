@@ -20,6 +20,7 @@ single region if the other body meets it only in faces of its own plane.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -246,46 +247,36 @@ class _OverlappingPair(MeshPair):
 
     def parts(self) -> Parts:
         """Return whether the first, and whether the second body sticks out, and whether their boundaries meet."""
-        self._sticks_out = [False, False]
         self.seek = SEEK_CROSSING
         self.find_contacts()
         if self.is_settled:  # by a crossing: overlapping is known
             return Parts(True, True, True)
-        self._search(self.contacts)
-        first, second = self._sticks_out
-        return Parts(first, second, len(self.contacts) > 0)
+        sticks_out = [False, False]
+        for own, ours, theirs in self._regions():
+            for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
+                sticks_out[own] |= mine and not other
+                sticks_out[1 - own] |= other and not mine
+            if all(sticks_out):
+                break
+        return Parts(sticks_out[0], sticks_out[1], len(self.contacts) > 0)
 
-    def _search(self, contacts: IntArray) -> None:
-        """Inspect patches, then faces in contact, until both bodies are known to stick out of each other or all are
-        inspected. contacts (n, 2): face of the first and of the second body."""
+    def _regions(self) -> Iterator[tuple[int, regions.Sides, regions.Sides]]:
+        """Yield (own, ours, theirs) of regions of patches, then of faces in contact: whether their body `own` (0, 1),
+        and the other, is inside above and below."""
         for own in (0, 1):
             for place, theirs in ((INSIDE, _BOTH), (OUTSIDE, _NEITHER)):
-                for patch in self.patches(own, contacts[:, own], place):
-                    for ours in self.patch_sides(own, patch):
-                        self._record_region(own, ours, theirs)
-                    if all(self._sticks_out):
-                        return
+                for patch in self.patches(own, self.contacts[:, own], place):
+                    yield from ((own, ours, theirs) for ours in self.patch_sides(own, patch))
         for own in (0, 1):
-            order = np.argsort(contacts[:, own], kind="stable")
-            faces, firsts = np.unique(contacts[order, own], return_index=True)
+            order = np.argsort(self.contacts[:, own], kind="stable")
+            faces, firsts = np.unique(self.contacts[order, own], return_index=True)
             for face, kinds in zip(faces.tolist(), np.split(self.kinds[order], firsts[1:])):
                 self.work.budget.check()
-                self._record_face(own, face, set(kinds.tolist()))
-                if all(self._sticks_out):
-                    return
+                yield from ((own, *sides) for sides in self._regions_of_face(own, face, set(kinds.tolist())))
 
-    def _record_region(self, own: int, ours: regions.Sides, theirs: regions.Sides) -> None:
-        """Record which body has a part outside the other, judging by one region of a face of body `own` (0, 1). ours,
-        theirs: whether body `own`, and the other, is inside above and below the region."""
-        for mine, other in ((ours.above, theirs.above), (ours.below, theirs.below)):
-            if mine and not other:
-                self._sticks_out[own] = True
-            if other and not mine:
-                self._sticks_out[1 - own] = True
-
-    def _record_face(self, own: int, face: int, kinds: set[int]) -> None:
-        """Record which body has a part outside the other near a face of body `own` (0, 1). kinds: what
-        `classify_in_detail` wrote for the face's contacts: NO_SHARED_AREA + bits of cut faces, SAME_SIDE, OPPOSITE."""
+    def _regions_of_face(self, own: int, face: int, kinds: set[int]) -> Iterator[tuple[regions.Sides, regions.Sides]]:
+        """Yield (ours, theirs) of the regions of a face of body `own`. kinds: what `classify_in_detail` wrote for its
+        contacts: NO_SHARED_AREA + bits of cut faces, SAME_SIDE, OPPOSITE."""
         body, other = self.exact[own], self.exact[1 - own]
         axis = body.axis(face)
         if axis < 0:
@@ -294,14 +285,12 @@ class _OverlappingPair(MeshPair):
         is_cut = any(kind < SAME_SIDE and kind >> own & 1 for kind in kinds)
         if is_clean and not is_cut:  # one region, and its own body on one side of it: call that above
             if not kinds.isdisjoint((SAME_SIDE, OPPOSITE)):
-                self._record_region(own, _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW)
+                yield _ABOVE, _ABOVE if SAME_SIDE in kinds else _BELOW
                 return
             for q in regions.points_within(body.corners(face)):
                 theirs = regions.sides_over(other, q, axis, body.plane(face))
                 if theirs is not None and theirs.above == theirs.below:
-                    self._record_region(own, _ABOVE, theirs)
+                    yield _ABOVE, theirs
                     return
         for q in regions.regions_of(body, face, [other] if is_clean else [other, body], self.work.budget):
-            self._record_region(own, regions.sides_at(body, q, axis), regions.sides_at(other, q, axis))
-            if all(self._sticks_out):
-                return
+            yield regions.sides_at(body, q, axis), regions.sides_at(other, q, axis)

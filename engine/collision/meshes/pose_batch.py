@@ -22,7 +22,7 @@ from engine.collision.meshes.parity import INSIDE, OUTSIDE, locate_point, to_loc
 from engine.collision.meshes.placement import Placement, PoseArrays, defect_of
 from engine.collision.meshes.separated import FEW, kind_of_pair, touches_in_planes
 from engine.collision.meshes.touching import N_FACES, are_separated, flush, relate_by_contacts
-from engine.collision.meshes.triangle_triangle import COMMON_AREA, COPLANAR, CORNER, CROSSING, off_plane_point
+from engine.collision.meshes.triangle_triangle import COMMON_AREA, COPLANAR, CORNER, CROSSING
 from engine.compiling.jit import called, inline, kernel
 from engine.predicates.vectors import as_point3
 from engine.types import UNDECIDED, FlagArray, Int8Array, IntArray
@@ -111,7 +111,7 @@ def classify_in_detail(s: dual.Search, n: int) -> None:
         kinds[item] = NO_SHARED_AREA | may_cut
         if kind == contact.FACE_FACE:
             t, u, axis, _ = dual.exact_faces(s, i, j)
-            how, shares = flush(s, i, j, t, u, axis, off_plane_point(t, axis))
+            how, shares = flush(s, i, j, t, u, axis)
             if shares:
                 kinds[item] = SAME_SIDE if how == OVERLAPPING else OPPOSITE
         if s.flag[0] != 0:

@@ -83,7 +83,7 @@ def _edge_enters_interior(
 
 
 @called
-def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int, off: PosedPoint3) -> tuple[int, bool]:
+def flush(s: Search, i: int, j: int, t: Facet, u: Facet, axis: int) -> tuple[int, bool]:
     """Return (relation, shares) of coplanar faces i and j with corners t and u. OVERLAPPING: they share an area and
     both bodies lie on the same side; TOUCHING: not so; UNSETTLED: undecided. shares: whether they share an area. axis:
     along it t has an area; off: a point off the plane."""
@@ -136,7 +136,7 @@ def decide_contact(s: Search, item: int) -> tuple[int, bool]:
         return UNSETTLED, False
     kinds[item] = DECIDED | on | theirs_on << 3
     if sides[0] == 0 and sides[1] == 0 and sides[2] == 0:
-        return flush(s, i, j, t, u, axis, off)
+        return flush(s, i, j, t, u, axis)
     by_own = _edge_enters_interior(s, t, sides, u, their_off, their_flat, s.second, j)
     if by_own == OVERLAPPING and parity.state_of(s.first, i, poses) == STATE_STACKED:
         by_own = UNSETTLED

@@ -12,7 +12,7 @@ from engine.running.budget import Budget
 from engine.scenes.bodies import Bodies
 from engine.scenes.near_boxes import MOST_MET, scratch_for
 from engine.scenes.placements import Placements
-from engine.scenes.posed_mesh import WANTS_BODY
+from engine.scenes.posed_cut import WANTS_BODY
 from engine.scenes.segment_kernels import cut_near
 from engine.segment_clipping.exact_pieces import compare
 from engine.segment_clipping.pieces import Pieces, allocate_pieces, first_of, joined
