@@ -122,6 +122,7 @@ def overlay(
         warnings.warn(f"rounding left nothing of {rows.n_collapsed} rows with area", UserWarning, stacklevel=2)
     frame = _frame(left, right, rows, how)
     is_other = ~np.isin(dims_of(frame.geometry.array), [*kinds])
+    is_other &= frame.geometry.geom_type.to_numpy() != "GeometryCollection"  # of parts of these dimensions
     if not keeps_all and is_other.any():
         frame = frame[~is_other]
         if keep_geom_type is None:

@@ -177,6 +177,20 @@ def test_clip_and_dissolve() -> None:
     assert box.geometry.length.tolist() == [1.0, 1.0]
 
 
+def test_a_row_of_a_line_and_a_point_stays_where_the_layer_has_both() -> None:
+    line, mark = shapely.LineString([(0, 1), (6, 1)]), shapely.Point(9, 9)
+    meets = shapely.MultiPolygon([shapely.box(1, 0, 2, 2), shapely.Polygon([(4, 1), (5, 2), (3, 2)])])
+    expected = shapely.GeometryCollection([shapely.Point(4, 1), shapely.LineString([(1, 1), (2, 1)])])
+    for keep in (None, True, False):
+        (row,) = layers.overlay(
+            geopandas.GeoDataFrame(geometry=[line, mark]), geopandas.GeoDataFrame(geometry=[meets]), keep_geom_type=keep
+        ).geometry
+        assert row.normalize() == expected.normalize()
+    with pytest.warns(UserWarning, match="1 rows"):  # of a layer of points alone, the other's rest is no point
+        assert len(layers.overlay(geopandas.GeoDataFrame(geometry=[mark]), geopandas.GeoDataFrame(geometry=[meets]),
+                                  "union")) == 1  # fmt: skip
+
+
 def test_a_grid_and_a_coverage() -> None:
     cells = [shapely.box(k, 0, k + 1, 1) for k in range(3)]
     layer = geopandas.GeoDataFrame(geometry=cells)
