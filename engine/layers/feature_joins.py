@@ -3,49 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, Unpack, overload
+from typing import Any
 
 import numpy as np
 
 from engine.distance.clearance import checked_distance
-from engine.errors import CancelledError, DeadlineExceededError, EngineError
-from engine.layers.feature_rows import ROW, FeatureRows
-from engine.layers.features import Answer
-from engine.layers.geojson import EVERY, Collection, check_each, collection_of, mixed_of, polygons_of
+from engine.layers.feature_rows import ROW, Answer, FeatureRows, reporting
+from engine.layers.geojson import EVERY, Collection, collection_of, mixed_of
 from engine.layers.joins import check_predicate, nearest_of, related_pairs
 from engine.layers.json_text import text_of
-from engine.layers.limits import Limits, TimeOptions
+from engine.layers.limits import Limits
 from engine.layers.members import crs_of, members_of, texts_of
 from engine.layers.rows import NONE, locate_points_in_layer, with_unmatched
+from engine.layers.shapes import MixedLayer
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
-from engine.solids.checks import as_points
 from engine.solids.ragged import summed
-from engine.types import Accuracy, IntArray, read_only
+from engine.types import IntArray, read_only
 
 
-@overload
-def join_features(
-    left: Any,
-    right: Any,
-    predicate: str = "intersects",
-    *,
-    distance: float | None = None,
-    outside: bool = False,
-    report: Literal[False] = False,
-    **options: Unpack[TimeOptions],
-) -> FeatureRows: ...
-@overload
-def join_features(
-    left: Any,
-    right: Any,
-    predicate: str = "intersects",
-    *,
-    distance: float | None = None,
-    outside: bool = False,
-    report: Literal[True],
-    **options: Unpack[TimeOptions],
-) -> tuple[FeatureRows, Accuracy]: ...
+@reporting
 def join_features(
     left: Any, right: Any, predicate: str = "intersects", *, distance: float | None = None, outside: bool = False,
     deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
@@ -61,13 +38,12 @@ def join_features(
     outside : bool, default False
         Also a row for each left feature without one.
     deadline, cancel, report
-        As for `engine.locate`.
+        As for `overlay_features`.
 
     Returns
     -------
     FeatureRows
-        A row for each pair, with the left geometry and the properties of both. With ``report=True`` a pair of it and an
-        `Accuracy`.
+        A row for each pair, with the left geometry and the properties of both.
 
     Raises
     ------
@@ -93,22 +69,14 @@ def join_features(
     check_options(None, None, report=report, outside=outside)
     reach, limits = check_predicate(predicate, distance), Limits(deadline, cancel)
     sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits, EVERY)]
-    write = _writer(sides, ("left", "right"), limits)
-    layers = [mixed_of(side, limits) for side in sides]
-    made = write(related_pairs(layers[0], layers[1], predicate, reach, limits), outside, None)
-    return (made, limits.accuracy) if report else made
+
+    def related(one: MixedLayer, other: MixedLayer) -> _Joined:
+        return related_pairs(one, other, predicate, reach, limits), None
+
+    return _answered(sides, ("left", "right"), related, outside, limits, report)
 
 
-@overload
-def nearest_features(
-    left: Any, right: Any, *, max_distance: float | None = None, exclusive: bool = False, outside: bool = False,
-    report: Literal[False] = False, **options: Unpack[TimeOptions],
-) -> FeatureRows: ...  # fmt: skip
-@overload
-def nearest_features(
-    left: Any, right: Any, *, max_distance: float | None = None, exclusive: bool = False, outside: bool = False,
-    report: Literal[True], **options: Unpack[TimeOptions],
-) -> tuple[FeatureRows, Accuracy]: ...  # fmt: skip
+@reporting
 def nearest_features(
     left: Any, right: Any, *, max_distance: float | None = None, exclusive: bool = False, outside: bool = False,
     deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
@@ -121,16 +89,13 @@ def nearest_features(
         GeoJSON FeatureCollections of any geometries but collections.
     max_distance, exclusive
         As for `engine.layers.sjoin_nearest`.
-    outside : bool, default False
-        Also a row for each left feature without one.
-    deadline, cancel, report
-        As for `engine.locate`.
+    outside, deadline, cancel, report
+        As for `join_features`.
 
     Returns
     -------
     FeatureRows
-        A row for each pair, with the left geometry, the properties of both, and the member `distance`. With
-        ``report=True`` a pair of it and an `Accuracy`.
+        A row for each pair, with the left geometry, the properties of both, and the member `distance`.
 
     Raises
     ------
@@ -157,21 +122,15 @@ def nearest_features(
     most = np.inf if max_distance is None else checked_distance(max_distance, "max_distance")
     limits = Limits(deadline, cancel)
     sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits, EVERY)]
-    write = _writer(sides, ("left", "right"), limits)
-    layers = [mixed_of(side, limits) for side in sides]
-    pairs, distances = nearest_of(layers[0], layers[1], most, bool(exclusive), limits)
-    made = write(pairs, outside, lambda pair: b',"distance":%b' % text_of(float(distances[pair])))
-    return (made, limits.accuracy) if report else made
+
+    def nearest(one: MixedLayer, other: MixedLayer) -> _Joined:
+        pairs, distances = nearest_of(one, other, most, bool(exclusive), limits)
+        return pairs, lambda pair: b',"distance":%b' % text_of(float(distances[pair]))
+
+    return _answered(sides, ("left", "right"), nearest, outside, limits, report)
 
 
-@overload
-def locate_features(
-    points: Any, polygons: Any, *, outside: bool = False, report: Literal[False] = False, **options: Unpack[TimeOptions]
-) -> FeatureRows: ...
-@overload
-def locate_features(
-    points: Any, polygons: Any, *, outside: bool = False, report: Literal[True], **options: Unpack[TimeOptions]
-) -> tuple[FeatureRows, Accuracy]: ...
+@reporting
 def locate_features(
     points: Any, polygons: Any, *, outside: bool = False, deadline: float | None = None, cancel: Cancel | None = None,
     report: bool = False,
@@ -182,15 +141,13 @@ def locate_features(
     ----------
     points, polygons : dict
         GeoJSON FeatureCollections.
-    outside : bool, default False
-        Also a row for a point that no polygon contains.
-    deadline, cancel, report
-        As for `engine.locate`.
+    outside, deadline, cancel, report
+        As for `join_features`.
 
     Returns
     -------
     FeatureRows
-        A row each, with `boundary`, and the properties of both. With ``report=True`` a pair of it and an `Accuracy`.
+        A row each, with `boundary`, and the properties of both.
 
     Raises
     ------
@@ -215,45 +172,41 @@ def locate_features(
     check_options(None, None, report=report, outside=outside)
     limits = Limits(deadline, cancel)
     sides = [collection_of(points, ("points",), limits, ("Point",)), collection_of(polygons, ("polygons",), limits)]
-    there = [k for k, each in enumerate(sides[0].features) if each.get("geometry") is not None]
-    places = [sides[0].features[k]["geometry"].get("coordinates") for k in there]
-    with limits.budget():
-        try:
-            positions = as_points(places, 2, ("points",))
-        except (DeadlineExceededError, CancelledError):
-            raise
-        except EngineError:
-            positions = check_each(there, sides[0], lambda each: as_points([each["coordinates"]], 2)[0])
-    write = _writer(sides, ("point", "polygon"), limits)
-    first, second, on_boundary = locate_points_in_layer(positions, polygons_of(sides[1], limits), limits)
-    words = (b',"boundary":false', b',"boundary":true')
-    pairs = np.column_stack([np.array(there, np.int64)[first], second])
-    made = write(pairs, outside, lambda pair: words[int(on_boundary[pair])])
-    return (made, limits.accuracy) if report else made
+
+    def located(one: MixedLayer, other: MixedLayer) -> _Joined:
+        first, second, on_boundary = locate_points_in_layer(one.paths.vertices, other.areas, limits)
+        words = (b',"boundary":false', b',"boundary":true')
+        pairs = np.column_stack([one.paths.owners()[1][first], second])
+        return pairs, lambda pair: words[int(on_boundary[pair])]
+
+    return _answered(sides, ("point", "polygon"), located, outside, limits, report)
 
 
-def _writer(
-    sides: list[Collection], names: tuple[str, str], limits: Limits
-) -> Callable[[IntArray, bool, Callable[[int], bytes] | None], FeatureRows]:
-    """Return a function that makes the rows of a join: of pairs (n, 2) of features, with the geometry and the members
-    of the first; outside: also a row for each first feature without one; more: further members of a pair, as JSON."""
+_Joined = tuple[IntArray, Callable[[int], bytes] | None]
+"""Pairs (n, 2) of features, and a function of a pair: further members, as JSON."""
+
+
+def _answered(
+    sides: list[Collection], names: tuple[str, str], function: Callable[[MixedLayer, MixedLayer], _Joined],
+    outside: bool, limits: Limits, report: bool,
+) -> Answer:  # fmt: skip
+    """Return the rows of a join, with the geometry and members of the first feature and the members of the second;
+    outside: also a row for each first feature without a second."""
     crs = crs_of(sides if names[0] == "left" else sides[:1], limits)
     geometries = texts_of(sides[0], (each.get("geometry") for each in sides[0].features), "geometry", limits)
     write_members, n_bytes = members_of(sides, names, limits)
+    pairs, more = function(*(mixed_of(side, limits) for side in sides))
+    first, second = pairs.T
+    places = np.arange(len(pairs))
+    if outside:
+        first, second, places = with_unmatched(len(sides[0].features), first, second)
+    limits.budget().take(8 * 4 * len(first))
 
-    def write(pairs: IntArray, outside: bool, more: Callable[[int], bytes] | None) -> FeatureRows:
-        first, second = pairs.T
-        places = np.arange(len(pairs))
-        if outside:
-            first, second, places = with_unmatched(len(sides[0].features), first, second)
-        limits.budget().take(8 * 4 * len(first))
+    def members(row: int) -> bytes:
+        text = write_members(int(first[row]), int(second[row]))
+        return text + more(int(places[row])) if more is not None and places[row] != NONE else text
 
-        def members(row: int) -> bytes:
-            text = write_members(int(first[row]), int(second[row]))
-            return text + more(int(places[row])) if more is not None and places[row] != NONE else text
-
-        sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
-        offsets = read_only(np.arange(len(first) + 1))
-        return FeatureRows(members, offsets, summed(ROW + sizes), crs, geometry=lambda row: geometries[first[row]])
-
-    return write
+    sizes = np.array([*map(len, geometries)], np.int64)[first] + n_bytes(first, second)
+    offsets = read_only(np.arange(len(first) + 1))
+    made = FeatureRows(members, offsets, summed(ROW + sizes), crs, geometry=lambda row: geometries[first[row]])
+    return (made, limits.accuracy) if report else made

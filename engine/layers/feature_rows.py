@@ -6,16 +6,16 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any, Final, Literal, Protocol, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
 from engine.layers.altitudes import heights_at
 from engine.layers.json_text import text_of
 from engine.layers.rows import LayerRows
-from engine.polygon_overlay.touching import Touching
+from engine.running.budget import Cancel
 from engine.solids.ragged import summed
-from engine.types import FloatArray, IntArray, read_only
+from engine.types import Accuracy, FloatArray, IntArray, read_only
 
 _BATCH: Final = 1000
 """Number of features made at a time."""
@@ -23,6 +23,10 @@ ROW: Final = 55
 """Lower bound on the bytes of a row in JSON, without copied members and positions."""
 _POSITION: Final = 10
 """Lower bound on the bytes of a position in JSON."""
+
+
+Areas = tuple[FloatArray, tuple[IntArray, IntArray, IntArray]]
+"""Positions, and offsets of rings, of polygons and of rows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +56,7 @@ class FeatureRows:
     offsets: IntArray
     n_bytes: IntArray
     crs_text: bytes | None
-    areas: tuple[FloatArray, tuple[IntArray, IntArray, IntArray]] | None = None
+    areas: Areas | None = None
     geometry: Callable[[int], bytes | None] = lambda row: None
     collapsed: int = 0
     slivers: tuple[tuple[int, int, float], ...] | None = None
@@ -91,15 +95,55 @@ class FeatureRows:
         given = self.geometry(row)
         if given is not None or self.areas is None:
             return json.loads(given or b"null")
-        positions, (rings, pieces, ends) = self.areas
-        parts = [
-            [positions[i:j] for i, j in pairwise(rings[first : last + 1].tolist())]
-            for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
-        ]
-        if not parts:
-            return None
-        kind, coordinates = ("Polygon", parts[0]) if len(parts) == 1 else ("MultiPolygon", parts)
-        return {"type": kind, "coordinates": coordinates}
+        positions, _ = self.areas
+        parts = _polygons(self.areas, row, lambda start, stop: positions[start:stop])
+        return _joined("Polygon", parts) if parts else None
+
+
+Answer = FeatureRows | tuple[FeatureRows, Accuracy]
+
+
+class Options(TypedDict, total=False):
+    """Arguments by keyword of the functions about GeoJSON."""
+
+    left: object
+    right: object
+    layer: object
+    mask: object
+    lines: object
+    points: object
+    polygons: object
+    how: str
+    predicate: str
+    keep: str
+    gaps: str
+    by: list[str] | None
+    grid: float | None
+    min_width: float | None
+    wrap: float | None
+    distance: float | None
+    max_distance: float | None
+    coverage: bool
+    exclusive: bool
+    outside: bool
+    deadline: float | None
+    cancel: Cancel | None
+
+
+class _Reporting(Protocol):
+    """A function whose answer has an `Accuracy` with it on request."""
+
+    @overload
+    def __call__(self, *given: Any, report: Literal[False] = False, **options: Unpack[Options]) -> FeatureRows: ...
+    @overload
+    def __call__(
+        self, *given: Any, report: Literal[True], **options: Unpack[Options]
+    ) -> tuple[FeatureRows, Accuracy]: ...
+
+
+def reporting(function: Callable[..., Answer]) -> _Reporting:
+    """Return the function as it is, for type checkers a `_Reporting`."""
+    return cast(_Reporting, function)
 
 
 def with_geometries(
@@ -109,48 +153,51 @@ def with_geometries(
     """Return the features of rows. members(row): JSON bytes of a row's members besides type and geometry; n_bytes:
     lower bound on the bytes of JSON of each row but for the geometry; crs: the common member of the layers as JSON;
     sources: altitudes, as `heights_at` has them."""
-    positions, (rings, pieces, ends) = rows.ragged
-    offsets, areas = rings[pieces[ends]], (positions, (rings, pieces, ends))
-    none = Touching(offsets[:0], positions[:0], offsets[:1] * 0, offsets[:0], positions[:0])
-    touching = none if rows.touching is None else rows.touching
-    of_lines = np.repeat(touching.lines, np.diff(touching.offsets))
-    owners = np.concatenate([np.repeat(np.arange(len(rows)), np.diff(offsets)), of_lines, touching.points])
-    heights = heights_at(np.concatenate([positions, touching.vertices, touching.places]), owners, sources)
-    offsets = read_only(summed(np.bincount(owners, minlength=len(rows))))
+    positions, (rings, pieces, ends) = areas = rows.ragged
+    touching, lines, points = rows.touching, rows.touching.lines, rows.touching.points
+    places = np.concatenate([positions, touching.vertices, touching.places])
+    owners = [
+        np.repeat(np.arange(len(rows)), np.diff(rings[pieces[ends]])),
+        np.repeat(lines, np.diff(touching.offsets)),
+    ]
+    owner = np.concatenate([*owners, points])
+    heights = heights_at(places, owner, sources)
+    offsets = read_only(summed(np.bincount(owner, minlength=len(rows))))
     n_bytes = summed(ROW + n_bytes) + _POSITION * offsets
-    if heights is None and not len(touching.lines) + len(touching.points):
+    if heights is None and not len(lines) + len(points):
         return FeatureRows(members, offsets, n_bytes, crs, areas, collapsed=rows.n_collapsed)
-    firsts = np.cumsum([len(positions), len(touching.vertices)]).tolist()
+    places = places if heights is None else np.column_stack([places, heights])
+    first_line, first_point = len(positions), len(places) - len(points)
+    parts_of = [(order := np.argsort(numbers, kind="stable"), numbers[order]) for numbers in (lines, points)]
 
-    def listed(places: FloatArray, start: int, stop: int, first: int = 0) -> list[Any]:
+    def listed(start: int, stop: int) -> list[Any]:
         flat = places[start:stop].tolist()
-        if heights is None:
-            return flat
-        own = heights[first + start : first + stop].tolist()
-        return [[*place, z] if z == z else place for place, z in zip(flat, own)]
-
-    lines, points = ({row: list[Any]() for row in numbers.tolist()} for numbers in (touching.lines, touching.points))
-    for row, start, stop in zip(touching.lines.tolist(), touching.offsets.tolist(), touching.offsets[1:].tolist()):
-        lines[row].append((start, stop))
-    for place, row in enumerate(touching.points.tolist()):
-        points[row].append(place)
+        return flat if heights is None else [place if place[2] == place[2] else place[:2] for place in flat]
 
     def geometry(row: int) -> bytes | None:
-        made: dict[str, list[Any]] = {"Polygon": [], "LineString": [], "Point": []}
-        if heights is not None:
-            made["Polygon"] = [
-                [listed(positions, i, j) for i, j in pairwise(rings[first : last + 1].tolist())]
-                for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
-            ]
-        made["LineString"] = [listed(touching.vertices, i, j, firsts[0]) for i, j in lines.get(row, ())]
-        made["Point"] = [listed(touching.places, k, k + 1, firsts[1])[0] for k in points.get(row, ())]
-        parts = [
-            {"type": f"Multi{kind}" if len(given) > 1 else kind, "coordinates": given if len(given) > 1 else given[0]}
-            for kind, given in made.items()
-            if given
-        ]
+        of_lines, of_points = (order[slice(*np.searchsorted(of, [row, row + 1]))].tolist() for order, of in parts_of)
+        made = {
+            "Polygon": [] if heights is None else _polygons(areas, row, listed),
+            "LineString": [listed(*(first_line + touching.offsets[k : k + 2]).tolist()) for k in of_lines],
+            "Point": [listed(first_point + k, first_point + k + 1)[0] for k in of_points],
+        }
+        parts = [_joined(kind, some) for kind, some in made.items() if some]
         if not parts:
             return None
         return text_of(parts[0] if len(parts) == 1 else {"type": "GeometryCollection", "geometries": parts})
 
     return FeatureRows(members, offsets, n_bytes, crs, areas, geometry, rows.n_collapsed)
+
+
+def _polygons(areas: Areas, row: int, listed: Callable[[int, int], Any]) -> list[list[Any]]:
+    """Return the rings of each piece of a row; listed: the positions from one number to another."""
+    _, (rings, pieces, ends) = areas
+    return [
+        [listed(i, j) for i, j in pairwise(rings[first : last + 1].tolist())]
+        for first, last in pairwise(pieces[ends[row] : ends[row + 1] + 1].tolist())
+    ]
+
+
+def _joined(kind: str, parts: list[Any]) -> dict[str, Any]:
+    """Return one part, or several, as a GeoJSON geometry."""
+    return {"type": f"Multi{kind}", "coordinates": parts} if len(parts) > 1 else {"type": kind, "coordinates": parts[0]}

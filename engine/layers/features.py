@@ -10,16 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal, Unpack, overload
+from typing import Any
 
 import numpy as np
 
 from engine.errors import InvalidInputError
-from engine.layers.feature_rows import FeatureRows, with_geometries
+from engine.layers.feature_rows import Answer, FeatureRows, reporting, with_geometries
 from engine.layers.gaps import check_gaps
 from engine.layers.geojson import EVERY, LINES, Collection, collection_of, mixed_of
 from engine.layers.json_text import text_of
-from engine.layers.limits import ClipOptions, GridOptions, Limits, TimeOptions, UnionOptions
+from engine.layers.limits import Limits
 from engine.layers.members import crs_of, groups_of, members_of, texts_of
 from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
 from engine.layers.rows import NONE, LayerRows
@@ -29,19 +29,9 @@ from engine.layers.widths import slivers_of
 from engine.running.budget import Cancel, polled
 from engine.running.parallel import check_options
 from engine.solids.checks import shown
-from engine.types import Accuracy
-
-Answer = FeatureRows | tuple[FeatureRows, Accuracy]
 
 
-@overload
-def overlay_features(
-    left: Any, right: Any, how: str = "intersection", *, report: Literal[False] = False, **options: Unpack[GridOptions]
-) -> FeatureRows: ...
-@overload
-def overlay_features(
-    left: Any, right: Any, how: str = "intersection", *, report: Literal[True], **options: Unpack[GridOptions]
-) -> tuple[FeatureRows, Accuracy]: ...
+@reporting
 def overlay_features(
     left: Any, right: Any, how: str = "intersection", *, grid: float | None = None, min_width: float | None = None,
     wrap: float | None = None, deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
@@ -55,20 +45,16 @@ def overlay_features(
         geometry keep their properties where what is left of their layer is part of the answer.
     how : {"intersection", "union", "identity", "difference", "symmetric_difference"}
         As `engine.layers.overlay`.
-    grid : float, optional
+    grid, wrap
         As for `engine.layers.overlay`.
     min_width : float, optional
         List the pieces that are narrower, as `engine.layers.slivers` says: in `FeatureRows.slivers`.
-    wrap : 180, optional
-        Coordinates are longitudes and latitudes; polygons with a step of more than 180 degrees between two positions
-        cross the antimeridian. They are cut there first, and joined in the answer.
     deadline, cancel, report
-        As for `engine.locate`.
+        As for `engine.locate`: with ``report=True`` the answer is a pair, of `FeatureRows` and an `Accuracy`.
 
     Returns
     -------
     FeatureRows
-        With ``report=True`` a pair of it and an `Accuracy`.
 
     Raises
     ------
@@ -77,10 +63,8 @@ def overlay_features(
 
     Notes
     -----
-    Altitudes: positions that stay keep theirs, new ones have none; the report counts both. Edges are straight in the
-    plane of the coordinates, in degrees too: no great circles.
-
-    Boundary, degenerate input, accuracy and cost: as `engine.layers.overlay`.
+    As `engine.layers.overlay`; altitudes are counted in the report. Edges are straight in the plane of the coordinates,
+    in degrees too: no great circles.
 
     References
     ----------
@@ -99,26 +83,14 @@ def overlay_features(
     check_options(None, None, report=report)
     limits = Limits(deadline, cancel, grid=grid, wrap=wrap)
     sides = [collection_of(left, ("left",), limits, EVERY), collection_of(right, ("right",), limits)]
-    crs = crs_of(sides, limits)
-    write_members, n_bytes = members_of(sides, ("left", "right"), limits)
-    layers = [mixed_of(side, limits) for side in sides]
-    rows = overlay_mixed(layers[0], layers[1], how, limits, frozenset(layers[0].dims.tolist()) - {-1}, False)
-    with limits.budget():
-        made = with_geometries(
-            rows, lambda row: write_members(int(rows.left[row]), int(rows.right[row])),
-            n_bytes(rows.left, rows.right), crs, [(sides[0].known, rows.left), (sides[1].known, rows.right)],
-        )  # fmt: skip
-    return _finished(made, rows, min_width, limits, report)
+
+    def overlaid(one: MixedLayer, other: MixedLayer) -> LayerRows:
+        return overlay_mixed(one, other, how, limits, one.kinds, False)
+
+    return _answered(sides, ("left", "right"), overlaid, min_width, limits, report)
 
 
-@overload
-def clip_features(
-    layer: Any, mask: Any, *, report: Literal[False] = False, **options: Unpack[ClipOptions]
-) -> FeatureRows: ...
-@overload
-def clip_features(
-    layer: Any, mask: Any, *, report: Literal[True], **options: Unpack[ClipOptions]
-) -> tuple[FeatureRows, Accuracy]: ...
+@reporting
 def clip_features(
     layer: Any, mask: Any, *, keep: str = "inside", grid: float | None = None, min_width: float | None = None,
     wrap: float | None = None, deadline: float | None = None, cancel: Cancel | None = None, report: bool = False,
@@ -131,15 +103,12 @@ def clip_features(
         GeoJSON FeatureCollections, the mask of polygons.
     keep : {"inside", "outside"}
         What is within the mask, or what is outside of it.
-    grid, min_width, wrap
+    grid, min_width, wrap, deadline, cancel, report
         As for `overlay_features`.
-    deadline, cancel, report
-        As for `engine.locate`.
 
     Returns
     -------
     FeatureRows
-        With ``report=True`` a pair of it and an `Accuracy`.
 
     Raises
     ------
@@ -167,20 +136,13 @@ def clip_features(
     limits = Limits(deadline, cancel, grid=grid, wrap=wrap, keep=keep)
     sides = [collection_of(layer, ("layer",), limits, EVERY), collection_of(mask, ("mask",), limits)]
 
-    def clipped(layers: list[MixedLayer]) -> LayerRows:
-        return clip_mixed(layers[0], layers[1], limits, frozenset(layers[0].dims.tolist()) - {-1}, False)
+    def clipped(one: MixedLayer, other: MixedLayer) -> LayerRows:
+        return clip_mixed(one, other, limits, one.kinds, False)
 
-    return _of_left(sides, clipped, min_width, limits, report)
+    return _answered(sides, ("layer",), clipped, min_width, limits, report)
 
 
-@overload
-def dissolve_features(
-    layer: Any, by: list[str] | None = None, *, report: Literal[False] = False, **options: Unpack[UnionOptions]
-) -> FeatureRows: ...
-@overload
-def dissolve_features(
-    layer: Any, by: list[str] | None = None, *, report: Literal[True], **options: Unpack[UnionOptions]
-) -> tuple[FeatureRows, Accuracy]: ...
+@reporting
 def dissolve_features(
     layer: Any, by: list[str] | None = None, *, coverage: bool = False, gaps: str = "keep", grid: float | None = None,
     min_width: float | None = None, wrap: float | None = None, deadline: float | None = None,
@@ -196,16 +158,13 @@ def dissolve_features(
         Names of properties.
     coverage, gaps, grid
         As for `engine.layers.dissolve`.
-    min_width, wrap
+    min_width, wrap, deadline, cancel, report
         As for `overlay_features`.
-    deadline, cancel, report
-        As for `engine.locate`.
 
     Returns
     -------
     FeatureRows
-        Groups in the order of their first features. Properties: those of `by`, and `count`, the features united. With
-        ``report=True`` a pair of it and an `Accuracy`.
+        Groups in the order of their first features. Properties: those of `by`, and `count`, the features united.
 
     Raises
     ------
@@ -259,19 +218,7 @@ def dissolve_features(
     return _finished(made, rows, min_width, limits, report)
 
 
-@overload
-def split_features(
-    layer: Any,
-    lines: Any,
-    *,
-    min_width: float | None = None,
-    report: Literal[False] = False,
-    **options: Unpack[TimeOptions],
-) -> FeatureRows: ...
-@overload
-def split_features(
-    layer: Any, lines: Any, *, min_width: float | None = None, report: Literal[True], **options: Unpack[TimeOptions]
-) -> tuple[FeatureRows, Accuracy]: ...
+@reporting
 def split_features(
     layer: Any, lines: Any, *, min_width: float | None = None, deadline: float | None = None,
     cancel: Cancel | None = None, report: bool = False,
@@ -282,16 +229,13 @@ def split_features(
     ----------
     layer, lines : dict
         GeoJSON FeatureCollections, of polygons and of lines.
-    min_width
+    min_width, deadline, cancel, report
         As for `overlay_features`.
-    deadline, cancel, report
-        As for `engine.locate`.
 
     Returns
     -------
     FeatureRows
-        The pieces of each feature, with its properties; one that no line splits is a row for each of its parts. With
-        ``report=True`` a pair of it and an `Accuracy`.
+        The pieces of each feature, with its properties; one that no line splits is a row for each of its parts.
 
     Raises
     ------
@@ -317,21 +261,22 @@ def split_features(
     check_options(None, None, report=report)
     limits = Limits(deadline, cancel)
     sides = [collection_of(layer, ("layer",), limits), collection_of(lines, ("lines",), limits, LINES)]
-    return _of_left(sides, lambda layers: split_rows(layers[0], layers[1], limits), min_width, limits, report)
+    return _answered(sides, ("layer",), lambda one, other: split_rows(one, other, limits), min_width, limits, report)
 
 
-def _of_left(
-    sides: list[Collection], function: Callable[[list[MixedLayer]], LayerRows], min_width: float | None,
-    limits: Limits, report: bool,
+def _answered(
+    sides: list[Collection], names: tuple[str, ...], function: Callable[[MixedLayer, MixedLayer], LayerRows],
+    min_width: float | None, limits: Limits, report: bool,
 ) -> Answer:  # fmt: skip
-    """Return rows, a function of two layers, with the members and altitudes of the first."""
+    """Return rows, a function of two layers, with the members and altitudes of those that have a name."""
     crs = crs_of(sides, limits)
-    write_members, n_bytes = members_of(sides[:1], ("layer", ""), limits)
-    rows, none = function([mixed_of(side, limits) for side in sides]), NONE
-    sizes = n_bytes(rows.left, np.full(len(rows), NONE))
+    write_members, n_bytes = members_of(sides[: len(names)], names, limits)
+    rows = function(*(mixed_of(side, limits) for side in sides))
+    numbers = rows.left, rows.right if len(names) > 1 else np.full(len(rows), NONE)
     with limits.budget():
+        sources = [(side.known, of_rows) for side, of_rows in zip(sides[: len(names)], numbers)]
         made = with_geometries(
-            rows, lambda row: write_members(int(rows.left[row]), none), sizes, crs, [(sides[0].known, rows.left)]
+            rows, lambda row: write_members(*(int(each[row]) for each in numbers)), n_bytes(*numbers), crs, sources
         )
     return _finished(made, rows, min_width, limits, report)
 

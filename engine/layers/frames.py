@@ -15,7 +15,6 @@ from engine.layers.limits import Limits
 from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
 from engine.layers.rows import NONE, LayerRows, check_how
 from engine.layers.shapes import AREA, LINE, POINT
-from engine.polygon_overlay.touching import Touching
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
 from engine.solids.checks import shown
@@ -116,7 +115,7 @@ def overlay(
     limits = Limits(deadline, cancel, workers, grid, wrap)
     layers = mixed_of(left, "left", limits), mixed_of(right, "right", limits, (AREA,))
     keeps_all = keep_geom_type is not None and not keep_geom_type
-    kinds = _EVERY if keeps_all else frozenset(layers[0].dims.tolist()) - {-1}
+    kinds = _EVERY if keeps_all else layers[0].kinds
     rows = overlay_mixed(*layers, how, limits, kinds, keeps_all)
     if rows.n_collapsed:
         warnings.warn(f"rounding left nothing of {rows.n_collapsed} rows with area", UserWarning, stacklevel=2)
@@ -201,7 +200,7 @@ def clip(
     check_frames("clip", others, layer=layer, mask=region)
     limits = Limits(deadline, cancel, workers, grid, wrap, keep)
     sides = mixed_of(layer, "layer", limits), mixed_of(region, "mask", limits, (AREA,))
-    kinds = frozenset(sides[0].dims.tolist()) - {-1} if keep_geom_type else _EVERY
+    kinds = sides[0].kinds if keep_geom_type else _EVERY
     rows = clip_mixed(*sides, limits, kinds, not keep_geom_type)
     return frame_of_left(layer, rows)
 
@@ -317,25 +316,29 @@ def dissolve(
 
 
 def _geometries(rows: LayerRows, empty: Any = None, source: Any = None) -> Any:
-    """Return an array of the rows' geometries: Polygon for one piece, MultiPolygon for several, `empty` for none; with
-    the touching lines and points added. source: the left geometries, of which Points are taken as they are."""
+    """Return an array of the rows' geometries, `empty` for a row without parts; parts of several dimensions make a
+    GeometryCollection. source: the left geometries, of which Points are taken as they are."""
     _, shapely = geopandas_and_shapely()
     positions, (rings, pieces, ends) = rows.ragged
-    single = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
-    sizes = np.diff(ends)
-    geometries = np.full(len(rows), empty, object)
-    geometries[sizes == 1] = single[ends[:-1][sizes == 1]]
-    if (several := sizes > 1).any():
-        owner = np.repeat(np.cumsum(several) - 1, np.where(several, sizes, 0))
-        geometries[several] = shapely.multipolygons(single[np.repeat(several, sizes)], indices=owner)
-    if rows.touching is not None and len(rows.touching.lines) + len(rows.touching.points):
-        touching = rows.touching
-        if source is not None and len(touching.points):
-            is_whole = (shapely.get_type_id(source) == 0)[rows.left[touching.points]]
-            owners = touching.points[is_whole]
-            geometries[owners] = source[rows.left[owners]]
-            touching = touching._replace(points=touching.points[~is_whole], places=touching.places[~is_whole])
-        _add_touching(geometries, touching)
+    points, lines = shapely.points(rows.touching.places), shapely.GeometryType.LINESTRING
+    if source is not None and len(points):
+        lefts = rows.left[rows.touching.points]
+        points = np.where(shapely.get_type_id(source)[lefts] == shapely.GeometryType.POINT, source[lefts], points)
+    lines = shapely.from_ragged_array(lines, rows.touching.vertices, (rows.touching.offsets,))
+    polygons = shapely.from_ragged_array(shapely.GeometryType.POLYGON, positions, (rings, pieces))
+    owners = np.concatenate([rows.touching.points, rows.touching.lines, np.repeat(np.arange(len(rows)), np.diff(ends))])
+    order, geometries = np.argsort(owners, kind="stable"), np.full(len(rows), empty, object)
+    there, starts, counts = np.unique(owners[order], return_index=True, return_counts=True)
+    if len(there):
+        parts = np.concatenate([points, lines, polygons])[order]
+        dims = dims_of(parts)
+        least, most = np.minimum.reduceat(dims, starts), np.maximum.reduceat(dims, starts)
+        made, of = parts[starts], np.repeat(np.arange(len(there)), counts)
+        makers = [shapely.multipoints, shapely.multilinestrings, shapely.multipolygons, shapely.geometrycollections]
+        for dim, make in enumerate(makers):
+            chosen = ((counts > 1) & (np.where(least == most, most, len(makers) - 1) == dim))[of]
+            make(parts[chosen], indices=of[chosen], out=made)
+        geometries[there] = made
     return geometries
 
 
@@ -349,9 +352,9 @@ def _with_altitudes(geometries: Any, sources: list[tuple[GeoDataFrame, IntArray,
         if shapely.has_z(array).any():
             places, feature = shapely.get_coordinates(array, include_z=True, return_index=True)
             known.append((np.column_stack([feature if groups is None else groups[feature], places]), of_rows))
-    flat, row = (
-        shapely.get_coordinates(geometries, return_index=True) if known else (np.zeros((0, 2)), np.zeros(0, np.int64))
-    )
+    if not known:
+        return geometries
+    flat, row = shapely.get_coordinates(geometries, return_index=True)
     heights = heights_at(flat, row, known)
     if heights is None:
         return geometries
@@ -359,30 +362,6 @@ def _with_altitudes(geometries: Any, sources: list[tuple[GeoDataFrame, IntArray,
     solid = shapely.force_3d(geometries[there])
     made[there] = shapely.set_coordinates(solid, np.column_stack([flat, heights]))
     return made
-
-
-def _add_touching(geometries: Any, touching: Touching) -> None:
-    """Add the lines and points in which pairs touch to the geometries of their rows, in place; mixed types give a
-    GeometryCollection."""
-    _, shapely = geopandas_and_shapely()
-    lines = shapely.from_ragged_array(shapely.GeometryType.LINESTRING, touching.vertices, (touching.offsets,))
-    rows, owners = np.unique(np.append(touching.points, touching.lines), return_inverse=True)
-    pieces, of_pieces = shapely.get_parts(geometries[rows], return_index=True)
-    owners = np.append(owners, of_pieces)
-    order = np.argsort(owners, kind="stable")
-    parts, owners = np.concatenate([shapely.points(touching.places), lines, pieces])[order], owners[order]
-    starts, kinds = np.searchsorted(owners, np.arange(len(rows))), shapely.get_type_id(parts)
-    least, most = np.minimum.reduceat(kinds, starts), np.maximum.reduceat(kinds, starts)
-    made = parts[starts]
-    is_alone = np.bincount(owners) == 1
-    for make, are_meant in (
-        (shapely.multipoints, most == POINT),
-        (shapely.multilinestrings, (least == LINE) & (most == LINE)),
-        (shapely.geometrycollections, least < most),
-    ):
-        chosen = (are_meant & ~is_alone)[owners]
-        make(parts[chosen], indices=owners[chosen], out=made)
-    geometries[rows] = made
 
 
 def _frame(left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str) -> GeoDataFrame:

@@ -22,8 +22,8 @@ from engine.errors import (
 )
 from engine.layers.json_text import Path
 from engine.layers.limits import Limits
-from engine.layers.rows import Layer, layer_of
-from engine.layers.shapes import LINE, POINT, MixedLayer, Paths
+from engine.layers.rows import layer_of
+from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths
 from engine.layers.wrapping import cut_parts
 from engine.polygon_overlay.overlay import union_all
 from engine.polygon_overlay.pair_arrays import PolygonArrays, arrays_of
@@ -31,33 +31,38 @@ from engine.running.budget import UNLIMITED, Budget, polled
 from engine.solids.checks import Where, as_points, shown
 from engine.solids.polygon import Polygon
 from engine.solids.ragged import summed
-from engine.types import BoolArray, FloatArray, IntArray, read_only
+from engine.types import FloatArray, Int8Array, IntArray, read_only
 
 AREAS: Final = ("Polygon", "MultiPolygon")
 POINTS: Final = ("Point", "MultiPoint")
 LINES: Final = ("LineString", "MultiLineString")
 EVERY: Final = (*POINTS, *LINES, *AREAS)
+_DIMS: Final = dict(zip(EVERY, (POINT, POINT, LINE, LINE, AREA, AREA)))
+_PARTS: Final[dict[str, Callable[[Any], Any]]] = {
+    "Point": lambda at: [[[at]]], "MultiPoint": lambda at: [[at]], "LineString": lambda at: [[at]],
+    "MultiLineString": lambda at: [[line] for line in at if len(line)], "Polygon": lambda at: [at],
+    "MultiPolygon": lambda at: at,
+}  # fmt: skip
+"""By type, its coordinates as parts, each a list of rings; the positions of points, and a line, are a ring."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collection:
     """A FeatureCollection whose geometries are of one kind: its features, the properties of each (empty for null), its
-    `crs`, and the path of the argument, for messages. altitudes: of vertices, once they are read.
-    start: of a part of a stream, the number of the features before it; kept: what was made of a collection that many
-    calls share."""
+    `crs`, and the path of the argument, for messages. start: of a part of a stream, the number of the features before
+    it; kept: what was made of a collection that many calls share."""
 
     features: list[dict[str, Any]]
     properties: list[dict[str, Any]]
     crs: Any
     where: Where
-    altitudes: list[FloatArray] = field(default_factory=lambda: [np.zeros((0, 4))])
     start: int | None = None
     kept: dict[Any, Any] = field(default_factory=dict)
 
     @property
     def known(self) -> FloatArray:
-        """The vertices that have an altitude: feature, x, y, altitude."""
-        return np.concatenate(self.altitudes)
+        """The vertices, if some have an altitude, once they are read: feature, x, y, altitude."""
+        return cast(FloatArray, self.kept.get("known", np.zeros((0, 4))))
 
 
 def collection_of(
@@ -105,95 +110,93 @@ def refused(
     return kind(f"{where[0]}.features[{number}]{named} {what}", (*where, "features", number, *path))
 
 
-def polygons_of(side: Collection, limits: Limits) -> Layer:
-    """Return the polygons of a collection as a `Layer`; overlapping parts of a feature are united."""
-    with limits.budget():
-        parts, offsets, is_missing = _parts_of(side, limits)
-        cut = cut_parts(parts, offsets, side.crs is None, limits, partial(refused, InvalidInputError, side))
-        return layer_of(*cut, is_missing, limits)
-
-
 def mixed_of(side: Collection, limits: Limits) -> MixedLayer:
-    """Return the points, lines and polygons of a collection."""
+    """Return the points, lines and polygons of a collection; overlapping parts of a feature are united."""
     if "mixed" in side.kept:
         return cast(MixedLayer, side.kept["mixed"])
-    n = len(side.features)
-    dims, counts, sizes, positions = np.full(n, -1, np.int8), np.zeros(n, np.int64), list[int](), list[FloatArray]()
+    dims, parts, counts = _parts_of(side, limits)
+    n = len(dims)
+    of_parts = np.repeat(np.arange(n), counts)
+    of_rings = np.repeat(of_parts, np.diff(parts.polygon_offsets))
+    of_vertices = np.repeat(of_rings, np.diff(parts.ring_offsets))
+    if parts.vertices.shape[1] == 3:
+        side.kept["known"] = np.column_stack([of_vertices, parts.vertices])
+    at = np.ascontiguousarray(parts.vertices[:, :2])
+    is_path = dims[of_rings] < AREA
+    sizes = np.diff(parts.ring_offsets)
+    is_point = dims[of_rings] == POINT
+    lengths = np.where(is_point, 1, sizes)[np.repeat(np.arange(len(sizes)), np.where(is_point, sizes, is_path))]
+    paths = Paths(
+        np.where((dims < AREA) & (counts > 0), dims, -1).astype(np.int8), read_only(at[dims[of_vertices] < AREA] + 0.0),
+        summed(lengths), summed(np.bincount(of_rings, np.where(is_point, sizes, is_path), n).astype(np.int64)),
+    )  # fmt: skip
+    is_area = dims[of_parts] == AREA
+    rings, offsets = summed(sizes[~is_path]), summed(np.diff(parts.polygon_offsets)[is_area])
+    areas, counts = arrays_of(at[dims[of_vertices] == AREA], rings, offsets), np.where(dims == AREA, counts, 0)
     with limits.budget():
-        single = _single_points(side)
-        for number in polled(range(n)):
-            geometry = side.features[number].get("geometry")
-            if geometry is not None and geometry["type"] not in AREAS:
-                paths = single.get(number) or check_each([number], side, _paths_in, is_array=False)[0]
-                counts[number] = len(paths)
-                sizes += map(len, paths)
-                positions += [path[:, :2] for path in paths]
-                side.altitudes.extend(_known(number, path) for path in paths if path.shape[1] == 3)
-                dims[number] = (POINT if geometry["type"] in POINTS else LINE) if paths else -1
-    vertices = np.concatenate([np.zeros((0, 2)), *positions])
-    made = side.kept["mixed"] = MixedLayer(
-        polygons_of(side, limits), Paths(dims, read_only(vertices), summed(sizes), summed(counts))
-    )
+        cut = cut_parts(areas, summed(counts), side.crs is None, limits, partial(refused, InvalidInputError, side))
+        layer = layer_of(*cut, dims < POINT, limits)
+    made = side.kept["mixed"] = MixedLayer(layer, paths)
     return made
 
 
-def _single_points(side: Collection) -> dict[int, list[FloatArray]]:
-    """Return the positions of the Points of a collection, read together; none if one of them is wrong."""
-    geometries = (feature.get("geometry") or {} for feature in side.features)
-    places = {k: each.get("coordinates") for k, each in enumerate(polled(geometries)) if each.get("type") == "Point"}
-    there = {k: place for k, place in places.items() if isinstance(place, list) and place}
-    try:
-        positions = _positions([list(there.values())])
-    except (DeadlineExceededError, CancelledError):
-        raise
-    except (EngineError, TypeError, ValueError):
-        return {}
-    return {k: [positions[row : row + 1]] for row, k in enumerate(polled(there))}
-
-
-def _paths_in(geometry: dict[str, Any]) -> list[FloatArray]:
-    """Return the positions of each point or line of a geometry."""
-    kind, given = geometry["type"], geometry["coordinates"]
-    if kind in POINTS:
-        return [_positions([[place]]) for place in ([given] if kind == "Point" and len(given) else given)]
-    lines = [_positions([line]) for line in ([given] if kind == "LineString" else given) if len(line)]
-    for line in lines:
-        if len(line) == 1:
-            raise InvalidArrayError("a line of one position; a line needs 2", ())
-    return lines
-
-
-def _parts_of(side: Collection, limits: Limits) -> tuple[PolygonArrays, IntArray, BoolArray]:
-    """Return (arrays, offsets, is_missing): all parts (Polygons) of all features as polygons, the offsets (n + 1,) of
-    each feature's parts, and (n,) whether a feature has no geometry."""
-    rings: list[Any] = []
-    part_sizes: list[int] = []
-    geometries = [feature.get("geometry") for feature in side.features]
-    there = [k for k, geometry in enumerate(geometries) if geometry is not None and geometry["type"] in AREAS]
-    is_missing = np.array([geometry is None for geometry in geometries], np.bool_)
-    counts = np.zeros(len(side.features), np.int64)
+def _parts_of(side: Collection, limits: Limits) -> tuple[Int8Array, PolygonArrays, IntArray]:
+    """Return the dimension of each feature, -1 without geometry; the parts of all, which may have altitudes, as
+    polygons: the positions of points, and a line, are a ring; and the number of parts of each feature."""
+    kinds = [(feature.get("geometry") or {}).get("type", "") for feature in side.features]
+    dims = np.array([_DIMS.get(kind, -1) for kind in kinds], np.int8)
+    numbers = np.flatnonzero(dims >= 0)
     with limits.budget():
         try:
-            for number in polled(there):
-                geometry = side.features[number]["geometry"]
-                parts = geometry["coordinates"]
-                parts = [parts] if geometry["type"] == "Polygon" and len(parts) else parts
-                counts[number] = len(parts)
-                for part in polled(parts):
-                    part_sizes.append(len(part))
-                    rings.extend(part)
-            positions = _positions(rings)
-            offsets = summed(np.fromiter(map(len, polled(rings)), np.int64)), summed(part_sizes)
-            if positions.shape[1] == 3:
-                owners = np.repeat(np.repeat(np.arange(len(counts)), counts), np.diff(offsets[0][offsets[1]]))
-                side.altitudes.append(_known(owners, positions))
-            arrays = arrays_of(np.ascontiguousarray(positions[:, :2]), *offsets)
+            rings, part_sizes, sizes = _rings_of(side, numbers.tolist())
+            lengths = summed(np.fromiter(map(len, polled(rings)), np.int64))
+            parts = PolygonArrays(_positions(rings), lengths, summed(part_sizes))
         except (DeadlineExceededError, CancelledError):
             raise
         except (EngineError, TypeError, ValueError, KeyError):
-            check_each(there, side, _check_rings)
+            for number in polled(numbers.tolist()):
+                _check(side, number)
             raise
-    return arrays, summed(counts), is_missing
+    counts = np.zeros(len(dims), np.int64)
+    counts[numbers] = sizes
+    of_rings = np.repeat(np.repeat(np.arange(len(dims)), counts), np.diff(parts.polygon_offsets))
+    if len(short := np.flatnonzero((np.diff(parts.ring_offsets) == 1) & (dims[of_rings] > POINT))):
+        number = int(of_rings[short[0]])
+        if dims[number] == LINE:
+            raise refused(InvalidArrayError, side, number, "is wrong: a line of one position; a line needs 2")
+        raise refused(RingTooShortError, side, number, "is wrong: a ring of one position; a ring needs 3")
+    return dims, parts, counts
+
+
+def _rings_of(side: Collection, numbers: list[int]) -> tuple[list[Any], list[int], list[int]]:
+    """Return the rings of some features, the number of rings of each part, and the number of parts of each feature."""
+    rings, part_sizes, counts = list[Any](), list[int](), list[int]()
+    for number in polled(numbers):
+        geometry = side.features[number]["geometry"]
+        given = geometry["coordinates"]
+        parts = _PARTS[geometry["type"]](given) if len(given) else []
+        counts.append(len(parts))
+        for part in polled(parts):
+            part_sizes.append(len(part))
+            rings.extend(part)
+    return rings, part_sizes, counts
+
+
+def _check(side: Collection, number: int) -> None:
+    """Raise, with its name, for a feature that cannot be read."""
+    try:
+        for ring in polled(_rings_of(side, [number])[0]):
+            _positions([ring])
+        return
+    except (DeadlineExceededError, CancelledError):
+        raise
+    except WrongDimensionError:
+        what = "has positions of other than two numbers, or three with an altitude"
+        raise refused(WrongDimensionError, side, number, what) from None
+    except EngineError as error:
+        raise refused(type(error), side, number, f"is wrong: {error.message}") from None
+    except (KeyError, TypeError, ValueError):
+        raise refused(InvalidArrayError, side, number, "has coordinates that are no lists of positions") from None
 
 
 def _positions(rings: list[Any]) -> FloatArray:
@@ -211,45 +214,6 @@ def _positions(rings: list[Any]) -> FloatArray:
     if any(part.shape[1] == 3 for part in parts):
         parts = [part if part.shape[1] == 3 else np.insert(part, 2, np.nan, axis=1) for part in parts]
     return np.concatenate(parts)
-
-
-def _known(owners: Any, positions: FloatArray) -> FloatArray:
-    """Return positions (n, 3) as rows (feature, x, y, altitude)."""
-    return np.insert(positions, 0, owners, axis=1)
-
-
-def _check_rings(geometry: dict[str, Any]) -> None:
-    """Raise for the first error in the coordinates of a Polygon or MultiPolygon."""
-    coordinates = geometry["coordinates"]
-    for part in [coordinates] if geometry["type"] == "Polygon" else polled(coordinates):
-        for ring in polled(part):
-            if len(_positions([ring])) == 1:
-                raise RingTooShortError("a ring of one position; a ring needs 3", ())
-
-
-def check_each(
-    there: list[int], side: Collection, check: Callable[[dict[str, Any]], Any], is_array: bool = True
-) -> Any:
-    """Return the array, or the list, of check(geometry) for the features of a layer at the indices `there`; an error
-    names its feature."""
-    made = []
-    for number in polled(there):
-        try:
-            made.append(check(side.features[number]["geometry"]))
-            continue
-        except (DeadlineExceededError, CancelledError):
-            raise
-        except WrongDimensionError:
-            kind, what = (
-                WrongDimensionError,
-                "has positions of other than two numbers, or three with an altitude",
-            )
-        except EngineError as error:
-            kind, what = type(error), f"is wrong: {error.message}"  # type: ignore[assignment]
-        except (KeyError, TypeError, ValueError):
-            kind, what = InvalidArrayError, "has coordinates that are no lists of positions"  # type: ignore[assignment]
-        raise refused(kind, side, number, what)
-    return np.array(made) if is_array else made
 
 
 def polygon_of(geometry: Any) -> Polygon:
@@ -292,8 +256,9 @@ def _polygon_of(geometry: Any, budget: Budget) -> Polygon:
     """Do the work of `polygon_of` within a budget."""
     feature, limits = {"type": "Feature", "geometry": geometry}, Limits(budget.left(), budget.cancel)
     side = collection_of({"type": "FeatureCollection", "features": [feature]}, ("geometry",), limits)
-    parts, offsets, _ = _parts_of(side, limits)
-    polygons = [parts.polygon(k) for k in range(int(offsets[-1]))]
+    _, (positions, *offsets), _ = _parts_of(side, limits)
+    arrays = arrays_of(np.ascontiguousarray(positions[:, :2]), *offsets)
+    polygons = [arrays.polygon(k) for k in range(len(arrays.polygon_offsets) - 1)]
     if len(polygons) == 1:
         return polygons[0]
     return Polygon(union_all(polygons, deadline=budget.left(), cancel=budget.cancel).rings)

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.running.budget import poll
+from engine.running.budget import poll, polled
 
 _FEW: Final = 256
 """Number of values written in one call: some 30 us."""
@@ -36,13 +36,11 @@ def text_of(value: Any) -> bytes:
     """Return a value as JSON, numbers exactly; arrays become lists. Raises: NotJsonError, DeadlineExceededError,
     CancelledError."""
     try:
-        if isinstance(value, str) or _count(value, _FEW) <= _FEW:
-            return _encoded(value)
-        writer = _Writer()
-        writer.write(value)
-        return bytes(writer.text)
+        return _text(value)
     except RecursionError:
         raise NotJsonError(ValueError("it is nested too deeply, or within itself"), (), False) from None
+    except (ValueError, TypeError) as error:
+        raise NotJsonError(error, *_find_invalid(value)) from None
 
 
 def key_of(value: Any) -> bytes:
@@ -79,68 +77,28 @@ def key_of(value: Any) -> bytes:
     return b"{" + digest.digest()
 
 
-class _Writer:
-    """Writes a large value as JSON in `text`, polling the deadline."""
-
-    def __init__(self) -> None:
-        self.text = bytearray()
-        self._path: list[str | int] = []
-
-    def write(self, value: Any) -> None:
-        """Append a list, an array or an object of more than `_FEW` values to the text. Recursion is as deep as the
-        value."""
-        names = list(value) if isinstance(value, dict) else None
-        items = list(value.values()) if isinstance(value, dict) else value
-        self.text += b"[" if names is None else b"{"
-        start, weight = 0, 0
-        if isinstance(items, np.ndarray) and items.ndim == 1:
-            for start in range(0, len(items), _FEW):
-                self._write_few(names, items, start, start + _FEW)
-            items = ()
-        for place, item in enumerate(items):
-            size = _count(item, _FEW)
-            if weight + size > _FEW:
-                self._write_few(names, items, start, place)
-                start, weight = place, 0
-            weight += size
-            if size > _FEW and not isinstance(item, str):
-                name = place if names is None else names[place]
-                self.text += b"" if names is None else _encoded({name: None})[1:-5]
-                self._path.append(name)
-                self.write(item)
-                self._path.pop()
-                self.text += b","
-                start, weight = place + 1, 0
-        if len(items):
-            self._write_few(names, items, start, len(items))
-        if self.text[-1:] == b",":
-            del self.text[-1]
-        self.text += b"]" if names is None else b"}"
-
-    def _write_few(self, names: list[Any] | None, items: Any, start: int, stop: int) -> None:
-        """Append items[start:stop] and a comma to the text; names: of the items, for an object, None for a list."""
-        poll()
-        if start == stop:
-            return
-        some = items[start:stop]
-        try:
-            self.text += _encoded(some if names is None else dict(zip(names[start:stop], some)))[1:-1] + b","
-        except NotJsonError as error:
-            first, *rest = error.path
-            error.path = (*self._path, start + int(first) if names is None else first, *rest)
-            raise
+def _text(value: Any) -> bytes:
+    """Return a value as JSON: that of two halves if it is large. Recursion is as deep as the value, and the logarithms
+    of the lengths in it."""
+    is_object = isinstance(value, dict)
+    is_list = isinstance(value, (list, tuple)) or (isinstance(value, np.ndarray) and value.ndim > 0)
+    n = len(value) if is_object or is_list else 0
+    if n == 0 or _count(value, _FEW) <= _FEW:
+        return _encoded(value)
+    poll()
+    if n == 1:
+        name, item = next(iter(value.items() if is_object else enumerate(value)))
+        return (_encoded({name: None})[:-5] if is_object else b"[") + _text(item) + (b"}" if is_object else b"]")
+    items = list(value.items()) if is_object else value
+    first, second = (_text(dict(half) if is_object else half) for half in (items[: n // 2], items[n // 2 :]))
+    return first[:-1] + b"," + second[1:]
 
 
 def _encoded(value: Any) -> bytes:
-    """Return the JSON of a small value; raise NotJsonError with the path to what cannot be written."""
     try:
-        try:
-            return _encode(value).encode()
-        except UnicodeEncodeError:  # half a surrogate pair, which only an escape can write
-            return _encode_ascii(value).encode()
-    except (ValueError, TypeError, RecursionError) as error:
-        path, is_number = _find_invalid(value)
-        raise NotJsonError(error, path, is_number) from None
+        return _encode(value).encode()
+    except UnicodeEncodeError:  # half a surrogate pair, which only an escape can write
+        return _encode_ascii(value).encode()
 
 
 def _as_list(value: Any) -> Any:
@@ -180,16 +138,12 @@ def _count(value: Any, most: int) -> int:
 
 
 def _find_invalid(value: Any) -> tuple[Path, bool]:
-    """Return the path to the first part of a small value that cannot become JSON, and whether that part is a float
-    (infinity or NaN)."""
-    items: Iterable[tuple[Any, Any]] = ()
-    if isinstance(value, dict):
-        items = value.items()
-    elif isinstance(value, (list, tuple, np.ndarray)):
-        items = enumerate(value)
-    for name, item in items:
+    """Return the path to the first part of a value that cannot become JSON, and whether that part is a float (infinity
+    or NaN)."""
+    is_list = isinstance(value, (list, tuple, np.ndarray))
+    for name, item in polled(value.items() if isinstance(value, dict) else enumerate(value) if is_list else ()):
         try:
-            _encode({name: item})
+            _text({name: item})
         except (ValueError, TypeError, RecursionError):
             path, is_number = _find_invalid(item)
             return (name if isinstance(name, (str, int)) else str(name), *path), is_number

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -13,34 +13,6 @@ from engine.polygon_overlay.grid import grid_of
 from engine.running.budget import Budget, Cancel
 from engine.solids.checks import shown
 from engine.types import Accuracy, FloatArray, IntArray
-
-
-class TimeOptions(TypedDict, total=False):
-    """Keyword options of layers as GeoJSON."""
-
-    deadline: float | None
-    cancel: Cancel | None
-
-
-class GridOptions(TimeOptions, total=False):
-    """Those where new coordinates are made."""
-
-    grid: float | None
-    min_width: float | None
-    wrap: float | None
-
-
-class ClipOptions(GridOptions, total=False):
-    """Those of clips."""
-
-    keep: str
-
-
-class UnionOptions(GridOptions, total=False):
-    """Those of unions."""
-
-    coverage: bool
-    gaps: str
 
 
 class Limits:

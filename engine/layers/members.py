@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -19,21 +18,11 @@ from engine.types import IntArray
 _NAME_BYTES: Final = 200
 """Bytes that a property name takes, with its entries in sets."""
 _NOUNS: Final = {"properties": "a property", "id": "an id", "geometry": "a geometry"}
-_BUDGET_STEP: Final = 2**20
-"""Number of bytes of text after which they are charged to the budget."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _CopiedMembers:
-    """JSON texts that result rows copy from the n features of a layer.
-
-    | field | shape | meaning |
-    | --- | --- | --- |
-    | properties | n | properties of the feature, without the braces |
-    | ids | n | a comma and the member "id", or nothing |
-    | n_bytes | (n + 1,) | length of both together; the last is 0, for feature -1 (none) |
-    | id_bytes | (n + 1,) | length of ids alone |
-    """
+class _CopiedMembers(NamedTuple):
+    """JSON texts that rows copy from n features: properties without the braces; ids: a comma and the member "id", or
+    nothing; lengths (n + 1,) of both together, and of ids alone, the last 0 for feature -1 (none)."""
 
     properties: list[bytes]
     ids: list[bytes]
@@ -44,51 +33,43 @@ class _CopiedMembers:
 def crs_of(sides: list[Collection], limits: Limits) -> bytes | None:
     """Return the common member `crs` of the layers as JSON, None if none has it; raise if they differ."""
     there = [side for side in sides if side.crs is not None]
-    texts = []
     with limits.budget() as budget:
         for side in there:
             try:
-                texts.append(text_of(side.crs))
-                budget.take(len(texts[-1]))
+                text = text_of(side.crs)
             except NotJsonError as error:
                 what = "holds infinity or NaN" if error.is_number else f"has no JSON ({error})"
-                kind = NotFiniteError if error.is_number else InvalidInputError
-                raise kind(
-                    f"the crs of {side.where[0]} {what}; correct it", (*side.where, "crs", *error.path)
-                ) from None
+                place = *side.where, "crs", *error.path
+                raise _kind_of(error)(f"the crs of {side.where[0]} {what}; correct it", place) from None
+            budget.take(len(text))
         if len(there) == 2 and key_of(there[0].crs) != key_of(there[1].crs):
             raise InvalidInputError("the crs of left and right differ; bring both layers into one", ("right", "crs"))
-    return texts[0] if texts else None
+    return text_of(there[0].crs) if there else None
+
+
+def _kind_of(error: NotJsonError) -> type[InvalidInputError]:
+    return NotFiniteError if error.is_number else InvalidInputError
 
 
 def texts_of(side: Collection, values: Iterable[Any], member: str, limits: Limits) -> list[bytes]:
     """Return each value, one for each feature of the layer, as JSON. member: of the feature, where the value stands
     (properties, id, geometry), for messages."""
     texts: list[bytes] = []
-    taken = 0
     with limits.budget() as budget:
         for number, value in enumerate(values):
             budget.check()
             try:
-                text = text_of(value)
+                texts.append(text_of(value))
             except NotJsonError as error:
                 why = "is infinite or NaN, which JSON cannot hold" if error.is_number else f"JSON cannot hold: {error}"
-                what = f"has {_NOUNS[member]} that {why}"
-                kind = NotFiniteError if error.is_number else InvalidInputError
-                raise refused(
-                    kind, side, number, what, error.path if member == "id" else (member, *error.path)
-                ) from None
-            taken += len(text)
-            if taken > _BUDGET_STEP:
-                budget.take(taken)
-                taken = 0
-            texts.append(text)
-        budget.take(taken)
+                path = error.path if member == "id" else (member, *error.path)
+                raise refused(_kind_of(error), side, number, f"has {_NOUNS[member]} that {why}", path) from None
+            budget.take(len(texts[-1]))
     return texts
 
 
 def members_of(
-    sides: list[Collection], names: tuple[str, str], limits: Limits
+    sides: list[Collection], names: tuple[str, ...], limits: Limits
 ) -> tuple[Callable[[int, int], bytes], Callable[[IntArray, IntArray], IntArray]]:
     """Return two functions of the pair of features (first, second) of a result row, -1 for none. The first returns the
     row's members besides type and geometry, as JSON; the second, for arrays of pairs, lower bounds on the lengths of

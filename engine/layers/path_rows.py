@@ -8,7 +8,6 @@ merged by rank; pieces that reach the end of a segment are joined with those tha
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -33,7 +32,7 @@ from engine.layers.rows import overlay_rows as overlay_areas
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
 from engine.layers.wrapping import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
-from engine.polygon_overlay.touching import Place, Touching, concatenate_touching, join_edges
+from engine.polygon_overlay.touching import Place, Touching, join_edges
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.rational import orient2d_rational
 from engine.running.budget import Budget, polled
@@ -80,7 +79,7 @@ def clip_mixed(
     if limits.is_outside:
         rows = overlay_mixed(layer, mask, "difference", limits, kinds, False)
         stays = (np.diff(rows.row_offsets) > 0) | (layer.paths.dims[rows.left] >= 0)  # not those without geometry
-        return with_touching_of(rows, np.flatnonzero(stays), rows.touching)
+        return rows.take(np.flatnonzero(stays))
     there = np.flatnonzero(mask.areas.arrays.sizes())
     if "union" not in mask.prepared:
         mask.prepared["union"] = unite(PolygonSelection(mask.areas.arrays, there), limits)
@@ -97,25 +96,8 @@ def clip_mixed(
 def sorted_rows(parts: list[LayerRows]) -> LayerRows:
     """Return the rows of all parts in the order of `overlay_rows`."""
     rows = concatenate_rows(parts)
-    starts = np.cumsum([0, *map(len, parts)])
-    some = [
-        part.touching._replace(lines=start + part.touching.lines, points=start + part.touching.points)
-        for part, start in zip(parts, starts.tolist())
-        if part.touching is not None
-    ]
     section = np.where(rows.right == NONE, 1, np.where(rows.left == NONE, 2, 0))
-    order = np.lexsort((rows.right, rows.left, section))
-    touching = concatenate_touching(some) if some else None
-    return with_touching_of(rows, order, touching)
-
-
-def with_touching_of(rows: LayerRows, order: IntArray, touching: Touching | None) -> LayerRows:
-    """Return rows in an order, with the lines and points of these."""
-    back = np.full(len(rows), NONE)
-    back[order] = np.arange(len(order))
-    if touching is not None:
-        touching = touching._replace(lines=back[touching.lines], points=back[touching.points])
-    return replace(rows.take(order), touching=touching)
+    return rows.take(np.lexsort((rows.right, rows.left, section)))
 
 
 def path_rows(

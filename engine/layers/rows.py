@@ -29,7 +29,7 @@ from engine.polygon_overlay.pair_arrays import (
 )
 from engine.polygon_overlay.result import Overlay
 from engine.polygon_overlay.run import Operation
-from engine.polygon_overlay.touching import Touching, collapsed, concatenate_touching, touching
+from engine.polygon_overlay.touching import NOWHERE, Touching, collapsed, concatenate_touching, touching
 from engine.running.budget import polled
 from engine.scenes.point_queries import locate_scene
 from engine.solids.accepted import PointsLike
@@ -79,7 +79,7 @@ class LayerRows:
     | piece_offsets | int64 | into the rings: a shell, counter-clockwise, before its holes, clockwise |
     | row_offsets | int64 (m + 1,) | into the pieces; none for: no geometry, no common area, or collapsed |
     | n_collapsed | int | rows left out because rounding collapsed them |
-    | touching | | lines and points, by row, in which pairs meet without common area; None: not requested |
+    | touching | | lines and points, by row: of points and lines, and where pairs of polygons meet without common area |
     """
 
     left: IntArray
@@ -89,16 +89,19 @@ class LayerRows:
     piece_offsets: IntArray
     row_offsets: IntArray
     n_collapsed: int = 0
-    touching: Touching | None = None
+    touching: Touching = NOWHERE
 
     def __len__(self) -> int:
         return len(self.left)
 
     def take(self, order: IntArray) -> LayerRows:
-        """Return the rows in an order; `touching` is left out."""
+        """Return rows in an order: each once at most, all that have lines or points."""
         pieces = PolygonArrays(self.vertices, self.ring_offsets, self.piece_offsets)
         pieces, sizes = pieces.take(places_of(self.row_offsets, order)), summed(np.diff(self.row_offsets)[order])
-        return LayerRows(self.left[order], self.right[order], *pieces, sizes, self.n_collapsed)
+        back = np.full(len(self), NONE)
+        back[order] = np.arange(len(order))
+        touching = self.touching._replace(lines=back[self.touching.lines], points=back[self.touching.points])
+        return LayerRows(self.left[order], self.right[order], *pieces, sizes, self.n_collapsed, touching)
 
     @property
     def ragged(self) -> tuple[FloatArray, tuple[IntArray, IntArray, IntArray]]:
@@ -248,7 +251,7 @@ def rows_of_pairs(
     with_touching: or touch, where no grid is given."""
     if limits.grid is None:
         batch = _overlay_batch(firsts, seconds, operation, limits)
-        more = _touching(firsts, seconds, batch, limits) if with_touching else None
+        more = _touching(firsts, seconds, batch, limits) if with_touching else NOWHERE
         return _rows(batch, left, right, more)
     options = {"grid": limits.grid, **limits.options()}
     made = [limits.record(overlay(one, other, operation, **options)) for one, other in zip(polled(firsts), seconds)]
@@ -276,7 +279,7 @@ def _is_lost(batch: OverlayBatch) -> BoolArray:
     return (np.diff(batch.pair_offsets) == 0) & (batch.n_pieces_exact > 0)
 
 
-def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching | None = None) -> LayerRows:
+def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching) -> LayerRows:
     """Return the pairs of a batch that have pieces, or touch, as rows; left, right: feature numbers of the pairs; more:
     lines and points of pairs that touch."""
     if batch.status.any():
@@ -288,10 +291,9 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching |
         )
     n_pieces = np.diff(batch.pair_offsets)
     is_row = n_pieces > 0
-    if more is not None:
-        is_row[more.lines] = is_row[more.points] = True
-        rows = np.cumsum(is_row) - 1
-        more = more._replace(lines=rows[more.lines], points=rows[more.points])
+    is_row[more.lines] = is_row[more.points] = True
+    rows = np.cumsum(is_row) - 1
+    more = more._replace(lines=rows[more.lines], points=rows[more.points])
     stored = np.flatnonzero(is_row)
     lost = int((_is_lost(batch) & ~is_row).sum())
     rings = batch.vertices, batch.ring_offsets, batch.piece_offsets
@@ -299,13 +301,18 @@ def _rows(batch: OverlayBatch, left: IntArray, right: IntArray, more: Touching |
 
 
 def concatenate_rows(parts: Sequence[LayerRows]) -> LayerRows:
-    """Return the rows of all parts, in order; `touching` is that of the first part."""
+    """Return the rows of all parts, in order."""
+    starts = np.cumsum([0, *map(len, parts)]).tolist()
+    touching = [
+        part.touching._replace(lines=start + part.touching.lines, points=start + part.touching.points)
+        for part, start in zip(parts, starts)
+    ]
     return LayerRows(
         np.concatenate([part.left for part in parts]), np.concatenate([part.right for part in parts]),
         np.concatenate([part.vertices for part in parts]), concatenate_offsets([part.ring_offsets for part in parts]),
         concatenate_offsets([part.piece_offsets for part in parts]),
         concatenate_offsets([part.row_offsets for part in parts]),
-        sum(part.n_collapsed for part in parts), parts[0].touching,
+        sum(part.n_collapsed for part in parts), concatenate_touching(touching),
     )  # fmt: skip
 
 

@@ -56,6 +56,11 @@ class MixedLayer:
         """Dimension of each feature, -1 for missing and empty ones."""
         return np.where(self.areas.arrays.sizes() > 0, AREA, self.paths.dims).astype(np.int8)
 
+    @property
+    def kinds(self) -> frozenset[int]:
+        """The dimensions that features have."""
+        return frozenset(self.dims.tolist()) - {-1}
+
 
 Shapes = namedtuple("Shapes", "dims vertices following firsts ends end_firsts boxes box_firsts sizes")
 """Features as edges.

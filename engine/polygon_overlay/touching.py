@@ -59,7 +59,7 @@ class Touching(NamedTuple):
     places: FloatArray
 
 
-_NOWHERE: Final = Touching(
+NOWHERE: Final = Touching(
     np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros((0, 2))
 )
 
@@ -94,7 +94,7 @@ def touching(
         by_block[start] = concatenate_touching(read)
 
     run_chunks(task, -(-len(firsts) // _BLOCK), budget=budget, first_chunk=1, workers=workers)
-    return concatenate_touching([_NOWHERE, *(by_block[start] for start in sorted(by_block))])
+    return concatenate_touching([NOWHERE, *(by_block[start] for start in sorted(by_block))])
 
 
 def _may_touch(arranged: PairResults) -> BoolArray:
