@@ -86,9 +86,30 @@ def _do_meet(a: Point2, b: Point2, c: Point2, d: Point2) -> bool:
 
 
 @inline
-def _has_simple_edges(vertices: FloatArray, following: IntArray, boxes: FloatArray, stop: FlagArray) -> bool:
+def _is_star_shaped(vertices: FloatArray, following: IntArray) -> bool:
+    """Return whether all edges are seen counter-clockwise, or all clockwise, from the mean of the vertices, and once
+    around: then they are those of one simple ring."""
+    x = y = 0.0
+    for vertex in range(len(vertices)):
+        x, y = x + vertices[vertex, 0] / len(vertices), y + vertices[vertex, 1] / len(vertices)
+    center = Point2(x, y)
+    side = n_upward = 0
+    for edge in range(len(following)):
+        a, b = as_point2(vertices, edge), as_point2(vertices, following[edge])
+        turn = orient2d(center, a, b)
+        if (turn != 1 and turn != -1) or turn == -side:
+            return False
+        side = turn
+        n_upward += (a.y <= center.y) & (center.y < b.y)
+    return n_upward == 1
+
+
+@inline
+def has_simple_edges(vertices: FloatArray, following: IntArray, boxes: FloatArray, stop: FlagArray) -> bool:
     """Return whether edges meet only in the vertices between consecutive ones, and none has length 0; False also if too
     many are near each other, or `stop` is set. boxes: the tree over them."""
+    if _is_star_shaped(vertices, following):
+        return True
     leaves, n_left = len(boxes) // 2, _MOST_NEAR * (len(following) + _MORE) // BLOCK
     for i in range(len(following)):
         if i & _POLL == 0 and stop[0] != 0:
@@ -176,7 +197,7 @@ def find_rings(
             continue
         own, ends, boxes = vertices[first:end], following[first:end], room[: 2 * n_leaves(n)]
         fill_tree(own, ends, boxes)
-        if _has_simple_edges(own, ends, boxes, stop):
+        if has_simple_edges(own, ends, boxes, stop):
             _find_sides(own, ends, n_rings, sides[first:end])
             n_known += sides[first] != 0
     return n_known

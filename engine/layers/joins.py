@@ -1,7 +1,6 @@
 """Which features of two layers are related: pairs by a predicate, decided exactly.
 
-Pairs of which one is no polygon are decided by relate.py, the rest as by `collide_scene`, whose relations of RCC-8 say
-which parts of a matrix are empty.
+Pairs are decided by relate.py; single points in large polygons as by `locate_scene`.
 """
 
 from __future__ import annotations
@@ -11,30 +10,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from engine.arrangement.simple_rings import find_rings
-from engine.collision.codes import UNSETTLED
-from engine.collision.meshes.placement import PoseArrays
-from engine.collision.outline_batch import OutlineArrays, relate_outline_pairs
-from engine.compiling.jit import entry_of
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidInputError, InvalidOperationError, NotRepresentableError
 from engine.layers.limits import Limits
 from engine.layers.nearest import are_within, meets, nearest_pairs
-from engine.layers.relate import BB, EI, IE, II, PREDICATES, holds, matrices, transposed
-from engine.layers.rows import Layer, locate_points_in_layer, unite
-from engine.layers.shapes import AREA, POINT, MixedLayer, Shapes, in_range, pairs_between, shapes_of
-from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons
-from engine.running.parallel import run_chunks
-from engine.scenes.collide_scene import collide_scene
+from engine.layers.relate import PREDICATES, holds, matrices, transposed
+from engine.layers.rows import locate_points_in_layer, unite
+from engine.layers.shapes import POINT, MixedLayer, Shapes, in_range, pairs_between, shapes_of
+from engine.polygon_overlay.pair_arrays import concatenate_polygons
 from engine.solids.checks import shown
-from engine.types import BoolArray, FloatArray, Int8Array, IntArray, Rcc8, read_only
+from engine.types import BoolArray, FloatArray, IntArray
 
-_OF_RCC8: Final = np.array(
-    [IE | EI, BB | IE | EI, II | IE | EI | BB, II | BB, II | EI | BB, II | EI, II | IE | BB, II | IE]
-)
-_OF_RELATION: Final = np.array([IE | EI, II | EI, II | IE, II | IE | EI | BB, BB | IE | EI, 0])
-"""Bits of a matrix of two polygons that tell predicates apart: by code of `Rcc8`; and by code of `Relation`, and
-UNSETTLED, where overlaps are proven to be PO."""
 _LARGE: Final = 64
 """Vertices of a polygon for which it pays to prepare it, about."""
 _OF_POINTS: Final = {"intersects": (True, True), "covered_by": (True, True), "within": (True, False),
@@ -69,14 +55,15 @@ def related_pairs(left: MixedLayer, right: MixedLayer, predicate: str, distance:
         return _chosen(pairs, meets, shapes, others, limits)
     pairs = pairs[_boxes_allow(predicate, shapes, others, pairs)]
     dims, theirs = shapes.dims[pairs[:, 0]], others.dims[pairs[:, 1]]
-    are_areas, bits = (dims == AREA) & (theirs == AREA), np.zeros(len(pairs), np.int64)
-    straight, turned = np.flatnonzero((dims <= theirs) & ~are_areas), np.flatnonzero(dims > theirs)
+    bits, straight, turned = (
+        np.zeros(len(pairs), np.int64),
+        np.flatnonzero(dims <= theirs),
+        np.flatnonzero(dims > theirs),
+    )
     with limits.budget() as budget:
         bits[straight] = matrices(shapes, others, pairs[straight], False, budget, limits.workers)
         back = matrices(others, shapes, pairs[turned][:, ::-1].copy(), False, budget, limits.workers)
         bits[turned] = transposed(back)
-    if are_areas.any():
-        bits[are_areas] = _of_areas(left.areas, right.areas, pairs[are_areas], predicate != "touches", limits)
     return pairs[holds(predicate, bits, dims, theirs)]
 
 
@@ -103,7 +90,10 @@ def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limi
     they need one where distances are measured."""
     for layer in (left, right):
         if "shapes" not in layer.prepared:
-            layer.prepared["shapes"] = shapes_of(_cleaned(layer, limits), limits)
+            shapes, wrong = shapes_of(layer, limits)
+            if len(wrong):
+                shapes, _ = shapes_of(_cleaned(layer, wrong, limits), limits)
+            layer.prepared["shapes"] = shapes
     made = left.prepared["shapes"], right.prepared["shapes"]
     scaled = in_range(*made)
     if is_measured and scaled[0] is not made[0]:
@@ -143,56 +133,10 @@ def _of_points(left: MixedLayer, right: MixedLayer, predicate: str, limits: Limi
     return None
 
 
-def _sides(arrays: PolygonArrays, limits: Limits) -> tuple[IntArray, Int8Array]:
-    """Return following and sides of all edges of polygons, as `find_rings` has them."""
-    following, sides = np.empty(len(arrays.vertices), np.int64), np.zeros(len(arrays.vertices), np.int8)
-    with limits.budget() as budget:
-        if len(sides):
-            entry_of(find_rings)(arrays.vertices, *arrays[1:], len(sides), following, sides, budget.flag)
-        budget.check()
-    return following, sides
-
-
-def _cleaned(layer: MixedLayer, limits: Limits) -> MixedLayer:
-    """Return a layer whose polygons have simple rings that do not cross."""
+def _cleaned(layer: MixedLayer, wrong: IntArray, limits: Limits) -> MixedLayer:
+    """Return a layer with some polygons united with themselves: of simple rings that do not cross."""
     arrays = layer.areas.arrays
-    sizes, (_, sides) = arrays.sizes(), _sides(arrays, limits)
-    filled = np.flatnonzero(sizes)
-    wrong = filled[sides[arrays.ring_offsets[arrays.polygon_offsets[filled]]] == 0]
-    if not len(wrong):
-        return layer
-    places = np.arange(len(sizes))
-    places[wrong] = len(sizes) + np.arange(len(wrong))
+    places = np.arange(len(layer.areas))
+    places[wrong] = len(places) + np.arange(len(wrong))
     united = [unite([arrays.polygon(k)], limits) for k in wrong.tolist()]
     return replace(layer, areas=replace(layer.areas, arrays=concatenate_polygons([arrays, *united]).take(places)))
-
-
-def _of_areas(left: Layer, right: Layer, pairs: IntArray, has_detail: bool, limits: Limits) -> IntArray:
-    """Return the bits of pairs of polygons: by the kernel of scenes, without an object each, then one by one. Without
-    has_detail they serve for touches alone."""
-    both = concatenate_polygons([left.arrays, right.arrays])
-    n, shifted = len(both.polygon_offsets) - 1, pairs + np.array([0, len(left)])
-    following, sides = _sides(both, limits)
-    firsts = both.ring_offsets[both.polygon_offsets]
-    pool = OutlineArrays(both.vertices, read_only(following), read_only(sides), read_only(firsts))
-    relations, none = np.full(len(pairs), UNSETTLED, np.int8), np.zeros((0, 3), np.int32)
-    poses, bodies = PoseArrays(np.tile(np.eye(2), (n, 1, 1)), np.zeros((n, 2)), True), np.arange(n)
-    with limits.budget() as budget:
-
-        def task(start: int, stop: int) -> None:
-            some, codes = shifted[start:stop], relations[start:stop]
-            entry_of(relate_outline_pairs)(pool, bodies, poses, some, False, has_detail, codes, none, budget.flag)
-            budget.check()
-
-        run_chunks(task, len(pairs), budget=budget, workers=limits.workers)
-    bits = _OF_RELATION[relations]
-    rest = np.flatnonzero(relations == UNSETTLED)
-    if len(rest):
-        names, places = np.unique(shifted[rest], return_inverse=True)
-        only, solids = places.reshape(-1, 2), list(PolygonSelection(both, names))
-        related = limits.record(collide_scene(solids, only=only, detail=True, **limits.options()))
-        codes, keys = np.full(len(rest), int(Rcc8.DC)), only[:, 0] * n + only[:, 1]
-        order = np.argsort(keys)
-        codes[order[np.searchsorted(keys[order], related.first * n + related.second)]] = related.detail
-        bits[rest] = _OF_RCC8[codes]
-    return bits

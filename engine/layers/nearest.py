@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from engine.arrangement.simple_rings import BLOCK, after, next_leaf
-from engine.compiling.jit import allocating_kernel, called, entry_of, inline
+from engine.compiling.jit import called, entry_of, inline, kernel
 from engine.layers.limits import Limits
 from engine.layers.relate import matrices
 from engine.layers.shapes import Shape, Shapes, pairs_between, shape_of
@@ -144,7 +144,7 @@ def _square(left: Shapes, right: Shapes, pair: IntArray, reach: float, limits: L
     (i, j), rows = pair.tolist(), np.empty((64, 6))
     with limits.budget() as budget:
         while True:  # bound: the second turn has room
-            n = entry_of(_list_near)(left, right, i, j, reach, rows, budget.flag)
+            n = entry_of(_list_near)(left, right, i, j, reach, rows, np.full(_N_STATE, np.inf), budget.flag)
             budget.check()
             if n <= len(rows):
                 break
@@ -187,7 +187,8 @@ def _bounds(left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, l
 
         def task(start: int, stop: int) -> None:
             some = slice(start, stop)
-            entry_of(_measure)(left, right, pairs[some], reaches[some], *(each[some] for each in made), budget.flag)
+            own, state = (each[some] for each in made), np.empty(_N_STATE)
+            entry_of(_measure)(left, right, pairs[some], reaches[some], *own, state, budget.flag)
             budget.check()
 
         run_chunks(task, n, budget=budget, workers=limits.workers)
@@ -199,13 +200,13 @@ _ROW, _LOW, _HIGH, _RIVAL, _N_STATE = 6, 7, 8, 9, 10
 lower bound of all other rows."""
 
 
-@allocating_kernel
+@kernel
 def _measure(
     left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, low: FloatArray, high: FloatArray,
-    rows: FloatArray, is_alone: BoolArray, flag: FlagArray,
+    rows: FloatArray, is_alone: BoolArray, state: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill the arrays of `_Bounds`."""
-    none, state = np.empty((0, 6)), np.empty(_N_STATE)
+    none = rows[:0]
     for item in range(len(pairs)):
         if flag[0] != 0:
             return
@@ -219,10 +220,12 @@ def _measure(
             rows[item, k] = state[k]
 
 
-@allocating_kernel
-def _list_near(left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: FloatArray, flag: FlagArray) -> int:
+@kernel
+def _list_near(
+    left: Shapes, right: Shapes, i: int, j: int, reach: float, rows: FloatArray, state: FloatArray, flag: FlagArray
+) -> int:
     """Fill rows (n, 6) with vertices and edges (x, y, x, y, x, y) that may be within `reach`; return their number."""
-    own, their, state = shape_of(left, i), shape_of(right, j), np.full(_N_STATE, np.inf)
+    own, their = shape_of(left, i), shape_of(right, j)
     return _scan(their, own, reach, rows, _scan(own, their, reach, rows, 0, state, flag), state, flag)
 
 

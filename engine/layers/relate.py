@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from engine.arrangement.simple_rings import BLOCK, after, next_leaf
-from engine.compiling.jit import allocating_kernel, called, entry_of, inline
+from engine.compiling.jit import called, entry_of, inline, kernel
 from engine.layers.shapes import AREA, LINE, POINT, Shape, Shapes, shape_of
 from engine.predicates.error_free import two_sum, workspace
 from engine.predicates.expansion import grow_product, sign
@@ -27,14 +27,14 @@ from engine.running.budget import Budget
 from engine.running.parallel import run_chunks
 from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, Point2
 
-II, IB, IE, BI, BB, BE, EI, EB, LONG = (1 << k for k in range(9))
-"""Bits of a matrix: interior, boundary or exterior of the first with that of the second; LONG: II has a length."""
+II, IB, IE, BI, BB, BE, EI, EB, LONG, ALIKE, OPPOSED = (1 << k for k in range(11))
+"""Bits of a matrix: interior, boundary or exterior of the first with that of the second; LONG: II has a length. Of the
+edges of an area, while it is related to another: where these are in that of the other (II, IB, IE), and whether there
+is a common stretch with both interiors on one side (ALIKE), or on two (OPPOSED)."""
 _MEET: Final = II | IB | BI | BB
 _UNKNOWN: Final = 0
 _WIDEST: Final = 6
 """Most marks that one contact leaves: four points and an overlap, whose ends are two."""
-_FEW: Final = 4 * BLOCK
-"""Edges of an area that are all looked at, without the tree."""
 _SLACK: Final = 2.0**-50
 
 PREDICATES: Final = (
@@ -70,73 +70,30 @@ def transposed(bits: IntArray) -> IntArray:
 def matrices(
     left: Shapes, right: Shapes, pairs: IntArray, is_any: bool, budget: Budget, workers: int | None
 ) -> IntArray:
-    """Return the bits of pairs (n, 2) of features in range, the first of no larger dimension than the second, and not
-    both areas. is_any: only whether they meet, as any of the bits; then both may be areas."""
+    """Return the bits of pairs (n, 2) of features in range, the first of no larger dimension than the second. is_any:
+    only whether they meet, as any of the bits."""
     bits = np.zeros(len(pairs), np.int64)
     most = max((int(np.diff(each.firsts).max(initial=0)) for each in (left, right)), default=0)
 
     def task(start: int, stop: int) -> None:
-        entry_of(_relate_pairs)(left, right, pairs[start:stop], is_any, most, bits[start:stop], budget.flag)
+        room = np.empty((1 if is_any else _WIDEST * most + 2, 3))
+        entry_of(_relate_pairs)(left, right, pairs[start:stop], is_any, room, bits[start:stop], budget.flag)
         budget.check()
 
     run_chunks(task, len(pairs), budget=budget, workers=workers)
     return bits
 
 
-@allocating_kernel
+@kernel
 def _relate_pairs(
-    left: Shapes, right: Shapes, pairs: IntArray, is_any: bool, most: int, bits: IntArray, flag: FlagArray
+    left: Shapes, right: Shapes, pairs: IntArray, is_any: bool, room: FloatArray, bits: IntArray, flag: FlagArray
 ) -> None:
-    """Fill bits (n,). most: vertices of the largest feature."""
-    room = np.empty((1 if is_any else _WIDEST * most + 2, 3))
+    """Fill bits (n,); room: as `_half`."""
     for item in range(len(pairs)):
         if flag[0] != 0:
             return
         i, j = pairs[item, 0], pairs[item, 1]
-        n, m = left.firsts[i + 1] - left.firsts[i], right.firsts[j + 1] - right.firsts[j]
-        if left.dims[i] == POINT and right.dims[j] == AREA and n == 1 and m <= _FEW:
-            bits[item] = _of_location(_locate_few(as_point2(left.vertices, left.firsts[i]), right, j), is_any)
-            continue
-        if is_any and n * m <= _FEW * BLOCK:
-            bits[item] = II if _do_few_meet(left, i, right, j) else 0
-            continue
         bits[item] = _relate(shape_of(left, i), shape_of(right, j), is_any, room, flag)
-
-
-@inline
-def _locate_few(p: Point2, shapes: Shapes, k: int) -> int:
-    """Return what `_locate` does, for a feature of few edges."""
-    at, first = -1, shapes.firsts[k]
-    for edge in range(first, shapes.firsts[k + 1]):
-        if at != 0:
-            at = _passed(
-                p, as_point2(shapes.vertices, edge), as_point2(shapes.vertices, first + shapes.following[edge]), at
-            )
-    return at
-
-
-@called
-def _do_few_meet(left: Shapes, i: int, right: Shapes, j: int) -> bool:
-    """Return whether two features of few edges meet: without trees, a pair of edges after the other."""
-    first, second = left.firsts[i], right.firsts[j]
-    for edge in range(first, left.firsts[i + 1]):
-        a, b = as_point2(left.vertices, edge), as_point2(left.vertices, first + left.following[edge])
-        for other in range(second, right.firsts[j + 1]):
-            c, d = as_point2(right.vertices, other), as_point2(right.vertices, second + right.following[other])
-            if _boxes_meet(a, b, c, d) and orient2d(a, b, c) * orient2d(a, b, d) <= 0:
-                if orient2d(c, d, a) * orient2d(c, d, b) <= 0:  # on one line too: their boxes meet
-                    return True
-    return _has_few_inside(left, i, right, j) or _has_few_inside(right, j, left, i)
-
-
-@inline
-def _has_few_inside(left: Shapes, i: int, right: Shapes, j: int) -> bool:
-    """Return whether a path of a feature that meets no edge of another, if that is an area, lies in it."""
-    first, found = left.firsts[i], False
-    for edge in range(first, left.firsts[i + 1]):
-        if right.dims[j] == AREA and not found and left.following[edge] <= edge - first:
-            found = _locate_few(as_point2(left.vertices, edge), right, j) > 0
-    return found
 
 
 @called
@@ -146,16 +103,29 @@ def _relate(own: Shape, their: Shape, is_any: bool, room: FloatArray, flag: Flag
         return _of_points(own, their, is_any, flag)
     bits = _half(own, their, is_any, room, flag)
     if is_any:
-        if bits == 0 and their.dim == AREA and _has_path_inside(own, their):
-            bits = II
-        if bits == 0 and own.dim == AREA and _has_path_inside(their, own):
-            bits = II
+        if bits == 0 and their.dim == AREA:
+            bits = _of_paths(own, their) & II
+        if bits == 0 and own.dim == AREA:
+            bits = _of_paths(their, own) & II
         return bits
+    if own.dim == AREA:
+        return _of_areas(bits, _half(their, own, is_any, room, flag) if bits & IB else _of_paths(their, own))
     bits |= _of_ends(own, their)
     if own.dim != their.dim:
         return bits | EI | EB
     back = _half(their, own, is_any, room, flag) | _of_ends(their, own)
     return bits | (EI if back & IE else 0) | (EB if back & BE else 0)
+
+
+@inline
+def _of_areas(bits: int, back: int) -> int:
+    """Return the bits of two areas from those of the edges of each: beside an edge of one, in a face of the other, are
+    its interior and its exterior."""
+    both = bits | back
+    return (
+        (II if both & (II | ALIKE) else 0) | (IE if bits & IE or back & II or both & OPPOSED else 0)
+        | (EI if back & IE or bits & II or both & OPPOSED else 0) | (BB if both & IB else 0)
+    )  # fmt: skip
 
 
 @called
@@ -253,6 +223,8 @@ def _contact(
         low, high = a if _key(a, axis_y) > _key(c, axis_y) else c, b if _key(b, axis_y) < _key(d, axis_y) else d
         if _key(low, axis_y) < _key(high, axis_y):
             bits |= IB if their.dim == AREA else II | LONG
+            if own.dim == AREA:
+                bits |= ALIKE if _is_inside(low, high, own) == _is_inside(low, high, their) else OPPOSED
             room[n, 0], room[n, 1], room[n, 2] = low.x, low.y, 1.0
             room[n + 1, 0], room[n + 1, 1], room[n + 1, 2] = high.x, high.y, -1.0
             n += 2
@@ -342,12 +314,13 @@ def _of_ends(own: Shape, their: Shape) -> int:
 
 
 @called
-def _has_path_inside(own: Shape, their: Shape) -> bool:
-    """Return whether a path of a feature that meets no edge of an area lies in it."""
+def _of_paths(own: Shape, their: Shape) -> int:
+    """Return the bits of the paths of a feature that meets no edge of an area."""
+    bits = 0
     for edge in range(len(own.following)):
-        if own.following[edge] <= edge and _locate(as_point2(own.points, edge), their) > 0:
-            return True
-    return False
+        if own.following[edge] <= edge:
+            bits |= II if _locate(as_point2(own.points, edge), their) > 0 else IE
+    return bits
 
 
 @inline
@@ -381,7 +354,8 @@ def _locate(p: Point2, their: Shape) -> int:
 @called
 def _is_inside(p: Point2, q: Point2, their: Shape) -> bool:
     """Return whether the middle of p and q, which is on no edge of an area, is inside: by the parity of the edges that
-    a ray to the right crosses."""
+    a ray to the right crosses. If they are on one edge: whether a point right of the middle is, or above if that edge
+    is horizontal."""
     top, rest = two_sum(p.y, q.y)
     x, y = 0.5 * (p.x + q.x), 0.5 * top
     low, high, left = y - _SLACK * abs(y), y + _SLACK * abs(y), x - _SLACK * (abs(p.x) + abs(q.x))

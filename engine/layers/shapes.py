@@ -8,15 +8,16 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from engine.arrangement.simple_rings import BLOCK, fill_tree
-from engine.compiling.jit import allocating, allocating_kernel, entry_of
+from engine.arrangement.simple_rings import BLOCK, fill_tree, has_simple_edges
+from engine.compiling.jit import entry_of, inline, kernel
 from engine.errors import NotRepresentableError
 from engine.layers.limits import Limits
 from engine.layers.rows import Layer
 from engine.polygon_overlay.pair_arrays import PolygonArrays, concatenate_polygons
 from engine.predicates.rational import shifted
+from engine.predicates.vectors import as_point2
 from engine.solids.ragged import next_in_rings, summed
-from engine.types import FlagArray, FloatArray, Int8Array, IntArray, read_only
+from engine.types import BoolArray, FlagArray, FloatArray, Int8Array, IntArray, read_only
 
 POINT: Final = 0
 LINE: Final = 1
@@ -79,7 +80,7 @@ Shape = namedtuple("Shape", "dim points following ends boxes")
 """One feature of `Shapes`."""
 
 
-@allocating
+@inline
 def shape_of(shapes: Shapes, k: int) -> Shape:
     """Return feature k."""
     own, ends = slice(shapes.firsts[k], shapes.firsts[k + 1]), slice(shapes.end_firsts[k], shapes.end_firsts[k + 1])
@@ -87,8 +88,9 @@ def shape_of(shapes: Shapes, k: int) -> Shape:
     return Shape(shapes.dims[k], shapes.vertices[own], shapes.following[own], shapes.ends[ends], boxes)
 
 
-def shapes_of(layer: MixedLayer, limits: Limits) -> Shapes:
-    """Return a layer as edges. Raises: NotRepresentableError beyond the range of exact signs."""
+def shapes_of(layer: MixedLayer, limits: Limits) -> tuple[Shapes, IntArray]:
+    """Return a layer as edges, and the polygons in it whose edges do not only meet in vertices between consecutive
+    ones."""
     paths, areas = layer.paths, layer.areas.arrays
     n, dims = len(layer.areas), layer.dims
     vertices, offsets, groups = areas
@@ -113,12 +115,15 @@ def shapes_of(layer: MixedLayer, limits: Limits) -> Shapes:
     box_firsts = summed(2 * leaves)
     limits.budget().take(8 * (4 * int(box_firsts[-1]) + 3 * len(vertices)))
     boxes = np.zeros((box_firsts[-1], 4))  # the first row of each tree is nobody's, but is scaled
-    trees = boxes, box_firsts, np.array([np.inf, 0.0])
+    magnitudes = np.abs(vertices)
+    least = np.where(magnitudes > 0.0, magnitudes, np.inf).min(initial=np.inf)
+    trees = boxes, box_firsts, np.array([least, magnitudes.max(initial=0.0)])
     made = Shapes(dims, read_only(vertices), read_only(following), firsts, ends, end_firsts, *trees)
+    is_simple = np.ones(n, np.bool_)
     with limits.budget() as budget:
-        entry_of(_build_trees)(made, budget.flag)
+        entry_of(_build_trees)(made, is_simple, budget.flag)
         budget.check()
-    return made
+    return made, np.flatnonzero(~is_simple)
 
 
 def _ends(
@@ -138,20 +143,27 @@ def _ends(
     return read_only(points[heads[is_odd]]), summed(np.bincount(feature[heads[is_odd]], minlength=n))
 
 
-@allocating_kernel
-def _build_trees(shapes: Shapes, flag: FlagArray) -> None:
-    """Fill the boxes and sizes of all features."""
-    least, most = np.inf, 0.0
-    for vertex in range(len(shapes.vertices)):
-        for k in range(2):
-            size = abs(shapes.vertices[vertex, k])
-            least, most = min(least, size if size > 0.0 else np.inf), max(most, size)
-    shapes.sizes[0], shapes.sizes[1] = least, most
+@kernel
+def _build_trees(shapes: Shapes, is_simple: BoolArray, flag: FlagArray) -> None:
+    """Fill the boxes of all features; is_simple (n,): made False for polygons, see `shapes_of`."""
     for k in range(len(shapes.firsts) - 1):
         if flag[0] != 0:
             return
-        shape = shape_of(shapes, k)
-        fill_tree(shape.points, shape.following, shape.boxes)
+        first, end, root = shapes.firsts[k], shapes.firsts[k + 1], shapes.box_firsts[k] + 1
+        if end - first <= BLOCK:  # the root is a leaf, with all vertices
+            x, y, right, top = np.inf, np.inf, -np.inf, -np.inf
+            for vertex in range(first, end):
+                p = as_point2(shapes.vertices, vertex)
+                x, right = p.x if p.x < x else x, p.x if p.x > right else right
+                y, top = p.y if p.y < y else y, p.y if p.y > top else top
+            shapes.boxes[root, 0], shapes.boxes[root, 1] = x, y
+            shapes.boxes[root, 2], shapes.boxes[root, 3] = right, top
+        if end - first > BLOCK or shapes.dims[k] == AREA:
+            shape = shape_of(shapes, k)
+            if end - first > BLOCK:
+                fill_tree(shape.points, shape.following, shape.boxes)
+            if shapes.dims[k] == AREA:
+                is_simple[k] = has_simple_edges(shape.points, shape.following, shape.boxes, flag)
 
 
 def in_range(left: Shapes, right: Shapes) -> tuple[Shapes, Shapes]:

@@ -85,6 +85,7 @@ def test_agrees_with_the_reference(d: int, first: Maker, second: Maker, n: int) 
 def test_large_outlines_end_at_their_deadline() -> None:
     t = np.linspace(0, 2 * np.pi, 300_000, endpoint=False)
     ring = np.stack([np.cos(t), np.sin(t)], axis=1) * (1 + 0.1 * np.sin(9999 * t))[:, None]
+    ring[:, 0] += 3 * ring[:, 1] ** 2  # bent: not star-shaped
     body, step = engine.Polygon([ring]), Pose(np.eye(2), [0.001, 0.0])  # without a deadline 18 s, posed 80 s
     small = engine.Polygon([ring[::30000]])
     for pose_ in (None, step):
