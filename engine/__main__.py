@@ -322,7 +322,7 @@ COMMANDS: Final[dict[str, tuple[Callable[[Options], None], str, Mapping[str, str
              {"surface": FORMATS, "items": ROWS + "two positions; with --rays origin and direction"}),
     "overlay": (_overlay, "Boolean operation on two layers, every feature with every one that it meets",
                 {"left": LAYER + ATTRIBUTES, "right": LAYER}),
-    "union": (_union, "unite the features of a layer, all or those with equal properties", {"layer": LAYER}),
+    "union": (_union, "unite the features of a layer, all or those with equal properties", {"layer": ANY}),
     "join": (_join, "join points to the features that contain them, boundary included",
              {"points": ".geojson file of points" + ATTRIBUTES, "polygons": LAYER}),
     "crop": (_crop, "cut the features of a layer to the union of some polygons",

@@ -177,7 +177,7 @@ def with_geometries(
     def geometry(row: int) -> bytes | None:
         of_lines, of_points = (order[slice(*np.searchsorted(of, [row, row + 1]))].tolist() for order, of in parts_of)
         made = {
-            "Polygon": [] if heights is None else _polygons(areas, row, listed),
+            "Polygon": _polygons(areas, row, listed) if heights is not None or of_lines or of_points else [],
             "LineString": [listed(*(first_line + touching.offsets[k : k + 2]).tolist()) for k in of_lines],
             "Point": [listed(first_point + k, first_point + k + 1)[0] for k in of_points],
         }

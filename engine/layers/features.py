@@ -153,7 +153,7 @@ def dissolve_features(
     Parameters
     ----------
     layer : dict
-        A GeoJSON FeatureCollection of polygons, of lines, or of points.
+        A GeoJSON FeatureCollection of polygons, lines and points.
     by : list of str, optional
         Names of properties.
     coverage, gaps, grid
@@ -173,7 +173,7 @@ def dissolve_features(
 
     Notes
     -----
-    Boundary, accuracy and cost: as `engine.union_all`, a group each.
+    Boundary, accuracy and cost: as `engine.layers.dissolve`.
 
     References
     ----------

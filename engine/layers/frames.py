@@ -241,7 +241,7 @@ def dissolve(
     Parameters
     ----------
     layer : GeoDataFrame
-        Of polygons, of lines, or of points.
+        Of polygons, lines and points.
     by, aggfunc
         As GeoDataFrame.dissolve.
     coverage : bool, default False
@@ -261,7 +261,7 @@ def dissolve(
     Returns
     -------
     GeoDataFrame
-        A row a group; one without geometries has an empty one.
+        A row a group; one without geometries has an empty one; one of several dimensions a GeometryCollection.
 
     Raises
     ------
@@ -273,7 +273,8 @@ def dissolve(
     Notes
     -----
     Boundary, accuracy and cost: as `engine.union_all`, a group each. Of lines, stretches that lie on one another are
-    taken once, lines are joined where two ends meet, and get no vertex where they cross: it would be rounded.
+    taken once, lines are joined where two ends meet, and get no vertex where they cross: it would be rounded. Of lines
+    stays what is outside of the polygons of their group, of points those that are on neither, decided exactly.
 
     References
     ----------

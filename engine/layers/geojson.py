@@ -165,6 +165,10 @@ def _parts_of(side: Collection, limits: Limits) -> tuple[Int8Array, PolygonArray
         if dims[number] == LINE:
             raise refused(InvalidArrayError, side, number, "is wrong: a line of one position; a line needs 2")
         raise refused(RingTooShortError, side, number, "is wrong: a ring of one position; a ring needs 3")
+    has_shell = np.append(np.diff(parts.ring_offsets), 0)[parts.polygon_offsets[:-1]] > 0
+    if len(alone := np.flatnonzero(~has_shell & (parts.sizes() > 0))):
+        number = int(np.repeat(np.arange(len(dims)), counts)[alone[0]])
+        raise refused(RingTooShortError, side, number, "is wrong: a shell without positions that has holes")
     return dims, parts, counts
 
 
@@ -236,6 +240,8 @@ def polygon_of(geometry: Any) -> Polygon:
 
     Notes
     -----
+    Degenerate input: a polygon without positions, [] or [[]], is empty; holes of an empty shell are refused.
+
     Boundary, accuracy: several parts are united as by `engine.union_all`, whose crossings are rounded; walls that parts
     share vanish.
 

@@ -8,13 +8,13 @@ merged by rank; pieces that reach the end of a segment are joined with those tha
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
-from engine.errors import UnsupportedSolidError
 from engine.layers.joins import related_pairs
 from engine.layers.limits import Limits
 from engine.layers.rows import (
@@ -29,7 +29,7 @@ from engine.layers.rows import (
     without_areas,
 )  # fmt: skip
 from engine.layers.rows import overlay_rows as overlay_areas
-from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_areas, no_paths
+from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_paths, single_points
 from engine.layers.wrapping import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
 from engine.polygon_overlay.touching import Place, Touching, join_edges
@@ -141,12 +141,10 @@ class _Parts(NamedTuple):
 
 def _of_points(paths: Paths, areas: Layer, keys: IntArray, is_outside: bool, limits: Limits) -> tuple[IntArray, _Parts]:
     """Return (feature, key) of each part, and the parts, of the points of a layer."""
-    _, features = paths.owners()
-    are_points = np.flatnonzero(paths.dims[features] == POINT)
-    vertices, features = read_only(paths.vertices[are_points]), features[are_points]
-    offsets = np.arange(len(vertices) + 1)
-    points = MixedLayer(no_areas(len(vertices)), Paths(np.zeros(len(vertices), np.int8), vertices, offsets, offsets))
-    first, second = related_pairs(points, MixedLayer(areas, no_paths(len(areas))), "intersects", 0.0, limits).T
+    paths = paths.of(POINT)
+    vertices, features = paths.vertices, paths.owners()[1]
+    points, polygons = single_points(vertices), MixedLayer(areas, no_paths(len(areas)))
+    first, second = related_pairs(points, polygons, "intersects", 0.0, limits).T
     if is_outside:
         first = np.setdiff1d(np.arange(len(vertices)), first)
         units = np.column_stack([first, np.zeros(len(first), np.int64)])
@@ -286,42 +284,60 @@ def _between(inside: _Intervals, segments: FloatArray) -> _Intervals:
 def dissolve_mixed(
     layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits, is_coverage: bool = False, gaps: str = "keep"
 ) -> LayerRows:
-    """Return one row for each group, the union of its features, all of one dimension; is_coverage, gaps: as
-    `dissolve_rows`.
-    Raises: UnsupportedSolidError for a layer of several dimensions."""
-    kinds = np.setdiff1d(layer.dims, [-1])
-    if len(kinds) > 1:
-        raise UnsupportedSolidError("layer has features of several dimensions; dissolve each alone", ("layer",))
-    if len(kinds) and kinds[0] < AREA:
-        return _dissolve_paths(layer.paths, groups, n_groups, limits)
-    return joined_rows(dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage, gaps), limits)
+    """Return one row for each group, the union of its features: of lines what is outside of its polygons, of points
+    those on neither; is_coverage, gaps: as `dissolve_rows`."""
+    rows = dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage, gaps)
+    if layer.kinds - {AREA}:
+        lines, points = _dissolve_lines(layer, groups, n_groups, limits), _dissolve_points(layer, groups, limits)
+        rows = replace(rows, touching=Touching(*lines, *points))
+    return joined_rows(rows, limits)
 
 
-def _dissolve_paths(paths: Paths, groups: IntArray, n_groups: int, limits: Limits) -> LayerRows:
-    """Return one row for each group, the union of its points or of its lines: points once each; of lines the stretches
-    that lie on one another once. Lines that cross get no vertex there, which rounding would put beside them."""
+def _dissolve_points(layer: MixedLayer, groups: IntArray, limits: Limits) -> tuple[IntArray, FloatArray]:
+    """Return group and place of the points that are on no line or polygon of their group, each once, sorted."""
+    points, others = layer.paths.of(POINT), MixedLayer(layer.areas, layer.paths.of(LINE))
+    own = groups[points.owners()[1]]
+    covered, by = related_pairs(single_points(points.vertices), others, "intersects", 0.0, limits).T
+    stays = own != NONE
+    stays[covered[own[covered] == groups[by]]] = False
+    made = np.unique(np.column_stack([own, points.vertices])[stays], axis=0)
+    return made[:, 0].astype(np.int64), made[:, 1:]
+
+
+def _dissolve_lines(
+    layer: MixedLayer, groups: IntArray, n_groups: int, limits: Limits
+) -> tuple[IntArray, FloatArray, IntArray]:
+    """Return the group of each line, their vertices and offsets, of the unions of lines: stretches that lie on one
+    another once, outside of the polygons of the group. Lines that cross get no vertex there, which rounding would put
+    beside them."""
+    paths = layer.paths.of(LINE)
     path, features = paths.owners()
-    lines: list[tuple[int, list[Place]]] = []
-    points: list[tuple[int, Place]] = []
+    tails = np.flatnonzero(path[:-1] == path[1:])
+    order = tails[np.argsort(groups[features[tails]], kind="stable")]
+    firsts = np.searchsorted(groups[features[order]], np.arange(n_groups + 1))
+    lines: list[tuple[int, FloatArray]] = []
     with limits.budget() as budget:
-        for group in range(n_groups):
+        for group in np.flatnonzero(np.diff(firsts)).tolist():
             budget.check()
-            own = np.flatnonzero(groups[features] == group)
-            if paths.dims[features[own]].max(initial=POINT) == POINT:
-                points += [(group, (x, y)) for x, y in sorted(set(map(tuple, paths.vertices[own].tolist())))]
-                continue
-            tails = own[:-1][path[own[:-1]] == path[own[1:]]]
-            ends = np.concatenate([paths.vertices[tails], paths.vertices[tails + 1]], axis=1).tolist()
+            own = order[firsts[group] : firsts[group + 1]]
+            ends = np.concatenate([paths.vertices[own], paths.vertices[own + 1]], axis=1).tolist()
             edges = {((a, b), (c, d)) if (a, b) <= (c, d) else ((c, d), (a, b)) for a, b, c, d in polled(ends)}
-            lines += [(group, line) for line in join_edges(_split(sorted(e for e in edges if e[0] != e[1]), budget))]
-    touching = Touching(
-        np.array([group for group, _ in lines], np.int64),
-        np.array([place for _, line in lines for place in line]).reshape(-1, 2),
-        summed([len(line) for _, line in lines]),
-        np.array([group for group, _ in points], np.int64),
-        np.array([place for _, place in points]).reshape(-1, 2),
-    )
-    return without_areas(np.arange(n_groups), np.full(n_groups, NONE), touching)
+            made = [*map(np.array, join_edges(_split(sorted(e for e in edges if e[0] != e[1]), budget)))]
+            members = np.flatnonzero((groups == group) & (layer.areas.arrays.sizes() > 0))
+            lines += [(group, line) for line in (_outside(made, layer.areas, members, limits) if made else ())]
+    vertices = np.concatenate([np.zeros((0, 2)), *(line for _, line in lines)])
+    return np.array([group for group, _ in lines], np.int64), vertices, summed([len(line) for _, line in lines])
+
+
+def _outside(lines: list[FloatArray], areas: Layer, members: IntArray, limits: Limits) -> list[FloatArray]:
+    """Return the parts of lines outside of some polygons."""
+    if not len(members):
+        return lines
+    none, offsets = members[:0], summed([*map(len, lines)])
+    paths = Paths(np.array([LINE], np.int8), read_only(np.concatenate(lines)), offsets, np.array([0, len(lines)]))
+    some = Layer(areas.arrays.take(members), np.zeros(len(members), np.bool_), areas.arrays.take(none), none)
+    made = path_rows(paths, some, np.zeros(len(members), np.int64), True, limits, frozenset([LINE])).touching
+    return np.split(made.vertices, made.offsets[1:-1]) if len(made.lines) else []
 
 
 def _split(edges: list[tuple[Place, Place]], budget: Budget) -> list[tuple[Place, Place]]:

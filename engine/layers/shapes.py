@@ -42,6 +42,13 @@ class Paths(NamedTuple):
         paths = np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
         return paths, np.repeat(np.arange(len(self.dims)), np.diff(self.path_offsets))[paths]
 
+    def of(self, dim: int) -> Paths:
+        """Return those of features of one dimension; other features have none."""
+        is_own, sizes, counts = self.dims == dim, np.diff(self.offsets), np.diff(self.path_offsets)
+        own = np.repeat(is_own, counts)
+        vertices = read_only(self.vertices[np.repeat(own, sizes)])
+        return Paths(np.where(is_own, self.dims, -1), vertices, summed(sizes[own]), summed(np.where(is_own, counts, 0)))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MixedLayer:
@@ -199,6 +206,12 @@ def pairs_between(left: Shapes, right: Shapes, reach: Any, limits: Limits) -> In
     n, low, high = len(numbers), np.concatenate([low, their_low]), np.concatenate([high, their_high])
     both = limits.pairs_of_boxes(low, high, lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n))
     return np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
+
+
+def single_points(vertices: FloatArray) -> MixedLayer:
+    """Return a layer of points."""
+    n = len(vertices)
+    return MixedLayer(no_areas(n), Paths(np.zeros(n, np.int8), vertices, np.arange(n + 1), np.arange(n + 1)))
 
 
 def no_paths(n: int) -> Paths:

@@ -293,7 +293,7 @@ class LayersUnionRequest(Schema):
 
     model_config = with_example({"layer": _PARCELS, "by": ["owner"], "grid": 0.001, "coverage": True})
 
-    layer: FeatureCollection = Field(description="A FeatureCollection of polygons, of lines, or of points.")
+    layer: FeatureCollection = Field(description=_ANY)
     by: Annotated[list[str], AtMost("max_operands")] = optional(
         "Names of properties: features are united that have the same values of these; all, if left out."
     )

@@ -24,7 +24,7 @@ from engine.errors import (
     UnsupportedSolidError,
     WrongDimensionError,
 )
-from engine.layers import dissolve_features, locate_features, overlay_features
+from engine.layers import dissolve_features, locate_features, overlay_features, polygon_of
 from engine.layers.rows import HOWS
 from tests.unit.layers.cells import Cells, collection, layer, rows
 
@@ -190,6 +190,11 @@ def ring(*positions: Any) -> Any:
         (ring([0, 0], [1, math.nan], [1, 1]), NotFiniteError, "nan"),
         (ring([0, 0], [1, "1"], [1, 1]), InvalidArrayError, "must be a number"),
         (ring([0, 0]), RingTooShortError, "one position"),
+        (
+            lambda f: f["geometry"].update(type="Polygon", coordinates=[[], [[0, 0], [1, 0], [1, 1]]]),
+            RingTooShortError,
+            "shell without positions that has holes",
+        ),
         (lambda f: f["geometry"].update(coordinates=7), InvalidArrayError, "no lists"),
         (lambda f: f["geometry"].pop("coordinates"), InvalidArrayError, "no lists"),
     ],
@@ -199,6 +204,16 @@ def test_the_feature_at_fault_is_named(change: Any, error: Any, says: str) -> No
         overlay_features(collection([]), faulty(change))
     assert caught.value.where[:3] == ("right", "features", 1)
     assert "right.features[1] (id 'f1')" in caught.value.message
+
+
+@pytest.mark.parametrize("coordinates", [[], [[]], [[], []], [[[]]], [[[]], [[], []]]])
+def test_polygons_without_positions_are_empty(coordinates: Any) -> None:
+    kind = "Polygon" if coordinates in ([], [[]], [[], []]) else "MultiPolygon"
+    geometry = {"type": kind, "coordinates": coordinates}
+    given = {"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": geometry}]}
+    assert [row["geometry"] for row in dissolve_features(given)] == [None]
+    assert len(overlay_features(given, collection([frozenset({(0, 0)})]))) == 0
+    assert polygon_of(geometry).n_rings == 0
 
 
 def test_what_is_no_layer() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import engine
-from engine.errors import InvalidInputError, InvalidOperationError, UnsupportedSolidError
+from engine.errors import InvalidInputError, InvalidOperationError
 from engine.layers.relate import PREDICATES
 from engine.layers.rows import HOWS
 
@@ -168,13 +168,43 @@ def test_clip_and_dissolve() -> None:
             groups, theirs = (each.geometry for each in (layers.dissolve(layer, "n"), layer.dissolve("n")))
             assert all(a.is_empty == b.is_empty for a, b in zip(groups, theirs))
             assert layers.dissolve(layer).geometry[0].hausdorff_distance(layer.dissolve().geometry[0]) < 1e-9
-    with pytest.raises(UnsupportedSolidError, match="several dimensions"):
-        layers.dissolve(layer)
     lines = [shapely.LineString(at) for at in ([(0, 0), (4, 0)], [(6, 0), (2, 0)], [(1, -1), (1, 1)])]
     united = layers.dissolve(geopandas.GeoDataFrame(geometry=lines)).geometry[0]
     assert united.length == 8.0
     box = layers.clip(geopandas.GeoDataFrame(geometry=lines), (0, 0, 1, 1))
     assert box.geometry.length.tolist() == [1.0, 1.0]
+
+
+def test_a_group_of_several_dimensions_is_one_collection() -> None:
+    """What lines have outside of polygons, and points outside of both; geopandas' union, but decided exactly."""
+    wkt = ["POLYGON ((0 0, 4 0, 4 4, 0 4, 0 0))", "LINESTRING (-2 2, 6 2)", "MULTIPOINT (1 1, 9 9, 9 9)", "POINT (5 2)",
+           "LINESTRING (0 0, 0 3)", "POLYGON ((4 0, 6 0, 6 1, 4 1, 4 0))", "POINT EMPTY"]  # fmt: skip
+    layer = geopandas.GeoDataFrame({"k": [*"aaaaaab"]}, geometry=[shapely.from_wkt(each) for each in wkt])
+    united, none = layers.dissolve(layer, "k").geometry
+    assert none.is_empty
+    expected = shapely.from_wkt(
+        "GEOMETRYCOLLECTION (POLYGON ((0 0, 0 4, 4 4, 4 1, 6 1, 6 0, 0 0)), LINESTRING (4 2, 6 2),"
+        "LINESTRING (-2 2, 0 2), POINT (9 9))"
+    )
+    assert [*map(shapely.normalize, united.geoms)] == [
+        *map(shapely.normalize, [expected.geoms[k] for k in (3, 2, 1, 0)])
+    ]
+    (row,) = layers.dissolve_features(layer.iloc[:6].__geo_interface__)
+    assert {each["type"] for each in row["geometry"]["geometries"]} == {"Polygon", "MultiLineString", "Point"}
+    edge = [shapely.Polygon([(0, 0), (7, 6), (1, 5)]), shapely.LineString([(0, 0), (3.5, 3)]), shapely.Point(3.5, 3)]
+    (area,) = layers.dissolve(geopandas.GeoDataFrame(geometry=edge)).geometry
+    assert area.equals(edge[0])
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        some = frame(12, 9, "a").assign(k=rng.integers(0, 3, 12))
+        for a, b in zip(layers.dissolve(some, "k").geometry, some.dissolve("k").geometry):
+            for dim in ("Polygon", "LineString"):  # of points GEOS keeps some that are on lines
+                mine, theirs = (
+                    shapely.union_all([each for each in shapely.get_parts(whole) if each.geom_type == dim])
+                    for whole in (a, b)
+                )
+                assert mine.symmetric_difference(theirs).area < 1e-9
+                assert mine.is_empty or mine.hausdorff_distance(theirs) < 1e-9
 
 
 def test_a_row_of_a_line_and_a_point_stays_where_the_layer_has_both() -> None:
