@@ -12,8 +12,9 @@ items just finished. All other parameters, results and errors are those of the f
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -28,9 +29,13 @@ from engine.distance import distances as point_distances
 from engine.distance.clearance import checked_distance
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.layers import frame_joins as joins
+from engine.layers import frames
 from engine.layers.frame_reading import mixed_of
 from engine.layers.joins import check_predicate
 from engine.layers.limits import Limits
+from engine.layers.path_rows import clip_mixed, overlay_mixed, sorted_rows
+from engine.layers.rows import HOWS, NONE, LayerRows
+from engine.layers.shapes import MixedLayer, single_points
 from engine.polygon_overlay.batch import OverlayBatch, join_batches
 from engine.polygon_overlay.batch import overlay_batch as overlay_pairs
 from engine.polygon_overlay.run import Operation
@@ -166,11 +171,7 @@ def sjoin(
     reach = check_predicate(predicate, distance)
     for name, side in (("left", left), ("right", right)):
         mixed_of(side, name, Limits(None, None))  # a worker could not say which feature is wrong, and sees not all
-    there = np.flatnonzero(~(left.geometry.isna() | left.geometry.is_empty))
-    order = there
-    if len(there):
-        order = there[np.argsort(left.geometry.iloc[there].hilbert_distance().to_numpy(), kind="stable")]
-    tasks = _Tiles(left, right, order, reach)
+    tasks = _Tiles(left, right, _order(left), reach)
     function = partial(_related, predicate=predicate, distance=distance)
     pairs = [
         np.zeros((0, 2), np.int64),
@@ -178,6 +179,83 @@ def sjoin(
     ]
     both = np.concatenate(pairs)
     return joins.joined(left, right, both[np.lexsort((both[:, 1], both[:, 0]))], how, (lsuffix, rsuffix))
+
+
+def overlay(
+    client: Client, left: GeoDataFrame, right: GeoDataFrame, how: str = "intersection",
+    keep_geom_type: bool | None = None, *, grid: float | None = None, wrap: float | None = None, part: int = 5_000,
+    progress: Progress | None = None,
+) -> GeoDataFrame:  # fmt: skip
+    """Overlay a layer with one of polygons, see `engine.layers.overlay`: parts as those of `sjoin`, first of the left
+    layer, then of the right one where its remainders are in the answer."""
+    layers = frames.checked_overlay(left, right, how, keep_geom_type, Limits(None, None, None, grid, wrap), {})
+    kinds = frames.kinds_of(layers[0], keep_geom_type is not False)
+    of_pairs, of_left, of_right = HOWS[how]
+    options: Any = {"grid": grid, "wrap": wrap, "kinds": kinds, "with_touching": keep_geom_type is False}
+    reach, rows = np.inf if wrap else 0.0, list[LayerRows]()
+    for sides, name, is_turned in (
+        ((left, right), ("identity" if of_left else "intersection") if of_pairs else "difference", False),
+        *([((right, left), "difference", True)] if of_right else []),
+    ):
+        ask = partial(_overlaid, how=name, is_turned=is_turned, **options)
+        rows += [
+            made for _, made in _answers(client, ask, (), (_Tiles(*sides, _order(sides[0]), reach),), part, progress)
+        ]
+    nothing = single_points(np.zeros((0, 2)))
+    none = overlay_mixed(nothing, nothing, how, Limits(None, None), kinds, False)
+    return frames.overlaid(left, right, sorted_rows([none, *rows]), how, keep_geom_type, kinds)
+
+
+def clip(
+    client: Client, layer: GeoDataFrame, mask: Any, keep_geom_type: bool = False, *, keep: str = "inside",
+    grid: float | None = None, wrap: float | None = None, part: int = 20_000, progress: Progress | None = None,
+) -> GeoDataFrame:  # fmt: skip
+    """Cut a layer to the union of some polygons, see `engine.layers.clip`: parts of the layer, as those of `sjoin`; the
+    mask is sent once to every worker."""
+    limits = Limits(None, None, None, grid, wrap, keep)
+    sides = frames.checked_clip(layer, mask, keep_geom_type, limits, {})
+    options: Any = {"grid": grid, "wrap": wrap, "keep": keep, "with_touching": not keep_geom_type}
+    kinds = frames.kinds_of(sides[0], keep_geom_type)
+    ask = partial(_clipped, kinds=kinds, **options)
+    tiles = _Tiles(layer, layer.iloc[:0], _order(layer), 0.0)
+    none = clip_mixed(single_points(np.zeros((0, 2))), sides[1], limits, kinds, False)
+    made = [rows for _, rows in _answers(client, ask, (sides[1],), (tiles,), part, progress)]
+    return frames.frame_of_left(layer, sorted_rows([none, *made]))
+
+
+def _overlaid(
+    shared: tuple[Any, ...], tile: Any, how: str, is_turned: bool, grid: Any, wrap: Any, **options: Any
+) -> LayerRows:
+    """Return the rows of a part of both layers; is_turned: of a part of the right one."""
+    limits = Limits(None, None, 1, grid, wrap)
+    numbers, sides = _sides_of(tile, limits)
+    rows = overlay_mixed(*sides, how, limits, **options)
+    first, second = (np.append(each, NONE)[of] for each, of in zip(numbers, (rows.left, rows.right)))
+    return replace(rows, left=second, right=first) if is_turned else replace(rows, left=first, right=second)
+
+
+def _clipped(shared: tuple[Any, ...], tile: Any, grid: Any, wrap: Any, keep: str, **options: Any) -> LayerRows:
+    limits = Limits(None, None, 1, grid, wrap, keep)
+    (numbers, _), (layer, _) = _sides_of(tile, limits)
+    rows = clip_mixed(layer, shared[0], limits, **options)
+    return replace(rows, left=numbers[rows.left])
+
+
+def _sides_of(tile: Any, limits: Limits) -> tuple[tuple[Any, Any], tuple[MixedLayer, MixedLayer]]:
+    """Return the numbers of features of a part of both layers, and these layers."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they are given where the call is
+        first, second = (mixed_of(each.to_frame("geometry"), "layer", limits) for each in tile[2:])
+        return tile[:2], (first, second)
+
+
+def _order(layer: GeoDataFrame) -> Any:
+    """Return the numbers of features along a curve that fills the plane, then of those without geometry."""
+    is_filled = ~(layer.geometry.isna() | layer.geometry.is_empty).to_numpy()
+    there = np.flatnonzero(is_filled)
+    if len(there):
+        there = there[np.argsort(layer.geometry.iloc[there].hilbert_distance().to_numpy(), kind="stable")]
+    return np.append(there, np.flatnonzero(~is_filled))
 
 
 class _Tiles:

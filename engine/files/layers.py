@@ -66,7 +66,7 @@ def read_layer(file: File) -> dict[str, Any]:
     geopandas = _geopandas(name)
     try:
         given: Any = file if is_path else io.BytesIO(octets)  # a Shapefile is several files
-        frame = geopandas.read_parquet(given) if suffix == "parquet" else geopandas.read_file(given)
+        frame = geopandas.read_parquet(given) if octets.startswith(b"PAR1") else geopandas.read_file(given)
         text = frame.to_json(drop_id=True) if isinstance(frame, geopandas.GeoDataFrame) else None
     except Exception as error:  # whatever the bytes lead its readers to
         raise InvalidInputError(

@@ -14,7 +14,7 @@ from engine.layers.gaps import check_gaps
 from engine.layers.limits import Limits
 from engine.layers.path_rows import clip_mixed, dissolve_mixed, overlay_mixed
 from engine.layers.rows import NONE, LayerRows, check_how
-from engine.layers.shapes import AREA, LINE, POINT
+from engine.layers.shapes import AREA, LINE, POINT, MixedLayer
 from engine.running.budget import Cancel
 from engine.running.parallel import check_options
 from engine.solids.checks import shown
@@ -105,28 +105,46 @@ def overlay(
     >>> engine.layers.overlay(parcels, floods).geometry.area.tolist()
     [1.0]
     """
-    grid = _grid_of(grid, others)
+    limits = Limits(deadline, cancel, workers, _grid_of(grid, others), wrap)
+    layers = checked_overlay(left, right, how, keep_geom_type, limits, others)
+    kinds = kinds_of(layers[0], keep_geom_type is not False)
+    rows = overlay_mixed(*layers, how, limits, kinds, keep_geom_type is False)
+    return overlaid(left, right, rows, how, keep_geom_type, kinds)
+
+
+def checked_overlay(
+    left: Any, right: Any, how: str, keep_geom_type: bool | None, limits: Limits, others: Any
+) -> tuple[MixedLayer, MixedLayer]:
+    """Return both layers after checks of the arguments of `overlay`."""
     check_frames("overlay", others, left=left, right=right)
     check_how(how)
-    if keep_geom_type is not None:
-        check_options(workers, None, keep_geom_type=keep_geom_type)
+    check_options(limits.workers, None, **({} if keep_geom_type is None else {"keep_geom_type": keep_geom_type}))
     if left.crs is not None and right.crs is not None and left.crs != right.crs:
-        warnings.warn("the layers have different CRS; coordinates are taken as they are", UserWarning, stacklevel=2)
-    limits = Limits(deadline, cancel, workers, grid, wrap)
-    layers = mixed_of(left, "left", limits), mixed_of(right, "right", limits, (AREA,))
-    keeps_all = keep_geom_type is not None and not keep_geom_type
-    kinds = _EVERY if keeps_all else layers[0].kinds
-    rows = overlay_mixed(*layers, how, limits, kinds, keeps_all)
+        warnings.warn("the layers have different CRS; coordinates are taken as they are", UserWarning, stacklevel=3)
+    return mixed_of(left, "left", limits), mixed_of(right, "right", limits, (AREA,))
+
+
+def kinds_of(layer: MixedLayer, keep_geom_type: bool) -> frozenset[int]:
+    """Return the dimensions of parts that stay: those that a layer has, or all."""
+    return layer.kinds if keep_geom_type else _EVERY
+
+
+def overlaid(
+    left: GeoDataFrame, right: GeoDataFrame, rows: LayerRows, how: str, keep_geom_type: bool | None,
+    kinds: frozenset[int],
+) -> GeoDataFrame:  # fmt: skip
+    """Return the rows of an overlay with the attributes of both layers; kinds: the dimensions that stay, unless
+    `keep_geom_type` is False."""
     if rows.n_collapsed:
-        warnings.warn(f"rounding left nothing of {rows.n_collapsed} rows with area", UserWarning, stacklevel=2)
+        warnings.warn(f"rounding left nothing of {rows.n_collapsed} rows with area", UserWarning, stacklevel=3)
     frame = _frame(left, right, rows, how)
     is_other = ~np.isin(dims_of(frame.geometry.array), [*kinds])
     is_other &= frame.geometry.geom_type.to_numpy() != "GeometryCollection"  # of parts of these dimensions
-    if not keeps_all and is_other.any():
+    if keep_geom_type is not False and is_other.any():
         frame = frame[~is_other]
         if keep_geom_type is None:
             what = "without geometry, or of other dimensions than the left layer,"
-            warnings.warn(f"{int(is_other.sum())} rows {what} are left out", UserWarning, stacklevel=2)
+            warnings.warn(f"{int(is_other.sum())} rows {what} are left out", UserWarning, stacklevel=3)
     return frame.reset_index(drop=True)
 
 
@@ -187,9 +205,19 @@ def clip(
     >>> engine.layers.clip(roads, shapely.box(1, -1, 3, 1)).geometry.length.tolist()
     [2.0]
     """
+    check_options(workers, None, sort=sort)
+    limits = Limits(deadline, cancel, workers, _grid_of(grid, others), wrap, keep)
+    sides = checked_clip(layer, mask, keep_geom_type, limits, others)
+    rows = clip_mixed(*sides, limits, kinds_of(sides[0], keep_geom_type), not keep_geom_type)
+    return frame_of_left(layer, rows)
+
+
+def checked_clip(
+    layer: Any, mask: Any, keep_geom_type: bool, limits: Limits, others: Any
+) -> tuple[MixedLayer, MixedLayer]:
+    """Return both layers after checks of the arguments of `clip`."""
     geopandas, shapely = geopandas_and_shapely()
-    grid = _grid_of(grid, others)
-    check_options(workers, None, keep_geom_type=keep_geom_type, sort=sort)
+    check_options(None, None, keep_geom_type=keep_geom_type)
     region = mask
     if isinstance(region, (list, tuple, np.ndarray)) and len(region) == 4 and np.isrealobj(np.asarray(region)):
         region = shapely.box(*region)
@@ -198,11 +226,7 @@ def clip(
     if isinstance(region, geopandas.GeoSeries):
         region = geopandas.GeoDataFrame(geometry=region)
     check_frames("clip", others, layer=layer, mask=region)
-    limits = Limits(deadline, cancel, workers, grid, wrap, keep)
-    sides = mixed_of(layer, "layer", limits), mixed_of(region, "mask", limits, (AREA,))
-    kinds = sides[0].kinds if keep_geom_type else _EVERY
-    rows = clip_mixed(*sides, limits, kinds, not keep_geom_type)
-    return frame_of_left(layer, rows)
+    return mixed_of(layer, "layer", limits), mixed_of(region, "mask", limits, (AREA,))
 
 
 def frame_of_left(layer: GeoDataFrame, rows: LayerRows) -> GeoDataFrame:

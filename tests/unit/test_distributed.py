@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -163,3 +164,34 @@ def test_layers_are_joined_as_by_one_process(client: Client) -> None:
     right.geometry.array[41] = shapely.GeometryCollection([shapely.Point(1e6, 0)])  # far from all of the left
     with pytest.raises(engine.UnsupportedSolidError, match=r"right\[41\] \(index 41\)"):
         distributed.sjoin(client, left, right, part=17)
+
+
+def test_layers_are_overlaid_and_clipped_as_by_one_process(client: Client) -> None:
+    geopandas, shapely = pytest.importorskip("geopandas"), pytest.importorskip("shapely")
+    testing = pytest.importorskip("pandas.testing")
+    rng = np.random.default_rng(6)
+
+    def layer(n: int, name: str, *more: Any) -> Any:
+        boxes = [shapely.box(x, y, x + 1.3, y + 1.7) for x, y in rng.random((n, 2)) * 9]
+        shapes = [*boxes, *more, None, shapely.Polygon()]
+        return geopandas.GeoDataFrame({name: range(len(shapes))}, geometry=shapes)
+
+    lines = [shapely.LineString(at) for at in rng.random((9, 4, 2)) * 9]
+    left, right = layer(40, "a"), layer(30, "b")
+    mixed = layer(10, "a", *lines, *shapely.points(rng.random((9, 2)) * 9))
+    for how in engine.layers.rows.HOWS:
+        for one, keep in ((left, None), (mixed, False)):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = distributed.overlay(client, one, right, how, keep, part=11)
+                testing.assert_frame_equal(found, engine.layers.overlay(one, right, how, keep), check_exact=True)
+    for keep in ("inside", "outside"):
+        found = distributed.clip(client, mixed, right, keep=keep, part=7)
+        testing.assert_frame_equal(found, engine.layers.clip(mixed, right, keep=keep))
+    assert len(distributed.clip(client, mixed.iloc[:0], (0, 0, 1, 1))) == 0
+    crossing = geopandas.GeoDataFrame(geometry=[shapely.Polygon([(170, 0), (-170, 0), (-170, 10), (170, 10)])])
+    east = geopandas.GeoDataFrame(geometry=[shapely.box(175, 5, 180, 20)])
+    with pytest.warns(UserWarning, match="wrap: 1 polygons"):
+        assert distributed.overlay(client, crossing, east, wrap=180).geometry[0].equals(shapely.box(175, 5, 180, 10))
+    with pytest.raises(engine.UnsupportedSolidError, match=r"right\[3\]"):
+        distributed.overlay(client, left, mixed.iloc[7:])

@@ -33,12 +33,24 @@ def test_geojson_is_read_from_wherever_it_is(tmp_path: Path) -> None:
     assert [row["properties"] for row in rows] == [{"owner_1": "Ada", "owner_2": "Ada"}]
 
 
-@pytest.mark.parametrize("suffix", ["gpkg", "shp", "fgb"])
+@pytest.mark.parametrize("suffix", ["gpkg", "shp", "fgb", "parquet"])
 def test_other_formats_come_through_geopandas(tmp_path: Path, suffix: str) -> None:
     geopandas = pytest.importorskip("geopandas")
     frame = geopandas.GeoDataFrame.from_features(LAYER["features"], crs="EPSG:25832")
     path = tmp_path / f"a.{suffix}"
-    frame.to_file(path)
+    if suffix == "parquet":
+        pytest.importorskip("pyarrow")
+        frame.to_parquet(path)
+        for given in (path.read_bytes(), io.BytesIO(path.read_bytes())):  # known by its contents
+            assert engine.read_layer(given) == engine.read_layer(path)
+        wide = [{**LAYER["features"][0], "properties": {"owner": None, "n": n}} for n in range(3)]
+        write_layer(str(tmp_path / "b.parquet"), wide, None)
+        assert [each["properties"]["n"] for each in engine.read_layer(tmp_path / "b.parquet")["features"]] == [0, 1, 2]
+        path.with_name("c.parquet").write_bytes(path.read_bytes()[:-9])
+        with pytest.raises(engine.InvalidInputError, match="cannot be read as a layer"):
+            engine.read_layer(path.with_name("c.parquet"))
+    else:
+        frame.to_file(path)
     layer = engine.read_layer(path)
     assert layer["features"][0]["properties"] == {"owner": "Ada"}
     assert "25832" in json.dumps(layer["crs"])
