@@ -15,7 +15,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import orjson
 from fastapi.routing import APIRoute, APIRouter
@@ -174,7 +174,8 @@ _LINES: Final = {KINDS[0]: {"schema": {"type": "string", "description": "A JSON 
 )
 def stream_features() -> None:
     """Answer features against one layer, a JSON text a line in and out: the first line has the members `operation`
-    (clip, join, nearest or contains), `layer`, and options of the call of that name; the others are a feature each."""
+    (clip, join, nearest or contains), `layer`, which may be `{"type": "stored", "id": ...}`, a polygon or a scene of
+    polygons, and options of the call of that name; the others are a feature each."""
 
 
 def _check_headers(headers: dict[bytes, bytes]) -> None:
@@ -237,9 +238,32 @@ def _begun(lines: list[Line], call: Call) -> engine.layers.FeatureStream:
     if len(names) < len(document):
         raise ServiceError("unknown_field", "deadline and cancel are no options; the service sets them")
     try:
+        names["layer"] = _layer_of(names["layer"], call)
         return engine.layers.FeatureStream(**names, deadline=call.remaining(), cancel=call)
     except engine.DeadlineExceededError:
         raise call.too_late() from None
+
+
+def _layer_of(given: Any, call: Call) -> Any:
+    """Return a layer as it is given, or the polygons of a stored solid or scene: a feature each, its number the id."""
+    if not isinstance(given, dict) or given.get("type") != "stored":
+        return given
+    name = given.get("id")
+    if not isinstance(name, str):
+        raise ServiceError("invalid_request", "layer.id must be that of a stored polygon, or scene of polygons")
+    try:
+        bodies, poses = [call.store.get(name)], list[engine.Pose | None]()
+    except ServiceError:
+        scene = call.store.get_scene(name)
+        bodies, poses = [*scene.solids], [*scene.poses]
+    if any(poses) or not all(isinstance(body, engine.Polygon) for body in bodies):
+        raise ServiceError("unsupported_solid", "a layer is of polygons without poses; store these as a solid or scene")
+    unions = (engine.union_all([body], deadline=call.remaining(), cancel=call) for body in bodies)
+    features = [
+        {"type": "Feature", "id": number, "properties": {}, "geometry": union.__geo_interface__}
+        for number, union in enumerate(unions)
+    ]
+    return {"type": "FeatureCollection", "features": features}
 
 
 def _answered(stream: engine.layers.FeatureStream, lines: list[Line], call: Call) -> list[bytes]:

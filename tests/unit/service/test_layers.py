@@ -257,6 +257,32 @@ async def test_streams_are_answered_in_parts_and_name_lines(client: httpx.AsyncC
     assert json.loads(late[-1])["detail"].startswith("line 2102: stream.features[2100] has a ring")
 
 
+async def test_a_stored_layer_serves_streams(client: httpx.AsyncClient) -> None:
+    rings = [[[x, 0], [x + 2, 0], [x + 2, 2], [x, 2]] for x in (0, 1)]
+    bodies = [{"type": "polygon", "rings": [ring]} for ring in rings]
+    one = (await client.post("/v1/solids", json=bodies[0])).json()["id"]
+    both = (await client.post("/v1/scenes", json={"bodies": [{"solid": body} for body in bodies]})).json()["id"]
+    posed = {"bodies": [{"solid": bodies[0], "pose": {"rotation": [[1, 0], [0, 1]], "translation": [1, 0]}}]}
+    moved = (await client.post("/v1/scenes", json=posed)).json()["id"]
+    ball = (await client.post("/v1/solids", json={"type": "sphere", "center": [0, 0], "radius": 1})).json()["id"]
+    point = {"type": "Feature", "properties": {}, "geometry": {"type": "Point", "coordinates": [1.5, 1]}}
+
+    async def ask(layer: Any) -> httpx.Response:
+        first = {"operation": "contains", "layer": layer}
+        content = "\n".join(map(json.dumps, (first, point))).encode()
+        return await client.post("/v1/layers/stream", content=content, headers={"content-type": "application/x-ndjson"})
+
+    for name, ids in ((one, [0]), (both, [0, 1])):
+        rows = [json.loads(line) for line in (await ask({"type": "stored", "id": name})).text.splitlines()]
+        assert [row["polygon"]["id"] for row in rows] == ids
+    for given, status, code in (
+        ({"type": "stored", "id": "0" * 64}, 404, "unknown_scene"), ({"type": "stored"}, 422, "invalid_request"),
+        ({"type": "stored", "id": ball}, 422, "unsupported_solid"),
+        ({"type": "stored", "id": moved}, 422, "unsupported_solid"),
+    ):  # fmt: skip
+        check_problem(await ask(given), status, code)
+
+
 async def test_lines_of_a_stream_are_measured_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(engine, "warm", lambda **_: None)
     first = json.dumps({"operation": "clip", "layer": collection([frozenset({(0, 0)})])})
