@@ -47,7 +47,7 @@ def are_within(left: Shapes, right: Shapes, pairs: IntArray, distance: float, li
     """Return whether pairs of features are at most `distance` apart, exactly."""
     result = meets(left, right, pairs, limits)
     rest = np.flatnonzero(~result)
-    low, high, _, _ = _bounds(left, right, pairs[rest], np.full(len(rest), distance), limits)
+    low, high, _, _ = _bounds(left, right, pairs[rest], np.full(len(rest), distance), False, limits)
     result[rest] = high <= distance
     limit = Fraction(distance) ** 2
     for k in np.flatnonzero((low <= distance) & (high > distance)).tolist():
@@ -74,7 +74,7 @@ def nearest_pairs(
         pairs = _of(pairs_between(left, right, np.maximum(reaches, 0.0), limits), reaches)
         pairs = pairs[~np.isin(pairs[:, 0] * len(right.dims) + pairs[:, 1], left_out)]
         best, made = np.full(len(left.dims), inf), meets(left, right, pairs, limits)
-        bounds = _bounds(left, right, pairs, np.where(made, -inf, reaches[pairs[:, 0]]), limits)
+        bounds = _bounds(left, right, pairs, np.where(made, -inf, reaches[pairs[:, 0]]), True, limits)
         bounds.low[made] = bounds.high[made] = 0.0
         np.minimum.at(best, pairs[:, 0], bounds.high)
         is_last = reach >= min(most, 2.0 * extent)
@@ -179,8 +179,11 @@ class _Bounds(NamedTuple):
         return _Bounds(self.low[some], self.high[some], self.rows[some], self.is_alone[some])
 
 
-def _bounds(left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, limits: Limits) -> _Bounds:
-    """Return bounds of the distances of pairs that do not meet."""
+def _bounds(
+    left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, is_least: bool, limits: Limits
+) -> _Bounds:
+    """Return bounds of the distances of pairs, sorted by left feature, that do not meet (reaches of others: -infinity);
+    is_least: only of those that may be the least of their left feature."""
     n = len(pairs)
     made = _Bounds(np.full(n, np.inf), np.full(n, np.inf), np.zeros((n, 6)), np.zeros(n, np.bool_))
     with limits.budget() as budget:
@@ -188,7 +191,7 @@ def _bounds(left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, l
         def task(start: int, stop: int) -> None:
             some = slice(start, stop)
             own, state = (each[some] for each in made), np.empty(_N_STATE)
-            entry_of(_measure)(left, right, pairs[some], reaches[some], *own, state, budget.flag)
+            entry_of(_measure)(left, right, pairs[some], reaches[some], is_least, *own, state, budget.flag)
             budget.check()
 
         run_chunks(task, n, budget=budget, workers=limits.workers)
@@ -202,22 +205,37 @@ lower bound of all other rows."""
 
 @kernel
 def _measure(
-    left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, low: FloatArray, high: FloatArray,
-    rows: FloatArray, is_alone: BoolArray, state: FloatArray, flag: FlagArray,
+    left: Shapes, right: Shapes, pairs: IntArray, reaches: FloatArray, is_least: bool, low: FloatArray,
+    high: FloatArray, rows: FloatArray, is_alone: BoolArray, state: FloatArray, flag: FlagArray,
 ) -> None:  # fmt: skip
     """Fill the arrays of `_Bounds`."""
-    none = rows[:0]
+    none, least, before = rows[:0], np.inf, np.int64(-1)
     for item in range(len(pairs)):
         if flag[0] != 0:
             return
-        own, their = shape_of(left, pairs[item, 0]), shape_of(right, pairs[item, 1])
+        i, j = pairs[item, 0], pairs[item, 1]
+        least, before = least if is_least and i == before else np.inf, i
+        reach = min(reaches[item], least)
+        if _gap(left.boxes, left.box_firsts[i] + 1, right.boxes, right.box_firsts[j] + 1) * (1.0 - _ERROR) > reach:
+            least = 0.0 if reach < 0.0 else least
+            continue
+        own, their = shape_of(left, i), shape_of(right, j)
         state[:_ROW], state[_ROW:] = 0.0, np.inf
-        _scan(own, their, reaches[item], none, 0, state, flag)
-        _scan(their, own, reaches[item], none, 0, state, flag)
+        _scan(own, their, reach, none, 0, state, flag)
+        _scan(their, own, reach, none, 0, state, flag)
+        least = min(least, state[_HIGH])
         low[item], high[item] = min(state[_LOW], state[_RIVAL]), state[_HIGH]
         is_alone[item] = state[_RIVAL] > state[_HIGH]
         for k in range(_ROW):
             rows[item, k] = state[k]
+
+
+@inline
+def _gap(boxes: FloatArray, node: int, others: FloatArray, other: int) -> float:
+    """Return the distance of two boxes, rounded."""
+    x = max(0.0, max(boxes[node, 0] - others[other, 2], others[other, 0] - boxes[node, 2]))
+    y = max(0.0, max(boxes[node, 1] - others[other, 3], others[other, 1] - boxes[node, 3]))
+    return hypot(x, y)
 
 
 @kernel
