@@ -93,7 +93,7 @@ def _shapes(left: MixedLayer, right: MixedLayer, is_measured: bool, limits: Limi
             shapes, wrong = shapes_of(layer, limits)
             if len(wrong):
                 shapes, _ = shapes_of(_cleaned(layer, wrong, limits), limits)
-            layer.prepared["shapes"] = shapes
+            layer.prepared.update(shapes=shapes, cleaned=wrong)
     made = left.prepared["shapes"], right.prepared["shapes"]
     scaled = in_range(*made)
     if is_measured and scaled[0] is not made[0]:

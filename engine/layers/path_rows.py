@@ -8,6 +8,7 @@ merged by rank; pieces that reach the end of a segment are joined with those tha
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from engine.bounding.box_grid import pairs_of_boxes
+from engine.errors import NotRepresentableError
 from engine.layers.joins import related_pairs
 from engine.layers.limits import Limits
 from engine.layers.rows import (
@@ -25,11 +27,12 @@ from engine.layers.rows import (
     check_how,
     concatenate_rows,
     dissolve_rows,
-    unite,
+    rows_of_pairs,
+    united_pieces,
     without_areas,
 )  # fmt: skip
 from engine.layers.rows import overlay_rows as overlay_areas
-from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, no_paths, single_points
+from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, layer_of_areas, no_areas, no_paths, single_points
 from engine.layers.wrapping import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
 from engine.polygon_overlay.touching import Place, Touching, join_edges
@@ -39,7 +42,7 @@ from engine.running.budget import Budget, polled
 from engine.scenes.clip import loose_pieces, sorted_exactly
 from engine.scenes.ends import LoosePieces, merge_parts, take_pieces
 from engine.scenes.scene import Scene
-from engine.solids.ragged import next_in_rings, summed
+from engine.solids.ragged import closed_rings, next_in_rings, summed
 from engine.types import BoolArray, FloatArray, IntArray, read_only
 
 
@@ -82,15 +85,49 @@ def clip_mixed(
         return rows.take(np.flatnonzero(stays))
     there = np.flatnonzero(mask.areas.arrays.sizes())
     if "union" not in mask.prepared:
-        mask.prepared["union"] = unite(PolygonSelection(mask.areas.arrays, there), limits)
-    arrays = mask.prepared["union"]
-    none = np.zeros(0, np.int64)
-    whole = Layer(arrays, np.zeros(1, np.bool_), arrays.take(none), none)
-    parts = [overlay_areas(layer.areas, whole, "intersection", limits, with_touching)]
+        mask.prepared["union"] = united_pieces(PolygonSelection(mask.areas.arrays, there), limits)
+    parts = _clip_areas(layer, mask.prepared["union"], limits, with_touching)
     if (layer.paths.dims >= 0).any():
         zeros = np.zeros(len(mask.areas), np.int64)
         parts.append(path_rows(layer.paths, mask.areas, zeros, False, limits, kinds))
     return joined_rows(sorted_rows(parts), limits)
+
+
+def _clip_areas(layer: MixedLayer, pieces: PolygonArrays, limits: Limits, with_touching: bool) -> list[LayerRows]:
+    """Return the rows of polygons, each cut by the pieces of a mask. Those that meet no boundary are inside or outside;
+    of others that are near one piece, this piece alone counts."""
+    arrays, own = layer.areas.arrays, np.flatnonzero(layer.areas.arrays.sizes())
+    whole = pieces.merged(np.array([0, len(pieces.polygon_offsets) - 1]))
+    inside = own[:0]
+    if limits.grid is None and len(own):
+        with suppress(NotRepresentableError):  # beyond the range of exact signs all are cut
+            met, inside = (np.unique(related_pairs(layer, other, "intersects", 0.0, limits)[:, 0])
+                           for other in (_outline_of(pieces), layer_of_areas(whole)))  # fmt: skip
+            cut = np.union1d(met, layer.prepared.get("cleaned", own[:0]))
+            own, inside = np.intersect1d(own, cut), np.intersect1d(own, np.setdiff1d(inside, cut))
+    n, ends = len(own), zip(arrays.boxes(own), pieces.boxes(np.arange(len(pieces.polygon_offsets) - 1)))
+    low, high = (np.concatenate(each) for each in ends)
+    first, second = limits.pairs_of_boxes(low, high, lambda pairs: (pairs[:, 0] < n) & (pairs[:, 1] >= n)).T
+    counts = np.bincount(first, minlength=n)
+    is_one = counts[first] == 1
+    several = own[counts > 1]
+    sides = (
+        (own[first[is_one]], pieces, second[is_one] - n, with_touching),
+        (several, whole, np.zeros(len(several), np.int64), with_touching),
+        (inside, arrays, inside, False),
+    )
+    return [
+        rows_of_pairs(PolygonSelection(arrays, some), PolygonSelection(others, numbers), "intersection", some,
+                      np.zeros(len(some), np.int64), limits, has_touching)
+        for some, others, numbers, has_touching in sides
+    ]  # fmt: skip
+
+
+def _outline_of(pieces: PolygonArrays) -> MixedLayer:
+    """Return the rings of polygons as one feature of lines."""
+    vertices, offsets = closed_rings(pieces.vertices, pieces.ring_offsets)
+    paths = Paths(np.array([LINE], np.int8), read_only(vertices), offsets, np.array([0, len(offsets) - 1]))
+    return MixedLayer(no_areas(1), paths)
 
 
 def sorted_rows(parts: list[LayerRows]) -> LayerRows:
@@ -333,10 +370,10 @@ def _outside(lines: list[FloatArray], areas: Layer, members: IntArray, limits: L
     """Return the parts of lines outside of some polygons."""
     if not len(members):
         return lines
-    none, offsets = members[:0], summed([*map(len, lines)])
+    offsets = summed([*map(len, lines)])
     paths = Paths(np.array([LINE], np.int8), read_only(np.concatenate(lines)), offsets, np.array([0, len(lines)]))
-    some = Layer(areas.arrays.take(members), np.zeros(len(members), np.bool_), areas.arrays.take(none), none)
-    made = path_rows(paths, some, np.zeros(len(members), np.int64), True, limits, frozenset([LINE])).touching
+    some = layer_of_areas(areas.arrays.take(members))
+    made = path_rows(paths, some.areas, np.zeros(len(members), np.int64), True, limits, frozenset([LINE])).touching
     return np.split(made.vertices, made.offsets[1:-1]) if len(made.lines) else []
 
 

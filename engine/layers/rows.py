@@ -210,8 +210,14 @@ def _pairs_overlap(arrays: PolygonArrays, pairs: IntArray, limits: Limits) -> Bo
 
 def unite(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
     """Return the union of polygons as one valid polygon, in arrays."""
+    pieces = united_pieces(polygons, limits)
+    return pieces.merged(np.array([0, len(pieces.polygon_offsets) - 1]))
+
+
+def united_pieces(polygons: Sequence[Polygon], limits: Limits) -> PolygonArrays:
+    """Return the pieces of the union of polygons."""
     union = limits.record(union_all(list(polygons), **limits.options()))
-    return PolygonArrays(union.vertices, union.ring_offsets, np.array([0, len(union.ring_offsets) - 1]))
+    return PolygonArrays(union.vertices, union.ring_offsets, union.piece_offsets)
 
 
 def layer_of(parts: PolygonArrays, offsets: IntArray, is_missing: BoolArray, limits: Limits) -> Layer:

@@ -208,6 +208,12 @@ def pairs_between(left: Shapes, right: Shapes, reach: Any, limits: Limits) -> In
     return np.column_stack([numbers[both[:, 0]], theirs[both[:, 1] - n]])
 
 
+def layer_of_areas(arrays: PolygonArrays) -> MixedLayer:
+    """Return a layer of polygons."""
+    n, none = len(arrays.polygon_offsets) - 1, np.zeros(0, np.int64)
+    return MixedLayer(Layer(arrays, np.zeros(n, np.bool_), arrays.take(none), none), no_paths(n))
+
+
 def single_points(vertices: FloatArray) -> MixedLayer:
     """Return a layer of points."""
     n = len(vertices)
