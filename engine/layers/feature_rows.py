@@ -6,14 +6,13 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final, Literal, Protocol, TypedDict, Unpack, cast, overload
+from typing import Any, Final, Literal, Protocol, cast, overload
 
 import numpy as np
 
 from engine.layers.altitudes import heights_at
 from engine.layers.json_text import text_of
 from engine.layers.rows import LayerRows
-from engine.running.budget import Cancel
 from engine.solids.ragged import summed
 from engine.types import Accuracy, FloatArray, IntArray, read_only
 
@@ -103,42 +102,13 @@ class FeatureRows:
 Answer = FeatureRows | tuple[FeatureRows, Accuracy]
 
 
-class Options(TypedDict, total=False):
-    """Arguments by keyword of the functions about GeoJSON."""
-
-    left: object
-    right: object
-    layer: object
-    mask: object
-    lines: object
-    points: object
-    polygons: object
-    how: str
-    predicate: str
-    keep: str
-    gaps: str
-    by: list[str] | None
-    grid: float | None
-    min_width: float | None
-    wrap: float | None
-    distance: float | None
-    max_distance: float | None
-    coverage: bool
-    exclusive: bool
-    outside: bool
-    deadline: float | None
-    cancel: Cancel | None
-
-
 class _Reporting(Protocol):
     """A function whose answer has an `Accuracy` with it on request."""
 
     @overload
-    def __call__(self, *given: Any, report: Literal[False] = False, **options: Unpack[Options]) -> FeatureRows: ...
+    def __call__(self, *given: Any, report: Literal[False] = False, **options: Any) -> FeatureRows: ...
     @overload
-    def __call__(
-        self, *given: Any, report: Literal[True], **options: Unpack[Options]
-    ) -> tuple[FeatureRows, Accuracy]: ...
+    def __call__(self, *given: Any, report: Literal[True], **options: Any) -> tuple[FeatureRows, Accuracy]: ...
 
 
 def reporting(function: Callable[..., Answer]) -> _Reporting:

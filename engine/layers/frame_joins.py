@@ -24,19 +24,10 @@ How = Literal["inner", "left", "right"]
 
 
 def sjoin(
-    left: GeoDataFrame,
-    right: GeoDataFrame,
-    how: How = "inner",
-    predicate: str = "intersects",
-    *,
-    distance: float | None = None,
-    lsuffix: str = "left",
-    rsuffix: str = "right",
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    **others: Any,
-) -> GeoDataFrame:
+    left: GeoDataFrame, right: GeoDataFrame, how: How = "inner", predicate: str = "intersects", *,
+    distance: float | None = None, lsuffix: str = "left", rsuffix: str = "right", workers: int | None = None,
+    deadline: float | None = None, cancel: Cancel | None = None, **others: Any,
+) -> GeoDataFrame:  # fmt: skip
     """Join features to those that they meet, or have another relation to, decided exactly: geopandas.sjoin.
 
     Parameters
@@ -99,20 +90,10 @@ def sjoin(
 
 
 def sjoin_nearest(
-    left: GeoDataFrame,
-    right: GeoDataFrame,
-    how: How = "inner",
-    *,
-    max_distance: float | None = None,
-    lsuffix: str = "left",
-    rsuffix: str = "right",
-    distance_col: str | None = None,
-    exclusive: bool = False,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    **others: Any,
-) -> GeoDataFrame:
+    left: GeoDataFrame, right: GeoDataFrame, how: How = "inner", *, max_distance: float | None = None,
+    lsuffix: str = "left", rsuffix: str = "right", distance_col: str | None = None, exclusive: bool = False,
+    workers: int | None = None, deadline: float | None = None, cancel: Cancel | None = None, **others: Any,
+) -> GeoDataFrame:  # fmt: skip
     """Join each feature to all features that are nearest to it, ties decided exactly: geopandas.sjoin_nearest.
 
     Parameters

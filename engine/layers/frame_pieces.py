@@ -20,13 +20,9 @@ if TYPE_CHECKING:
 
 
 def split(
-    layer: GeoDataFrame,
-    lines: GeoDataFrame,
-    *,
-    workers: int | None = None,
-    deadline: float | None = None,
+    layer: GeoDataFrame, lines: GeoDataFrame, *, workers: int | None = None, deadline: float | None = None,
     cancel: Cancel | None = None,
-) -> GeoDataFrame:
+) -> GeoDataFrame:  # fmt: skip
     """Split the polygons of a layer by lines, a row for each piece.
 
     Parameters

@@ -31,18 +31,10 @@ _EVERY = frozenset({POINT, LINE, AREA})
 
 
 def overlay(
-    left: GeoDataFrame,
-    right: GeoDataFrame,
-    how: str = "intersection",
-    keep_geom_type: bool | None = None,
-    *,
-    grid: float | None = None,
-    wrap: float | None = None,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    **others: Any,
-) -> GeoDataFrame:
+    left: GeoDataFrame, right: GeoDataFrame, how: str = "intersection", keep_geom_type: bool | None = None, *,
+    grid: float | None = None, wrap: float | None = None, workers: int | None = None, deadline: float | None = None,
+    cancel: Cancel | None = None, **others: Any,
+) -> GeoDataFrame:  # fmt: skip
     """Overlay a layer with one of polygons, every feature with every one that it meets, as geopandas.overlay does.
 
     Parameters
@@ -149,19 +141,10 @@ def overlaid(
 
 
 def clip(
-    layer: GeoDataFrame,
-    mask: Any,
-    keep_geom_type: bool = False,
-    sort: bool = False,
-    *,
-    keep: str = "inside",
-    grid: float | None = None,
-    wrap: float | None = None,
-    workers: int | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
-    **others: Any,
-) -> GeoDataFrame:
+    layer: GeoDataFrame, mask: Any, keep_geom_type: bool = False, sort: bool = False, *, keep: str = "inside",
+    grid: float | None = None, wrap: float | None = None, workers: int | None = None, deadline: float | None = None,
+    cancel: Cancel | None = None, **others: Any,
+) -> GeoDataFrame:  # fmt: skip
     """Cut the features of a layer to the union of some polygons, as geopandas.clip does.
 
     Parameters
@@ -248,18 +231,10 @@ def _grid_of(grid: float | None, others: dict[str, Any]) -> float | None:
 
 
 def dissolve(
-    layer: GeoDataFrame,
-    by: Any = None,
-    aggfunc: Any = "first",
-    *,
-    coverage: bool = False,
-    gaps: str = "keep",
-    grid: float | None = None,
-    wrap: float | None = None,
-    deadline: float | None = None,
-    cancel: Cancel | None = None,
+    layer: GeoDataFrame, by: Any = None, aggfunc: Any = "first", *, coverage: bool = False, gaps: str = "keep",
+    grid: float | None = None, wrap: float | None = None, deadline: float | None = None, cancel: Cancel | None = None,
     **options: Any,
-) -> GeoDataFrame:
+) -> GeoDataFrame:  # fmt: skip
     """Unite the features of each group exactly, and aggregate their attributes, as GeoDataFrame.dissolve does.
 
     Parameters

@@ -63,15 +63,9 @@ class FeatureStream:
     """
 
     def __init__(
-        self,
-        /,
-        operation: str,
-        layer: Any,
-        *,
-        deadline: float | None = None,
-        cancel: Cancel | None = None,
+        self, /, operation: str, layer: Any, *, deadline: float | None = None, cancel: Cancel | None = None,
         **options: Any,
-    ) -> None:
+    ) -> None:  # fmt: skip
         if not isinstance(operation, str) or operation not in OPERATIONS:
             what = f"operation must be one of {', '.join(OPERATIONS)}; got {shown(operation)}"
             raise InvalidOperationError(what, ("operation",))
