@@ -91,7 +91,7 @@ Shape = namedtuple("Shape", "dim points following ends boxes")
 def shape_of(shapes: Shapes, k: int) -> Shape:
     """Return feature k."""
     own, ends = slice(shapes.firsts[k], shapes.firsts[k + 1]), slice(shapes.end_firsts[k], shapes.end_firsts[k + 1])
-    boxes = shapes.boxes[shapes.box_firsts[k] : shapes.box_firsts[k + 1]]
+    boxes = shapes.boxes[shapes.box_firsts[k] : shapes.box_firsts[k + 1] + 1]
     return Shape(shapes.dims[k], shapes.vertices[own], shapes.following[own], shapes.ends[ends], boxes)
 
 
@@ -119,9 +119,9 @@ def shapes_of(layer: MixedLayer, limits: Limits) -> tuple[Shapes, IntArray]:
         dims[filled[(low == high).all(axis=1)]] = POINT
     sizes = np.diff(firsts)
     leaves = 1 << np.ceil(np.log2(np.maximum(1, -(-sizes // BLOCK)))).astype(np.int64)
-    box_firsts = summed(2 * leaves)
+    box_firsts = summed(2 * leaves - 1)  # the row before a root, which no tree uses, is the last of the feature before
     limits.budget().take(8 * (4 * int(box_firsts[-1]) + 3 * len(vertices)))
-    boxes = np.zeros((box_firsts[-1], 4))  # the first row of each tree is nobody's, but is scaled
+    boxes = np.zeros((box_firsts[-1] + 1, 4))
     magnitudes = np.abs(vertices)
     least = np.where(magnitudes > 0.0, magnitudes, np.inf).min(initial=np.inf)
     trees = boxes, box_firsts, np.array([least, magnitudes.max(initial=0.0)])
