@@ -17,7 +17,7 @@ from engine.layers.wrapping import cut_parts
 from engine.polygon_overlay.pair_arrays import arrays_of
 from engine.solids.checks import shown
 from engine.solids.ragged import summed, within
-from engine.types import BoolArray, Int8Array, IntArray, read_only
+from engine.types import BoolArray, FloatArray, Int8Array, IntArray, read_only
 
 if TYPE_CHECKING:
     from geopandas import GeoDataFrame
@@ -99,8 +99,8 @@ def _addresses(array: Any) -> IntArray:
 
 def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds: tuple[int, ...]) -> MixedLayer:
     _, shapely = geopandas_and_shapely()
-    types, is_missing = shapely.get_type_id(array), shapely.is_missing(array)
-    dims = dims_of(array)
+    types = shapely.get_type_id(array)
+    dims, is_missing = _DIMS[types], types < 0
     is_filled = ~is_missing & ~shapely.is_empty(array)
     if len(wrong := np.flatnonzero(is_filled & ~np.isin(dims, kinds))):
         nouns = " or ".join(NOUNS[kind] for kind in kinds)
@@ -119,9 +119,9 @@ def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds:
     else:
         _, positions, (rings, parts_of, *several) = shapely.to_ragged_array(array[there], include_z=False)
         ends = several[0] if several else np.arange(len(there) + 1)
-    if len(broken := np.flatnonzero(~np.isfinite(positions).all(axis=1))):
-        owner = there[within(ends, within(parts_of, within(rings, broken[:1])))]
-        raise refused(NotFiniteError, frame, (name, int(owner[0])), f"holds {positions[broken[0]].tolist()}")
+    if (broken := _first_broken(positions)) >= 0:
+        owner = there[within(ends, within(parts_of, within(rings, np.array([broken]))))]
+        raise refused(NotFiniteError, frame, (name, int(owner[0])), f"holds {positions[broken].tolist()}")
     counts = np.zeros(len(array), np.int64)
     counts[there] = np.diff(ends)
     in_degrees = bool(frame.crs and frame.crs.is_geographic)
@@ -130,6 +130,12 @@ def _mixed_of(frame: GeoDataFrame, array: Any, name: str, limits: Limits, kinds:
     cut = cut_parts(parts, summed(counts), in_degrees, limits, lambda k, what: refuse((name, k), what))
     areas = layer_of(*cut, is_missing, limits)
     return MixedLayer(areas, paths)
+
+
+def _first_broken(positions: FloatArray) -> int:
+    """Return the first position that is not finite, -1 if there is none."""
+    is_finite = np.isfinite(positions)
+    return -1 if is_finite.all() else int(np.argmin(is_finite)) // 2
 
 
 def _paths(frame: GeoDataFrame, name: str, array: Any, dims: Any) -> Paths:
@@ -147,9 +153,9 @@ def _paths(frame: GeoDataFrame, name: str, array: Any, dims: Any) -> Paths:
         is_point = are_points[of_parts]
         firsts = np.append(True, of_parts[1:] != of_parts[:-1])
         owners, of_parts = owners[of_parts[is_point | firsts]], np.cumsum(is_point | firsts) - 1
-    if len(broken := np.flatnonzero(~np.isfinite(vertices).all(axis=1))):
-        owner = int(there[owners[of_parts[broken[0]]]])
-        raise refused(NotFiniteError, frame, (name, owner), f"holds {vertices[broken[0]].tolist()}")
+    if (broken := _first_broken(vertices)) >= 0:
+        owner = int(there[owners[of_parts[broken]]])
+        raise refused(NotFiniteError, frame, (name, owner), f"holds {vertices[broken].tolist()}")
     counts = np.bincount(there[owners], minlength=len(array))
     sizes = np.bincount(of_parts, minlength=len(owners))
     return Paths(np.where(is_path, dims, -1).astype(np.int8), read_only(vertices + 0.0), summed(sizes), summed(counts))

@@ -68,6 +68,24 @@ def test_predicates_are_those_of_geos(predicate: str) -> None:
         ("POLYGON ((0 0, 1 0, 1 1, 0 0))", "POLYGON ((1 1, 2 1, 2 2, 1 1))", "touches"),  # covers nothing of it
         ("LINESTRING (0 0, 4 0)", "POLYGON ((1 0, 3 0, 3 1, 1 1, 1 0))", "touches"),
         ("LINESTRING (0 0, 3 0)", "LINESTRING (1 0, 2 0)", "contains"),
+        (
+            "POLYGON ((0 0, 4 0, 4 4, 0 4, 0 0))",
+            "POLYGON ((1 0, 3 0, 3 1, 1 1, 1 0))",
+            "contains",
+        ),  # a side within a side
+        ("POLYGON ((0 0, 4 0, 4 4, 0 4, 0 0))", "POLYGON ((1 0, 3 0, 3 -1, 1 -1, 1 0))", "touches"),  # from outside
+        (
+            "POLYGON ((0 0, 4 0, 4 4, 0 4, 0 0), (1 1, 3 1, 3 3, 1 3, 1 1))",
+            "POLYGON ((1 1, 1 3, 3 3, 3 1, 1 1))",
+            "touches",
+        ),  # what fills a hole
+        (
+            "POLYGON ((0 0, 4 0, 4 4, 0 4, 0 0), (1 1, 3 1, 3 3, 1 3, 1 1))",
+            "POLYGON ((0 0, 0 4, 4 4, 4 0, 0 0))",
+            "covered_by",
+        ),  # and an outline alone
+        ("POLYGON ((0 0, 2 0, 1 3, 0 0))", "POLYGON ((2 0, 1 3, 0 0, 2 0))", "equals"),
+        ("POLYGON ((0 0, 9 0, 9 9, 0 9, 0 0), (1 1, 8 1, 8 8, 1 8, 1 1))", "POLYGON ((2 2, 3 2, 3 3, 2 2))", ""),
         ("LINESTRING (1 1, 1 1)", "POLYGON ((0 0, 2 0, 2 2, 0 2, 0 0))", "within"),
         ("LINESTRING (0.1 0.3, 0.2 0.6)", "POINT (0.30000000000000004 0.9)", ""),
     ],
