@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.bounding.box_grid import pairs_of_boxes
 from engine.errors import NotRepresentableError
 from engine.layers.joins import related_pairs
 from engine.layers.limits import Limits
@@ -35,7 +34,7 @@ from engine.layers.rows import overlay_rows as overlay_areas
 from engine.layers.shapes import AREA, LINE, POINT, MixedLayer, Paths, layer_of_areas, no_areas, no_paths, single_points
 from engine.layers.wrapping import joined_rows
 from engine.polygon_overlay.pair_arrays import PolygonArrays, PolygonSelection, concatenate_polygons, places_of
-from engine.polygon_overlay.touching import Place, Touching, join_edges
+from engine.polygon_overlay.touching import NOWHERE, Place, Touching, join_edges
 from engine.predicates.orientation import BOUND_2D, GUARD_2D
 from engine.predicates.rational import orient2d_rational
 from engine.running.budget import Budget, polled
@@ -323,7 +322,10 @@ def dissolve_mixed(
 ) -> LayerRows:
     """Return one row for each group, the union of its features: of lines what is outside of its polygons, of points
     those on neither; is_coverage, gaps: as `dissolve_rows`."""
-    rows = dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage, gaps)
+    if AREA in layer.kinds or not layer.kinds:
+        rows = dissolve_rows(layer.areas, groups, n_groups, limits, is_coverage, gaps)
+    else:
+        rows = without_areas(np.arange(n_groups), np.full(n_groups, NONE), NOWHERE)
     if layer.kinds - {AREA}:
         lines, points = _dissolve_lines(layer, groups, n_groups, limits), _dissolve_points(layer, groups, limits)
         rows = replace(rows, touching=Touching(*lines, *points))
@@ -334,6 +336,8 @@ def _dissolve_points(layer: MixedLayer, groups: IntArray, limits: Limits) -> tup
     """Return group and place of the points that are on no line or polygon of their group, each once, sorted."""
     points, others = layer.paths.of(POINT), MixedLayer(layer.areas, layer.paths.of(LINE))
     own = groups[points.owners()[1]]
+    if not len(own):
+        return own, points.vertices
     covered, by = related_pairs(single_points(points.vertices), others, "intersects", 0.0, limits).T
     stays = own != NONE
     stays[covered[own[covered] == groups[by]]] = False
@@ -349,21 +353,32 @@ def _dissolve_lines(
     beside them."""
     paths = layer.paths.of(LINE)
     path, features = paths.owners()
-    tails = np.flatnonzero(path[:-1] == path[1:])
-    order = tails[np.argsort(groups[features[tails]], kind="stable")]
-    firsts = np.searchsorted(groups[features[order]], np.arange(n_groups + 1))
+    tails = np.flatnonzero((path[:-1] == path[1:]) & (groups[features[:-1]] != NONE))
+    ends = np.stack([paths.vertices[tails], paths.vertices[tails + 1]], axis=1)
+    turned = (ends[:, 0, 0] > ends[:, 1, 0]) | ((ends[:, 0, 0] == ends[:, 1, 0]) & (ends[:, 0, 1] > ends[:, 1, 1]))
+    ends[turned] = ends[turned, ::-1]
+    rows = np.unique(np.column_stack([groups[features[tails]], ends.reshape(-1, 4)]), axis=0)
+    rows = rows[(rows[:, 1:3] != rows[:, 3:]).any(axis=1)]
+    filled = np.flatnonzero(layer.areas.arrays.sizes())
+    (order, firsts), (areas, area_firsts) = (_by_group(each, n_groups) for each in (rows[:, 0], groups[filled]))
+    edges = [((a, b), (c, d)) for _, a, b, c, d in polled(rows.tolist())]
+    cuts = _cuts(edges, rows, limits)
     lines: list[tuple[int, FloatArray]] = []
-    with limits.budget() as budget:
-        for group in np.flatnonzero(np.diff(firsts)).tolist():
-            budget.check()
-            own = order[firsts[group] : firsts[group + 1]]
-            ends = np.concatenate([paths.vertices[own], paths.vertices[own + 1]], axis=1).tolist()
-            edges = {((a, b), (c, d)) if (a, b) <= (c, d) else ((c, d), (a, b)) for a, b, c, d in polled(ends)}
-            made = [*map(np.array, join_edges(_split(sorted(e for e in edges if e[0] != e[1]), budget)))]
-            members = np.flatnonzero((groups == group) & (layer.areas.arrays.sizes() > 0))
-            lines += [(group, line) for line in (_outside(made, layer.areas, members, limits) if made else ())]
+    with limits.budget():
+        for group in polled(np.flatnonzero(np.diff(firsts)).tolist()):
+            own = order[firsts[group] : firsts[group + 1]].tolist()
+            parts = {part for k in own for part in pairwise(sorted({*edges[k], *cuts.get(k, ())}))}
+            made = [*map(np.array, join_edges(sorted(parts)))]
+            members = filled[areas[area_firsts[group] : area_firsts[group + 1]]]
+            lines += [(group, line) for line in _outside(made, layer.areas, members, limits)]
     vertices = np.concatenate([np.zeros((0, 2)), *(line for _, line in lines)])
     return np.array([group for group, _ in lines], np.int64), vertices, summed([len(line) for _, line in lines])
+
+
+def _by_group(groups: IntArray, n_groups: int) -> tuple[IntArray, IntArray]:
+    """Return the items of each group in order, and the offsets of groups in these. groups: by item, -1 for none."""
+    order = np.argsort(groups, kind="stable")
+    return order, np.searchsorted(groups[order], np.arange(n_groups + 1))
 
 
 def _outside(lines: list[FloatArray], areas: Layer, members: IntArray, limits: Limits) -> list[FloatArray]:
@@ -377,25 +392,28 @@ def _outside(lines: list[FloatArray], areas: Layer, members: IntArray, limits: L
     return np.split(made.vertices, made.offsets[1:-1]) if len(made.lines) else []
 
 
-def _split(edges: list[tuple[Place, Place]], budget: Budget) -> list[tuple[Place, Place]]:
-    """Return distinct edges, each a sorted pair of points, split where an end of another lies on one that is collinear,
-    and each stretch once."""
-    rows = np.array(edges).reshape(-1, 2, 2)
-    low, high = rows.min(axis=1), rows.max(axis=1)
-    cuts: dict[int, set[Place]] = {}
-    for pairs in pairs_of_boxes(low, high, budget.flag) if len(rows) else ():
-        budget.check()
-        for i, j in polled(pairs[_may_be_collinear(rows, pairs)].tolist()):
+def _cuts(edges: list[tuple[Place, Place]], rows: FloatArray, limits: Limits) -> dict[int, set[Place]]:
+    """Return the points at which edges, sorted pairs of points, are split: where an end of another one of the group
+    lies on one that is collinear. rows (n, 5): group, ends."""
+    own, ends, cuts = rows[:, 0], rows[:, 1:].reshape(-1, 2, 2), dict[int, set[Place]]()
+    if not len(rows):
+        return cuts
+    start, size = ends.min(axis=(0, 1)), (ends.max(axis=(0, 1)) / 2 - ends.min(axis=(0, 1)) / 2)
+    at = (ends / 2 - start / 2) / np.where(size > 0.0, size, 1.0)  # in 0 .. 1; groups side by side
+    at[:, :, 0] += 2.0 * own[:, None]
+    slack = 2.0**-48 * (2.0 + at.max())
+    low, high = at.min(axis=1) - slack, at.max(axis=1) + slack
+
+    def may_overlap(pairs: IntArray) -> BoolArray:
+        return (own[pairs[:, 0]] == own[pairs[:, 1]]) & _may_be_collinear(ends, pairs)
+
+    with limits.budget():
+        for i, j in polled(limits.pairs_of_boxes(low, high, may_overlap).tolist()):
             (a, b), (c, d) = edges[i], edges[j]
             if max(a, c) < min(b, d) and orient2d_rational(a, b, c) == orient2d_rational(a, b, d) == 0:
                 cuts.setdefault(i, set()).update(p for p in (c, d) if a < p < b)
                 cuts.setdefault(j, set()).update(p for p in (a, b) if c < p < d)
-    budget.check()
-    made = set(edges)
-    for k, places in cuts.items():
-        made.discard(edges[k])
-        made.update(pairwise(sorted({*edges[k], *places})))
-    return sorted(made)
+    return cuts
 
 
 def _may_be_collinear(rows: FloatArray, pairs: IntArray) -> BoolArray:
