@@ -10,6 +10,13 @@ detected by `make`. The kinds, their subjects, items and answers:
     scene all, any    Bodies                  (n, 2, 3)                   as scene; bool: any body is met (first, too)
     segments          a solid of ours         (n, 2, dim)                 (n, 2 * dim) first piece, NaN where nothing
     hits              Mesh                    (n, 2, 3)                   bool: meets a face
+    first hits        Mesh                    (n, 2, 3)                   parameter t of the first hit, NaN where none
+    hit counts        Mesh                    (n, 2, 3)                   number of hits
+    all hits          Mesh                    (n, 2, 3)                   [(segment, t)]
+    volume            Mesh                    None                        its volume
+    cut volumes       Mesh                    rows [a, b, c, d]           volumes of the closed halves, NaN not closed
+    section areas     Mesh                    rows [a, b, c, d]           areas of the sections
+    overlap           a couple                None                        volume in common
     pieces            Rings, a solid          (n, 2, dim)                 [(segment, start, end)]
     lines             Polygon of one ring     (n, size, 2)                the line of each piece
     layers            how                     two (n, size, 2)            areas of the rows
@@ -17,7 +24,8 @@ detected by `make`. The kinds, their subjects, items and answers:
     polygon areas     Aabb of the plane       (n, size, 2)                area of what is left
     pair              a couple                None                        bool: a common point
     poses             Pair                    rows of its poses           bool
-    point distances   Mesh                    points                      distances from its surface
+    point distances   Mesh, Rings             points                      distances from its boundary
+    signed distances  Mesh                    points                      the same, negative inside
     points within     (Mesh, distance)        points                      bool: at most so far from its surface
     clearance poses   Pair                    rows of its poses           distances
     clearance pairs   None                    couples                     distances, NaN refused, infinite not taken
@@ -181,6 +189,23 @@ def in_threads(task: Callable[[slice], Any], n_items: int, threads: int) -> list
         return [task(slice(0, n_items))]
     borders = [n_items * part // threads for part in range(threads + 1)]
     return list(pool(threads).map(task, map(slice, borders, borders[1:])))
+
+
+def t_by_segment(n_segments: int, segments: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return the least parameter of each segment's hits, NaN where it has none."""
+    result = np.full(n_segments, np.inf)
+    np.minimum.at(result, segments, t)
+    return np.where(np.isinf(result), np.nan, result)
+
+
+def is_closed(vertices: np.ndarray, faces: np.ndarray) -> bool:
+    """Return whether every side of a triangle is used as often in one direction as in the other, by position."""
+    numbers = np.unique(vertices, axis=0, return_inverse=True)[1].ravel()[faces]
+    sides = np.stack([numbers, np.roll(numbers, -1, axis=1)], axis=-1).reshape(-1, 2)
+    sides = sides[sides[:, 0] != sides[:, 1]]
+    signs = np.where(sides[:, 0] < sides[:, 1], 1, -1)
+    where = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)[1].ravel()
+    return not np.bincount(where, signs).any()
 
 
 def rows_of(result: np.ndarray, remaining: np.ndarray) -> np.ndarray:

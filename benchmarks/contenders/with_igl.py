@@ -31,9 +31,24 @@ def _distances(mesh: Mesh, threads: int) -> Prepared:
     return Prepared(lambda points: np.sqrt(tree.squared_distance(mesh.vertices, mesh.faces, points)[0]))
 
 
+def _signed_distances(mesh: Mesh, threads: int) -> Prepared:
+    return Prepared(lambda points: igl.signed_distance(points, mesh.vertices, mesh.faces)[0])
+
+
+def _all_hits(mesh: Mesh, threads: int) -> Prepared:
+    """One call a segment, as its users must."""
+
+    def ask(segments: np.ndarray) -> list[tuple[int, float]]:
+        found = (igl.ray_mesh_intersect(start, end - start, mesh.vertices, mesh.faces) for start, end in segments)
+        return [(i, float(hit[1])) for i, hits in enumerate(found) for hit in hits or () if hit[1] <= 1.0]
+
+    return Prepared(ask)
+
+
 def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
     prepared = _distances(asked[0], threads)
     return Prepared(prepared.ask, answer=lambda result: result <= asked[1])
 
 
-MAKERS = {"points": _points, "pair": _pair, "point distances": _distances, "points within": _within}
+MAKERS = {"points": _points, "pair": _pair, "point distances": _distances, "points within": _within,
+          "signed distances": _signed_distances, "all hits": _all_hits}  # fmt: skip

@@ -18,6 +18,7 @@ from benchmarks.contenders import (
     overlays,
     rings_of,
 )
+from benchmarks.workloads import Mesh
 
 PACKAGE = "manifold3d"
 NAMES = {"overlay": "Clipper2 by manifold3d", "overlay of made": "Clipper2 by manifold3d"}
@@ -49,8 +50,18 @@ def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(each_or_nan(area))
 
 
+def _solid(mesh: Mesh) -> Manifold:
+    return Manifold(Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
+
+
 def _solids(pair: Couple) -> list[Manifold]:
-    return [Manifold(Mesh64(mesh.vertices, mesh.faces.astype(np.uint64))) for mesh in meshes_of(pair)]
+    return [_solid(mesh) for mesh in meshes_of(pair)]
+
+
+def _valid(solid: Manifold) -> Manifold:
+    if solid.status() != Error.NoError:
+        raise ValueError(solid.status())
+    return solid
 
 
 def _pair(pair: Couple, threads: int) -> Prepared:
@@ -58,17 +69,63 @@ def _pair(pair: Couple, threads: int) -> Prepared:
         raise NotApplicable("solids only")
     first, second = _solids(pair)
 
-    def ask(_: object) -> bool:
-        for solid in (first, second):
-            if solid.status() != Error.NoError:
-                raise ValueError(solid.status())
-        return not (first ^ second).is_empty()
+    return Prepared(lambda _: not (_valid(first) ^ _valid(second)).is_empty())
+
+
+def _overlap(pair: Couple, threads: int) -> Prepared:
+    first, second = _solids(pair)
+    return Prepared(lambda _: (_valid(first) ^ _valid(second)).volume())
+
+
+def _volume(mesh: Mesh, threads: int) -> Prepared:
+    return Prepared(lambda _: _valid(_solid(mesh)).volume())
+
+
+def _cut_volumes(mesh: Mesh, threads: int) -> Prepared:
+    solid = _solid(mesh)
+
+    def volume(row: np.ndarray) -> float:
+        part = _valid(solid).trim_by_plane(row[:3].tolist(), float(-row[3] / np.linalg.norm(row[:3])))
+        return float(_valid(part).volume())
+
+    return Prepared(each_or_nan(volume))
+
+
+def _section_areas(mesh: Mesh, threads: int) -> Prepared:
+    """Across z alone."""
+    solid = _solid(mesh)
+
+    def area(row: np.ndarray) -> float:
+        if row[:2].any():
+            raise NotApplicable("sections across z only")
+        return float(_valid(solid).slice(float(-row[3] / row[2])).area())
+
+    return Prepared(each_or_nan(area))
+
+
+def _all_hits(mesh: Mesh, threads: int) -> Prepared:
+    solid = _solid(mesh)
+
+    def ask(segments: np.ndarray) -> list[Any]:
+        if solid.status() == Error.NotManifold:
+            raise NotApplicable("closed manifolds only")
+        lines = [(tuple(start), tuple(end)) for start, end in segments.tolist()]
+        result = [(number, hit) for number, line in enumerate(lines) for hit in solid.ray_cast(*line)]
+        ways = segments[:, 1] - segments[:, 0]
+        return [
+            (i, float((np.array(hit.position) - segments[i, 0]) @ ways[i] / (ways[i] @ ways[i]))) for i, hit in result
+        ]
 
     return Prepared(ask)
 
 
 MAKERS = {
     "pair": _pair,
+    "overlap": _overlap,
+    "volume": _volume,
+    "all hits": _all_hits,
+    "cut volumes": _cut_volumes,
+    "section areas": _section_areas,
     "clearance pairs": lambda _, threads: each_alone(_solids, lambda pair: pair[0].min_gap(pair[1], 1e3)),
     "polygon areas": _polygon_areas,
     **overlays(_read, _combined, lambda made, result: result.area()),

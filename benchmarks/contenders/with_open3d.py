@@ -7,6 +7,8 @@ are found as a careful user would: points sorted along x once, a binary search f
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import open3d
@@ -64,6 +66,41 @@ def _scene(bodies: Bodies, threads: int) -> Prepared:
     return Prepared(ask, lambda points: points.astype(np.float32), lambda result: np.sort(np.concatenate(result)))
 
 
+def _rays(segments: np.ndarray) -> Tensor:
+    return Tensor(np.concatenate([segments[:, 0], segments[:, 1] - segments[:, 0]], axis=1).astype(np.float32))
+
+
+def _along(ask: str, answer: Callable[[int, Any], Any]) -> Callable[[Mesh, int], Prepared]:
+    """Return the maker of one question about segments, as rays whose t counts lengths of the segment."""
+
+    def make(mesh: Mesh, threads: int) -> Prepared:
+        scene = _scene_of(mesh, threads)
+        run = getattr(scene, ask)
+        return Prepared(
+            lambda rays: (len(rays), run(rays, nthreads=threads)), _rays, lambda result: answer(*result)
+        )  # fmt: skip
+
+    return make
+
+
+def _places(n_segments: int, result: dict[str, Tensor]) -> tuple[np.ndarray, np.ndarray]:
+    t, segments = result["t_hit"].numpy().astype(float), result["ray_ids"].numpy().astype(np.int64)
+    return segments[t <= 1.0], t[t <= 1.0]
+
+
+def _first(n_segments: int, result: dict[str, Tensor]) -> np.ndarray:
+    t = result["t_hit"].numpy().astype(float)
+    return np.where(t <= 1.0, t, np.nan)
+
+
+def _volume(mesh: Mesh, threads: int) -> Prepared:
+    vector = open3d.utility
+    made = open3d.geometry.TriangleMesh(
+        vector.Vector3dVector(mesh.vertices), vector.Vector3iVector(mesh.faces.astype(np.int32))
+    )
+    return Prepared(lambda _: made.get_volume())
+
+
 def _through(keep: str) -> Callable[[Bodies, int], Prepared]:
     """Return the maker of one raycasting scene of all bodies: all hits of rays, the first, or whether there is any."""
 
@@ -71,20 +108,17 @@ def _through(keep: str) -> Callable[[Bodies, int], Prepared]:
         mesh, owners = merged(bodies)
         scene = _scene_of(mesh, threads)
 
-        def native(segments: np.ndarray) -> Tensor:
-            return Tensor(np.concatenate([segments[:, 0], segments[:, 1] - segments[:, 0]], axis=1).astype(np.float32))
-
         def all_met(result: dict[str, Tensor]) -> np.ndarray:
             hits = result["t_hit"].numpy() <= 1.0
             rays, faces = result["ray_ids"].numpy().astype(np.int64)[hits], result["primitive_ids"].numpy()[hits]
             return np.unique(rays * len(bodies.bodies) + owners[faces])
 
         if keep == "all":
-            return Prepared(lambda rays: scene.list_intersections(rays, nthreads=threads), native, all_met)
+            return Prepared(lambda rays: scene.list_intersections(rays, nthreads=threads), _rays, all_met)
         if keep == "first":
-            return Prepared(lambda rays: scene.cast_rays(rays, nthreads=threads), native,
+            return Prepared(lambda rays: scene.cast_rays(rays, nthreads=threads), _rays,
                             lambda result: result["t_hit"].numpy() <= 1.0)  # fmt: skip
-        return Prepared(lambda rays: scene.test_occlusions(rays, 0.0, 1.0, nthreads=threads), native,
+        return Prepared(lambda rays: scene.test_occlusions(rays, 0.0, 1.0, nthreads=threads), _rays,
                         lambda result: result.numpy())  # fmt: skip
 
     return make
@@ -109,6 +143,13 @@ def _distances(mesh: Mesh, threads: int) -> Prepared:
     )
 
 
+def _signed_distances(mesh: Mesh, threads: int) -> Prepared:
+    scene = _scene_of(mesh, threads)
+    return replace(
+        _distances(mesh, threads), ask=lambda points: scene.compute_signed_distance(points, nthreads=threads)
+    )
+
+
 def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
     prepared = _distances(asked[0], threads)
     return Prepared(prepared.ask, prepared.native, lambda result: result.numpy() <= asked[1])
@@ -116,6 +157,10 @@ def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
 
 MAKERS = {
     "points": _points, "scene": _scene, "pair": _pair, "point distances": _distances, "points within": _within,
+    "signed distances": _signed_distances, "volume": _volume, "first hits": _along("cast_rays", _first),
+    "hits": _along("cast_rays", lambda n, result: ~np.isnan(_first(n, result))),
+    "hit counts": _along("list_intersections", lambda n, result: np.bincount(_places(n, result)[0], minlength=n)),
+    "all hits": _along("list_intersections", lambda n, result: list(zip(*map(np.ndarray.tolist, _places(n, result))))),
 } | {
     f"scene {keep}": _through(keep) for keep in ("all", "first", "any")
 }  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 import engine
 from benchmarks.bodies import Crowd, Pair
-from benchmarks.contenders import Couple, Placed, Prepared, each_alone, each_or_nan
+from benchmarks.contenders import Couple, Placed, Prepared, each_alone, each_or_nan, t_by_segment
 from benchmarks.workloads import Bodies, Mesh, Rings
 
 
@@ -76,16 +76,27 @@ def _segments(subject: Any, threads: int) -> Prepared:
     return Prepared(ask, answer=answer, share=said.beyond_filter)
 
 
-def _hits(subject: Any, threads: int) -> Prepared:
-    region = solid_of(subject)
+def _hits(keep: Any, answer: Callable[[int, Any], Any]) -> Callable[[Any, int], Prepared]:
+    """Return the maker of one question about where segments meet a mesh."""
 
-    def answer(result: tuple[int, engine.SegmentPieces]) -> np.ndarray:
-        met = result[1].source[(result[1].faces >= 0).any(axis=1)]
-        return np.bincount(met, minlength=result[0]) > 0
+    def make(subject: Any, threads: int) -> Prepared:
+        region = solid_of(subject)
+        return Prepared(
+            lambda segments: (len(segments), engine.hits(segments, region, keep=keep, workers=threads)),
+            answer=lambda result: answer(*result),
+        )
 
-    return Prepared(
-        lambda segments: (len(segments), engine.clip_segments(segments, region, workers=threads)), answer=answer
-    )
+    return make
+
+
+def _planes(measure: Callable[[Any, Any], float]) -> Callable[[Any, int], Prepared]:
+    """Return the maker of one call a plane."""
+
+    def make(subject: Any, threads: int) -> Prepared:
+        solid = solid_of(subject)
+        return Prepared(lambda rows: np.array([measure(solid, engine.HalfSpace(row[:3], row[3])) for row in rows]))
+
+    return make
 
 
 def _kept_polygons(region: engine.Solid, threads: int) -> Prepared:
@@ -270,11 +281,17 @@ def _layers(how: str, threads: int) -> Prepared:
 
 MAKERS = {
     "lines": _lines, "layers": _layers,
-    "points": _points, "scene": _scene, "segments": _segments, "hits": _hits, "kept polygons": _kept_polygons,
+    "points": _points, "scene": _scene, "segments": _segments, "kept polygons": _kept_polygons,
     "polygon areas": _polygon_areas, "pair": _pair, "relation": _relation, "poses": _poses, "convex poses": _poses,
     "witnesses": lambda pair, threads: _poses(pair, threads, witnesses=True),
     "detail": lambda pair, threads: _poses(pair, threads, detail=True),
     "relations": lambda pair, threads: _poses(pair, threads, boolean=False),
+    "hits": _hits("any", lambda n, met: met),
+    "first hits": _hits("first", lambda n, found: t_by_segment(n, found.source, found.t)),
+    "hit counts": _hits("all", lambda n, found: np.bincount(found.source, minlength=n)),
+    "volume": lambda mesh, threads: Prepared(lambda _: engine.volume(solid_of(mesh))),
+    "cut volumes": _planes(lambda solid, region: engine.cut(solid, region).volume),
+    "section areas": _planes(lambda solid, region: float(engine.section(solid, [region]).areas[0])),
     "point distances": _distances,
     "points within": lambda asked, threads: _distances(asked[0], threads, within=asked[1]),
     "clearance poses": _clearance_poses,

@@ -109,6 +109,11 @@ def _lines(region: engine.Polygon, threads: int) -> Prepared:
     return Prepared(lambda lines: shapely.intersection(lines, shape), shapely.linestrings)
 
 
+def _outline_distances(region: Rings, threads: int) -> Prepared:
+    outline = even_odd(region.rings).boundary
+    return Prepared(lambda points: shapely.distance(points, outline), shapely.points)
+
+
 def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     """Of single rings; of polygons of several."""
     bounds = _bounds(region)
@@ -149,6 +154,7 @@ def _gridded(pair: Any, grid: float = 0.0) -> Any:
 
 MAKERS = {
     "points": _points,
+    "point distances": _outline_distances,
     "scene": _scene,
     "segments": _by_rectangle(shapely.linestrings, _rows_of),
     "pieces": _pieces,

@@ -11,29 +11,33 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 import engine
-from benchmarks.contenders import Prepared, merged
+from benchmarks.contenders import Prepared, each_or_nan, is_closed, merged, t_by_segment
 from benchmarks.workloads import Bodies, Mesh
 
 PACKAGE = "trimesh"
 NAMES = {"": "trimesh + embreex"}
 
 
+def _made(mesh: Mesh) -> trimesh.Trimesh:
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+
+
 def _points(mesh: Mesh, threads: int) -> Prepared:
-    return Prepared(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).contains)
+    return Prepared(_made(mesh).contains)
 
 
-def _hits(mesh: Mesh, threads: int) -> Prepared:
+def _hits(mesh: Mesh, threads: int, is_first: bool = False) -> Prepared:
     """Whether a segment meets the mesh; from hits on its ray, those beyond its end left out."""
-    intersector = RayMeshIntersector(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False))
+    intersector = RayMeshIntersector(_made(mesh))
 
     def native(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.ascontiguousarray(segments[:, 0]), segments[:, 1] - segments[:, 0]
 
-    def ask(rays: tuple[np.ndarray, np.ndarray]) -> tuple[int, np.ndarray, np.ndarray]:
+    def ask(rays: tuple[np.ndarray, np.ndarray]) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
         origins, directions = rays
-        points, ray, face = intersector.intersects_location(origins, directions, multiple_hits=True)
+        points, ray, face = intersector.intersects_location(origins, directions, multiple_hits=not is_first)
         t = ((points - origins[ray]) * directions[ray]).sum(axis=1) / (directions[ray] ** 2).sum(axis=1)
-        return len(origins), ray[t <= 1.0], face[t <= 1.0]
+        return len(origins), ray[t <= 1.0], face[t <= 1.0], t[t <= 1.0]
 
     return Prepared(ask, native, lambda result: np.bincount(result[1], minlength=result[0]) > 0)
 
@@ -81,8 +85,37 @@ def _kept_polygons(region: engine.Aabb, threads: int) -> Prepared:
 
 
 def _distances(mesh: Mesh, threads: int) -> Prepared:
-    made = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    made = _made(mesh)
     return Prepared(lambda points: trimesh.proximity.closest_point(made, points)[1])
+
+
+def _signed_distances(mesh: Mesh, threads: int) -> Prepared:
+    made = _made(mesh)
+    return Prepared(lambda points: -trimesh.proximity.signed_distance(made, points))
+
+
+def _origin(row: np.ndarray) -> np.ndarray:
+    return -row[3] * row[:3] / (row[:3] @ row[:3])
+
+
+def _cut_volumes(mesh: Mesh, threads: int) -> Prepared:
+    made = _made(mesh)
+
+    def volume(row: np.ndarray) -> float:
+        part = trimesh.intersections.slice_mesh_plane(made, row[:3], _origin(row), cap=True)
+        return float(part.volume) if is_closed(part.vertices, part.faces) else np.nan
+
+    return Prepared(each_or_nan(volume))
+
+
+def _section_areas(mesh: Mesh, threads: int) -> Prepared:
+    made = _made(mesh)
+
+    def area(row: np.ndarray) -> float:
+        section = made.section(plane_normal=row[:3], plane_origin=_origin(row))
+        return 0.0 if section is None else float(section.to_2D()[0].area)
+
+    return Prepared(each_or_nan(area))
 
 
 def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
@@ -91,7 +124,18 @@ def _within(asked: tuple[Mesh, float], threads: int) -> Prepared:
 
 
 MAKERS = {
-    "point distances": _distances, "points within": _within,
+    "point distances": _distances, "points within": _within, "signed distances": _signed_distances,
+    "all hits": lambda mesh, threads: replace(
+        _hits(mesh, threads), answer=lambda result: list(zip(result[1].tolist(), result[3].tolist()))
+    ),
+    "first hits": lambda mesh, threads: replace(
+        _hits(mesh, threads, True), answer=lambda result: t_by_segment(result[0], result[1], result[3])
+    ),
+    "hit counts": lambda mesh, threads: replace(
+        _hits(mesh, threads), answer=lambda result: np.bincount(result[1], minlength=result[0])
+    ),
+    "volume": lambda mesh, threads: Prepared(lambda _: float(_made(mesh).volume)),
+    "cut volumes": _cut_volumes, "section areas": _section_areas,
     "points": _points, "hits": _hits, "pieces": _pieces, "kept polygons": _kept_polygons, "scene all": _through,
     "scene any": lambda bodies, threads: _hits(merged(bodies)[0], threads),
 }  # fmt: skip

@@ -5,8 +5,9 @@
     python -m benchmarks report --filed        # put the answers into the stored results, and write the pages again
 
 Each contender runs in a process of its own, so that one that crashes or never returns costs its own case only. Points
-on a boundary count as contained, bodies that touch as meeting. An area is wrong when it is off by more than a millionth
-of the extent, a piece of a segment likewise; ours must equal the exact answer to the last bit. Nothing is timed.
+on a boundary count as contained, bodies that touch as meeting. An area or a volume is wrong when it is off by more than
+a millionth of that of the box, a distance or a piece of a segment by more than one of the extent, a place of a hit by
+one of the segment; ours must equal the exact answer to the last bit. Nothing is timed.
 """
 
 from __future__ import annotations
@@ -52,20 +53,23 @@ POINTS, PIECES, PAIR = {"locate 3D": "points"}, {"clip_segments 3D": "pieces"}, 
 OVERLAY, CLIPPING = {"overlay 2D": "overlay of made"}, {"clip_polygons 2D": "polygon areas"}
 PLANE = {"locate 2D": "points", "clip_segments 2D": "pieces", **OVERLAY}
 BOOK = PLANE | {"overlay 2D": "overlay", "collide 3D": "pair by volumes"}
+HITS, AWAY, VOLUME = {"hits 3D": "all hits"}, {"distances 3D": "point distances"}, {"volume 3D": "volume"}
+CUTS = {"cut 3D": "cut volumes", "section 3D": "section areas"} | VOLUME
 PEERS = (
     Peer("ours", "", {}),
     Peer("textbook", "textbook", POINTS | BOOK),
-    Peer("shapely", "shapely", PLANE | {"collide 2D": "pair"}),
+    Peer("shapely", "shapely", PLANE | {"collide 2D": "pair", "distances 2D": "point distances"}),
     Peer("shapely clip_by_rect", "shapely", {"clip_segments 2D": "pieces by rectangle", **CLIPPING}),
     Peer("Clipper2 by manifold3d", "manifold3d", CLIPPING | OVERLAY),
     Peer("numba_celltree", "celltree", {"clip_segments 2D": "pieces"}),
-    Peer("Open3D", "open3d", POINTS | PAIR),
-    Peer("trimesh + embreex", "trimesh", POINTS | PIECES),
-    Peer("libigl", "igl", POINTS | PAIR),
+    Peer("Open3D", "open3d", POINTS | PAIR | HITS | AWAY | VOLUME),
+    Peer("trimesh + embreex", "trimesh", POINTS | PIECES | HITS | AWAY | CUTS),
+    Peer("libigl", "igl", POINTS | PAIR | HITS | AWAY),
     Peer("CGAL", "cgal", POINTS),
     Peer("coal", "coal", PAIR),
     Peer("fcl", "fcl", PAIR),
-    Peer("manifold3d", "manifold3d", PAIR),
+    Peer("manifold3d", "manifold3d", PAIR | HITS | CUTS | {"overlap 3D": "overlap"}),
+    Peer("VTK", "vtk", POINTS | PAIR | HITS | AWAY | CUTS | {"overlap 3D": "overlap"}),
 )
 
 
@@ -79,7 +83,7 @@ def kind_of(case: Case) -> str:
     from tests.reference.solids import dimension
 
     data = case["input"]
-    solids = (data[key] for key in ("solid", "region", "first", "subject") if key in data)
+    solids = (data[key] for key in ("solid", "region", "first", "subject", "surface") if key in data)
     return f"{case['operation']} {dimension(next(solids, None) or data['bodies'][0]['solid'])}D"
 
 
@@ -101,6 +105,10 @@ def is_right(case: Case, answer: Any) -> bool:
         case "clip_polygons":
             size = np.prod(_extent([ring for rings in data["polygons"] for ring in rings]))
             return abs(np.sum(answer) - sum(abs(_area(ring)) for rings in exact for ring in rings)) <= TOLERANCE * size
+        case "hits":
+            return not museum.wrong_lines(case, answer)
+        case "distances" | "volume" | "cut" | "section" | "overlap":
+            return not museum.far_off(case, answer)
     slack = TOLERANCE * _extent([data["segments"]]).max()
     pieces = _long_pieces([(piece["segment"], piece["start"], piece["end"]) for piece in exact], slack)
     result = _long_pieces(answer, slack)
@@ -161,6 +169,18 @@ def _answer_of_peer(module: str, kind: str, operation: str, data: dict[str, Any]
         case "clip_polygons":
             polygons = [[np.array(ring, float) for ring in rings] for rings in data["polygons"]]
             return answers(module, kind, _subject(data["region"], True), polygons)
+        case "hits":
+            return answers(module, kind, _subject(data["surface"]), np.array(data["segments"], float))
+        case "distances":
+            signed = "signed distances" if data.get("signed") else kind
+            return answers(module, signed, _subject(data["solid"]), np.array(data["points"], float))
+        case "volume":
+            return answers(module, kind, _subject(data["solid"]), None)
+        case "cut":
+            row = [*data["region"]["normal"], data["region"]["offset"]]
+            return _of_planes(module, kind, data["solid"], [row])[0]
+        case "section":
+            return _of_planes(module, kind, data["solid"], data["planes"])
         case "overlay":
             pair = tuple(rings_of(_subject(data[key])) for key in ("subject", "clip"))
             area = answers(module, kind, data["operation"], [pair])[0]
@@ -168,6 +188,13 @@ def _answer_of_peer(module: str, kind: str, operation: str, data: dict[str, Any]
                 raise NotApplicable("out of its domain")
             return area
     return answers(module, kind, (_placed(data, "first"), _placed(data, "second")), None)
+
+
+def _of_planes(module: str, kind: str, solid: dict[str, Any], rows: list[list[float]]) -> np.ndarray:
+    result = answers(module, kind, _subject(solid), np.array(rows, float))
+    if np.isinf(result).any():
+        raise NotApplicable("out of its domain")
+    return result
 
 
 def _answer(peer: Peer, case: Case) -> tuple[str, str, list[int]]:
@@ -259,7 +286,8 @@ def section(rows: list[dict[str, Any]]) -> str:
         f"{len(replayed - {''})} inputs from {len(threads)} public threads about peers and other libraries, replayed "
         "on the installed versions; [the museum](museum.html) draws each, with what every library says of it today "
         "([how one is added](../benchmarks/filed/README.md)). A boundary counts as contained, contact as meeting; "
-        "areas and pieces may be off by a millionth of the extent; ours must be exact to the last bit.\n",
+        "areas, volumes, distances, pieces and places of hits may be off by a millionth of the extent; ours must be "
+        "exact to the last bit.\n",
         "| contender | version | asked | " + " | ".join(OUTCOMES) + " |",
         "|---|---|---|" + "---|" * len(OUTCOMES),
     ]

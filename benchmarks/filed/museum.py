@@ -13,7 +13,12 @@ from benchmarks.web_page import written
 from engine.files.solids import from_json
 
 PATHS = {"locate": "/v1/contains", "clip_segments": "/v1/clip/segments", "clip_polygons": "/v1/clip/polygons",
-         "overlay": "/v1/overlay", "collide": "/v1/collide"}  # fmt: skip
+         "overlay": "/v1/overlay", "collide": "/v1/collide", "hits": "/v1/hits", "distances": "/v1/distances",
+         "volume": "/v1/volume", "cut": "/v1/cut", "section": "/v1/section", "overlap": "/v1/overlap"}  # fmt: skip
+CLOSE = 2.0**-20
+"""Part of the extent that an answer may be off by."""
+SIDES = {"distances": 1, "section": 2, "volume": 3, "cut": 3, "overlap": 3}
+"""How many of the box's sides, the longest, a number is a product of."""
 PLACES = {-1: "outside", 0: "on the boundary", 1: "inside"}
 Case = dict[str, Any]
 
@@ -56,10 +61,34 @@ def request(case: Case) -> tuple[str, dict[str, Any]]:
 def is_on_boundary(case: Case, where: list[int]) -> bool:
     """Return whether the wrong items are on the boundary or only touch, where libraries may define another answer."""
     exact = case["answer"]
+    if case["operation"] == "hits":
+        kinds = {hit["segment"]: hit["kind"] for hit in exact if hit["segment"] in where}
+        return kinds.keys() == set(where) and engine.HitKind.ACROSS not in kinds.values()
     if case["operation"] == "clip_segments":
         middles = np.array([[piece["start"], piece["end"]] for piece in exact]).mean(axis=1)
         return len(exact) > 0 and not engine.locate(middles, from_json(case["input"]["region"])[0]).any()
-    return exact == "touching" or (bool(where) and all(exact[item] == 0 for item in where))
+    is_located = case["operation"] == "locate" and bool(where)
+    return exact == "touching" or (is_located and all(exact[item] == 0 for item in where))
+
+
+def far_off(case: Case, answer: Any) -> list[int]:
+    """Return which numbers of an answer are not the exact ones, up to rounding."""
+    data, exact = case["input"], np.atleast_1d(case["answer"])
+    solid = data.get("solid") or data["first"]
+    corners = solid.get("vertices") or [corner for ring in solid["rings"] for corner in ring]
+    sides = np.sort(np.ptp(np.array([*corners, *data.get("points", ())], float), axis=0))
+    size = np.prod(sides[-SIDES[case["operation"]] :])
+    close = np.abs(np.atleast_1d(np.asarray(answer, float)) - exact) <= CLOSE * size
+    return np.flatnonzero(~close).tolist()
+
+
+def places(hits: Any) -> list[tuple[int, float]]:
+    """Return where segments are hit, several hits at one place, up to rounding, once."""
+    result: list[tuple[int, float]] = []
+    for segment, t in sorted((int(segment), float(t)) for segment, t in hits):
+        if not result or segment != result[-1][0] or t - result[-1][1] > CLOSE:
+            result.append((segment, t))
+    return result
 
 
 def exact_words(case: Case) -> str:
@@ -78,6 +107,12 @@ def exact_words(case: Case) -> str:
             return f"area {area!r} in {plural(exact['pieces'], 'polygon')}"
         case "clip_polygons":
             return f"{plural(sum(map(len, exact)), 'polygon')} left"
+        case "hits":
+            return f"{plural(len(exact), 'place')} hit"
+        case "distances" | "section":
+            return numbers(exact)
+        case "volume" | "cut" | "overlap":
+            return f"volume {exact!r}"
     return f"{plural(len(exact), 'piece')} left"
 
 
@@ -94,7 +129,30 @@ def said(case: Case, answer: Any) -> tuple[str, list[int]]:
             return ("a common point" if answer else "no common point"), []
         case "overlay" | "clip_polygons":
             return f"area {float(sum(answer) if case['operation'] == 'clip_polygons' else answer)!r}", []
+        case "hits":
+            return f"{plural(len(places(answer)), 'place')} hit", wrong_lines(case, answer)
+        case "distances" | "section":
+            return numbers(answer), far_off(case, answer) if case["operation"] == "distances" else []
+        case "volume" | "cut" | "overlap":
+            return "not closed" if np.isnan(answer) else f"volume {float(answer)!r}", []
     return plural(len(answer), "piece"), []
+
+
+def wrong_lines(case: Case, answer: Any) -> list[int]:
+    """Return the segments that are hit elsewhere than exactly."""
+    exact, result = places([(hit["segment"], hit["t"]) for hit in case["answer"]]), places(answer)
+    wrong = []
+    for number in range(len(case["input"]["segments"])):
+        both = [[t for segment, t in some if segment == number] for some in (exact, result)]
+        if len(both[0]) != len(both[1]) or any(abs(a - b) > CLOSE for a, b in zip(*both)):
+            wrong.append(number)
+    return wrong
+
+
+def numbers(values: Any) -> str:
+    """Return the first few numbers in words."""
+    some = [float(value) for value in values]
+    return ", ".join(map(repr, some[:3])) + (f" and {len(some) - 3} more" if len(some) > 3 else "")
 
 
 def plural(count: int, word: str) -> str:

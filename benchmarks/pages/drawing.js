@@ -35,7 +35,17 @@ function drawing(body, wrong = new Set()) {
       (s.center.length === 2 ? [[0, 1]] : [[0, 1], [0, 2], [1, 2]]).forEach(([u, v]) => add([round(u, v)], color, s.center.length === 2 ? "area" : "line"));
     }
   };
-  [body.solid, body.region, body.first, body.subject].forEach(s => solid(s, "var(--book)"));
+  [body.solid, body.surface, body.region, body.first, body.subject].forEach(s => solid(s, "var(--book)"));
+  const corners = body.solid && body.solid.vertices, half = body.region || {};
+  for (const row of corners ? [...(body.planes || []), ...(half.normal ? [[...half.normal, half.offset]] : [])] : []) {  // a patch of the plane
+    const n = row.slice(0, 3), size = Math.hypot(...n), unit = n.map(x => x / size), axes = [0, 1, 2];
+    const middle = axes.map(i => corners.reduce((sum, p) => sum + p[i] / corners.length, 0));
+    const reach = 0.6 * Math.max(...axes.map(i => Math.max(...corners.map(p => p[i])) - Math.min(...corners.map(p => p[i]))));
+    const above = unit.reduce((sum, x, i) => sum + x * middle[i], row[3] / size), foot = middle.map((x, i) => x - above * unit[i]);
+    const least = axes.reduce((a, i) => Math.abs(unit[i]) < Math.abs(unit[a]) ? i : a, 0), other = axes.map(i => (i === least) - unit[least] * unit[i]);
+    const u = other.map(x => x / Math.hypot(...other)), v = axes.map(i => unit[(i + 1) % 3] * u[(i + 2) % 3] - unit[(i + 2) % 3] * u[(i + 1) % 3]);
+    add([[[1, 1], [-1, 1], [-1, -1], [1, -1]].map(([a, b]) => foot.map((x, i) => x + reach * (a * u[i] + b * v[i])))], "var(--peer)", "area");
+  }
   solid(body.second || body.clip, "var(--peer)", body.poses && body.poses[0]);
   (body.bodies || []).forEach((each, i) => solid(each.solid, i ? "var(--peer)" : "var(--book)", each.pose));
   (body.segments || []).forEach((s, i) => add([s], wrong.has(i) ? "var(--bad)" : "var(--ours)", "line", 2.5));

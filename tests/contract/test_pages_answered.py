@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -102,6 +103,19 @@ def words_of(case: dict[str, Any], answer: dict[str, Any]) -> str:
             return f"area {answer['area']!r} in {museum.plural(answer['rounding']['pieces_exact'], 'polygon')}"
         case "/v1/clip/polygons":
             return museum.plural(len(answer["polygons"]), "polygon") + " left"
+        case "/v1/hits":
+            return museum.exact_words({"operation": "hits", "answer": answer["hits"]})
+        case "/v1/distances":
+            return museum.exact_words({"operation": "distances", "answer": answer["distances"]})
+        case "/v1/section":
+            areas = [math.fsum(piece["area"] for piece in one["pieces"]) for one in answer["sections"]]
+            return museum.exact_words({"operation": "section", "answer": areas})
+        case "/v1/volume":
+            return f"volume {answer['volume']!r}"
+        case "/v1/cut":
+            return f"volume {answer['parts'][0]['volume']!r}"
+        case "/v1/overlap":
+            return f"volume {answer['overlaps'][0]['overlap']!r}"
     return museum.plural(len(answer["pieces"]), "piece") + " left"
 
 

@@ -4,6 +4,7 @@ of the answer that no exact transformation changes."""
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,19 @@ import numpy as np
 
 import engine
 from tests import build
-from tests.reference import bounds, collision, containment, overlay, segments, sutherland_hodgman
+from tests.reference import (
+    bounds,
+    collision,
+    containment,
+    cutting,
+    distance,
+    hits,
+    overlay,
+    segments,
+    sutherland_hodgman,
+)
+from tests.reference.exact import Q, nearest_double, nearest_double_with_root, sub, vector
+from tests.reference.solids import dimension, edges, triangles_with_faces
 
 Dict = dict[str, Any]
 
@@ -172,6 +185,80 @@ def _bounds(data: Dict) -> Dict:
     }
 
 
+def _hits_exact(data: Dict) -> list[Dict]:
+    triangles, faces = zip(*triangles_with_faces(data["surface"]), strict=True)
+    found = []
+    for i, (start, other) in enumerate(data["segments"]):
+        is_ray = data.get("rays", False)
+        way = vector(other) if is_ray else sub(vector(other), vector(start))
+        some = hits.hits(vector(start), way, is_ray, triangles, faces)
+        found += [{"segment": i, "t": nearest_double(hit.t), "kind": hit.kind} for hit in some]
+    return found
+
+
+def _hits(data: Dict) -> list[Dict]:
+    found = engine.hits(data["segments"], build.solid(data["surface"]), rays=data.get("rays", False))
+    columns = found.source.tolist(), found.t.tolist(), found.kind.tolist()
+    return [{"segment": i, "t": t, "kind": kind} for i, t, kind in zip(*columns, strict=True)]
+
+
+def _distances_exact(data: Dict) -> list[float]:
+    """From the boundary; with "signed" negative inside."""
+    solid, found = data["solid"], []
+    parts = edges(solid) if dimension(solid) == 2 else [part for part, _ in triangles_with_faces(solid)]
+    for point in data["points"]:
+        squares = (distance.squared_distance(tuple(dict.fromkeys(part)), (vector(point),)) for part in parts)
+        size = nearest_double_with_root(Q(0), Q(1), min(squares))
+        is_inside = data.get("signed", False) and containment.locate(point, solid) > 0
+        found.append(-size if is_inside else size)
+    return found
+
+
+def _distances(data: Dict) -> list[float]:
+    options = {"signed": True} if data.get("signed") else {"to": "boundary"}
+    return engine.distances(data["points"], build.solid(data["solid"]), **options).tolist()
+
+
+def _mesh(solid: Dict) -> tuple[Any, np.ndarray]:
+    return cutting.points_of(np.array(solid["vertices"], float)), np.array(solid["faces"])
+
+
+def _volume_exact(data: Dict) -> float:
+    return cutting.nearest(abs(cutting.signed_volume(*_mesh(data["solid"]))))
+
+
+def _volume(data: Dict) -> float:
+    return float(engine.volume(build.solid(data["solid"])))
+
+
+def _cut_exact(data: Dict) -> float:
+    row = [*data["region"]["normal"], data["region"]["offset"]]
+    return cutting.nearest(abs(cutting.cut_volume(*_mesh(data["solid"]), row)[0]))
+
+
+def _cut(data: Dict) -> float:
+    return float(engine.cut(build.solid(data["solid"]), build.solid(data["region"])).volume)
+
+
+def _section_exact(data: Dict) -> list[float]:
+    squares = (cutting.cut_volume(*_mesh(data["solid"]), row)[1] for row in data["planes"])
+    return [nearest_double_with_root(Q(0), Q(1), Q(square)) for square in squares]
+
+
+def _section(data: Dict) -> list[float]:
+    planes = [engine.HalfSpace(row[:3], row[3]) for row in data["planes"]]
+    found = engine.section(build.solid(data["solid"]), planes)
+    return [math.fsum(found.areas[slice(*ends)]) for ends in itertools.pairwise(found.plane_offsets)]
+
+
+def _overlap_exact(data: Dict) -> float:
+    return cutting.nearest(cutting.convex_overlap_of_space(_mesh(data["first"]), _mesh(data["second"])))
+
+
+def _overlap(data: Dict) -> float:
+    return float(engine.overlap_volume(build.solid(data["first"]), build.solid(data["second"])))
+
+
 OPERATIONS = {
     "bounds": Operation("bounds", _bounds_exact, _bounds, nothing),
     "clip_polygons": Operation(
@@ -182,7 +269,13 @@ OPERATIONS = {
     ),
     "collide": Operation("collide", _collide_exact, _collide, everything),
     "collide_scene": Operation("collide_scene", _pairs_exact, _pairs, everything),
+    "cut": Operation("cut", _cut_exact, _cut, nothing),
+    "distances": Operation("distances", _distances_exact, _distances, nothing),
+    "hits": Operation("hits", _hits_exact, _hits, everything),
     "locate": Operation("locate", _locate_exact, _locate, everything),
     "locate_scene": Operation("locate_scene", _scene_exact, _scene, everything),
     "overlay": Operation("overlay", _overlay_exact, _overlay, lambda a: (a["pieces"], a["holes"])),
+    "overlap": Operation("overlap_volume", _overlap_exact, _overlap, nothing),
+    "section": Operation("section", _section_exact, _section, nothing),
+    "volume": Operation("volume", _volume_exact, _volume, nothing),
 }

@@ -82,3 +82,37 @@ def convex_overlap(first: Any, second: Any) -> Fraction:
                 left.append([x + v / (v - w) * (y - x) for x, y in zip(p, q)])
         ring = left
     return ring_area(ring) if len(ring) > 2 else Fraction(0)
+
+
+def convex_overlap_of_space(first: tuple[Any, Any], second: tuple[Any, Any]) -> Fraction:
+    """Return the volume that two convex meshes, faces outwards, have in common: the faces of each within the other."""
+    total, planes = (
+        Fraction(0),
+        [[_plane(points, face) for face in faces.tolist()] for points, faces in (first, second)],
+    )
+    for (points, faces), others, is_second in zip((first, second), planes[::-1], (False, True)):
+        for face in faces.tolist():
+            if is_second and _plane(points, face) in others:
+                continue  # counted once, as a face of the first
+            piece = [points[k] for k in face]
+            for *normal, offset in others:
+                values = [sum(n * x for n, x in zip(normal, point)) - offset for point in piece]
+                kept: list[list[Fraction]] = []
+                for p, q, v, w in zip(piece, [*piece[1:], *piece[:1]], values, [*values[1:], *values[:1]]):
+                    if v <= 0:
+                        kept.append(p)
+                    if v * w < 0:
+                        kept.append([x + v / (v - w) * (y - x) for x, y in zip(p, q)])
+                piece = kept
+            total += sum((det(piece[0], b, c) for b, c in pairwise(piece[1:])), Fraction(0)) / 6
+    return total
+
+
+def _plane(points: list[list[Fraction]], face: Sequence[int]) -> list[Fraction]:
+    """Return normal and offset of a face, the largest part of the normal 1."""
+    a, b, c = (points[k] for k in face)
+    u, v = ([y - x for x, y in zip(a, other)] for other in (b, c))
+    normal = [u[k - 2] * v[k - 1] - u[k - 1] * v[k - 2] for k in range(3)]
+    size = max(map(abs, normal))
+    unit = [x / size for x in normal]
+    return [*unit, sum(n * x for n, x in zip(unit, a))]

@@ -26,6 +26,11 @@ def test_every_kind_of_question_has_a_peer() -> None:
         ("mikedh/trimesh#1860 equal", True, False),
         ("w8r/martinez#6 rectangles", 96.0 * 48, 96.0 * 47),
         ("AngusJohnson/Clipper2#821", 0.1 * 0.1, 0.0),
+        ("mikedh/trimesh#1766", [(0, 0.5), (0, 0.5 + 2.0**-30)], [(0, 0.5), (0, 0.75)]),
+        ("dimforge/parry#76", [0.1714783], [2.8686]),
+        ("mikedh/trimesh#1698 cut", 6.0 + 2.0**-20, float("nan")),
+        ("mikedh/trimesh#1698 section", [0.25, 0.25], [0.0, 0.25]),
+        ("opencitymodel/opencitymodel#11 volume", 6.0493251e-08, 6.0495e-08),
         ("io7m-com/jspatial#7", [(0, (96.0, 32.0), (32.0, 32.0)), (0, (32.0, 32.0), (32.0, 32.0))], []),
     ],
 )
@@ -63,6 +68,11 @@ def test_the_section_counts_what_fails() -> None:
         ("AngusJohnson/Clipper2#821", [0.25], "area 0.25", False),
         ("AngusJohnson/Clipper2#75", [], "0 pieces", True),
         ("evil-mad/plotink#40", [], "0 pieces", False),
+        ("libgdx/libgdx#3122", [], "0 places hit", True),
+        ("RenderKit/embree#416", [(0, 0.5)], "1 place hit", False),
+        ("mikedh/trimesh#1698 cut", float("nan"), "not closed", False),
+        ("mikedh/trimesh#1698 section", [0.0, 0.25], "0.0, 0.25", False),
+        ("RiSearcher/GeometRi.CSharp#26", [1211.5], "1211.5", False),
     ],
 )
 def test_the_museum_says_what_a_contender_answers(name: str, answer: object, said: str, is_rule: bool) -> None:
