@@ -1,10 +1,12 @@
 """Compare libraries on your own data: ``python -m engine audit SUBJECT [ITEMS] [--question ...] [-o page.html]``.
 
-Runs the textbook's methods, the same on numbers rounded to float32, and every installed peer on your points, segments,
-bodies or layers; judges them by the exact engine; prints a table and writes one self-contained page: who is wrong, how
-often, on which items, how fast. Of a mesh or polygon alone the points are the middles of its
-own faces or edges, rounded: on its boundary, or off it by less than a float32 shows. A package that crashes or takes
-longer than `LIMIT` is named, and all others are run again without it.
+Runs the textbook's methods, the same on numbers rounded to float32, and every installed peer; judges them by the exact
+engine; prints a table and writes one self-contained page: who is wrong, how often, on which items, how fast. Asked are
+points in a solid (contains) or their distances from its boundary (distances), what is left of segments on a region and
+where they first meet a mesh (segments), whether two bodies meet (collide), and areas that layers have in common
+(overlay). Of a mesh or polygon alone the points are the middles of its own faces or edges, rounded: on its boundary, or
+off it by less than a float32 shows. A package that crashes or takes longer than `LIMIT` is named, and all others are
+run again without it.
 """
 
 from __future__ import annotations
@@ -28,28 +30,30 @@ import numpy as np
 import engine
 from benchmarks import errors, machine, table, web_page
 from benchmarks.bodies import Pair
-from benchmarks.contenders import NotApplicable, Placed, Prepared, rings_of
+from benchmarks.contenders import NotApplicable, Placed, Prepared, rings_of, t_by_segment
 from benchmarks.contest import LISTENERS, Contender, Contest, Row, field_of, refusing, run_contest
 from benchmarks.fields import collision as in_collision
 from benchmarks.fields import containment as in_containment
+from benchmarks.fields import distances as in_distances
 from benchmarks.fields import overlay as in_overlay
 from benchmarks.fields import segments as in_segments
 from benchmarks.measure import interval
-from benchmarks.web_page import percent
+from benchmarks.web_page import percent, shown
 from benchmarks.workloads import Mesh, Rings, document
 from engine.errors import InvalidArrayError, InvalidInputError
 from engine.files.solids import from_json, read_rows, read_solid, read_solids
 from engine.textbook import methods
 
-QUESTIONS = ("contains", "segments", "collide", "overlay")
+QUESTIONS = ("contains", "distances", "segments", "collide", "overlay")
 MOST_STEPS = 2_000_000
 """Steps of a textbook's method for one item: about a second."""
 MOST_NAMED = 1_000
 """Wrong items that are listed."""
 LIMIT = 120.0
 """Seconds that a package may take for an answer."""
-MESHES, POLYGONS = ("open3d", "trimesh", "igl", "cgal"), ("shapely",)
-BODIES, LAYERS = ("coal", "fcl", "open3d", "igl", "manifold3d"), ("textbook", "shapely", "manifold3d")
+MESHES, POLYGONS = ("open3d", "trimesh", "igl", "cgal", "vtk"), ("shapely",)
+BODIES, LAYERS = ("coal", "fcl", "open3d", "igl", "manifold3d", "vtk"), ("shapely", "manifold3d")
+AWAY, RAYS = ("open3d", "trimesh", "igl", "vtk"), ("open3d", "trimesh")
 
 
 ABOUT = "your bodies; most peers see surfaces only, and miss a body inside another"
@@ -95,6 +99,27 @@ def books(of: Callable[..., methods.Methods], *solids: engine.Solid) -> Iterator
         yield Contender(f"textbook: {name}, float32", partial(in_float32, name, steps))
 
 
+def book_of_kind(kind: str, subject: Any) -> Iterator[Contender]:
+    """Yield the textbook's method for a kind of question, and the same in float32."""
+    plain = field_of(kind, subject, ("textbook",), 1)[1]
+
+    def in_float32() -> Prepared:
+        made = partial(plain.make.func, "textbook", kind, _single(subject), 1)()  # type: ignore[attr-defined]
+        return Prepared(lambda items: made.ask(_single(items)), made.native, made.answer)
+
+    yield plain
+    yield replace(plain, name=f"{plain.name}, float32", make=in_float32)
+
+
+def _single(value: Any) -> Any:
+    """Return numbers rounded to float32, in arrays, meshes and lists of them."""
+    if isinstance(value, np.ndarray):
+        return value.astype(np.float32).astype(np.float64)
+    if isinstance(value, Mesh):
+        return replace(value, vertices=_single(value.vertices))
+    return type(value)(map(_single, value)) if isinstance(value, list | tuple) else value
+
+
 def listing_wrong(judge: Callable[[Any, Any], dict[str, Any]]) -> Callable[[Any, Any], dict[str, Any]]:
     """Return a judge that also lists the wrong items."""
 
@@ -128,9 +153,31 @@ def own_points(solid: engine.Solid) -> np.ndarray:
     raise ValueError("one file is a mesh or a polygon; to ask about other solids give points, segments or bodies, too")
 
 
+def distances(solid: engine.Solid, points: np.ndarray) -> Contest:
+    """Return the contest about distances of points from the boundary of a solid."""
+    subject = subject_of(solid)
+    peers = AWAY if isinstance(subject, Mesh) else POLYGONS if isinstance(subject, Rings) else ()
+    book = book_of_kind("point distances", subject) if isinstance(subject, Mesh) else ()
+    asked = [*field_of("point distances", subject, peers, 1), *book]
+    exact = np.asarray(engine.distances(points, solid, to="boundary"))
+    return Contest("yours", "distances", True, points, exact, listing_wrong(errors.distances), asked, "your points",
+                   request=partial(in_distances.asked, subject, points))  # fmt: skip
+
+
+def first_hits(mesh: Mesh, surface: engine.Solid, items: np.ndarray) -> Contest:
+    """Return the contest about where segments first meet a mesh."""
+    asked = [*field_of("first hits", mesh, RAYS, 1), *book_of_kind("first hits", mesh)]
+    found = engine.hits(items, surface, keep="first")
+    exact = t_by_segment(len(items), found.source, found.t)
+    about, request = "your segments: where they first meet the mesh", partial(in_segments.hit_request, mesh, items)
+    return Contest("yours", "segments", True, items, exact, listing_wrong(errors.places), asked, about, request=request)
+
+
 def segments(region: engine.Solid, items: np.ndarray) -> Contest:
     """Return the contest about segments clipped to a region: whether a piece is left, and its coordinates."""
     subject = subject_of(region)
+    if isinstance(subject, Mesh):
+        return first_hits(subject, region, items)
     peers = ("shapely", "celltree") if isinstance(region, engine.Aabb) and region.dimension == 2 else ()
     asked = [*field_of("segments", subject, peers, 1), *books(methods.of_segments, region)]
     ours = asked[0].make()
@@ -173,7 +220,7 @@ def overlay(subjects: Sequence[engine.Solid], clips: Sequence[engine.Solid]) -> 
     sides = [[_rings(solid) for solid in (side if len(side) == n else side * n)] for side in (subjects, clips)]
     pairs = list(zip(*sides, strict=True))
     exact = np.array([in_overlay.by_ours(pair) for pair in pairs])
-    asked = field_of("overlay", "intersection", LAYERS, 1)
+    asked = [*field_of("overlay", "intersection", LAYERS, 1), *book_of_kind("overlay", "intersection")]
     return Contest("yours", "overlay", True, pairs, exact, listing_wrong(errors.areas), asked, "your layers",
                    request=partial(in_overlay.request, pairs))  # fmt: skip
 
@@ -191,7 +238,7 @@ def contest_of(question: str | None, files: Sequence[str], poses: str | None) ->
     first, second = files[0], files[-1]
     if len(files) == 1:
         solid = read_solid(first)
-        return contains(solid, own_points(solid))
+        return (distances if question == "distances" else contains)(solid, own_points(solid))
     is_table = Path(second).suffix.lower() in (".npy", ".csv")
     dimension = read_solids(first)[0].dimension
     if question is None and is_table:
@@ -201,8 +248,9 @@ def contest_of(question: str | None, files: Sequence[str], poses: str | None) ->
         question = "overlay" if dimension == 2 else "collide"
     if question == "overlay":
         return overlay(read_solids(first), read_solids(second))
-    if question == "contains":
-        return contains(read_solid(first), _some(second, (dimension,)))
+    if question in ("contains", "distances"):
+        ask = contains if question == "contains" else distances
+        return ask(read_solid(first), _some(second, (dimension,)))
     if question == "segments":
         return segments(read_solid(first), _some(second, (2, dimension)))
     rows = None if poses is None else _some(poses, (dimension, dimension + 1))
@@ -219,22 +267,22 @@ def _some(source: str, shape: tuple[int, ...]) -> np.ndarray:
 def lines_of(rows: Sequence[Row]) -> Iterator[str]:
     """Yield a line a contender: speed, wrong answers with their 95% interval, refusals, the first items."""
     judged = max(row.errors.get("judged", 0) for row in rows)
-    wide = max(34, *(len(row.contender) + 2 for row in rows))
-    yield f"{'contender':<{wide}}{'a second':>12}  {f'wrong of {judged:,}':<24}  items"
-    for row in rows:
-        if row.absent:
-            yield f"{row.contender:<{wide}}{'':>12}  absent: {row.absent}"
-            continue
+    names = {id(row): shown(row.contender) for row in rows}
+    wide = max(34, *(len(name) + 2 for name in names.values()))
+    yield f"{'contender':<{wide}}{'a second':>12}  {f'wrong of {judged:,} (95% interval)':<30}  items"
+    for row in (row for row in rows if not row.absent):
         wrong, where, result = row.errors["wrong"], row.errors["where"], row.errors
         between = " to ".join(map(percent, interval(wrong, result["judged"])))
         said = [f"{result[kind]:,} {kind}" for kind in ("refused", "outside") if result.get(kind)]
         if result.get("off"):
             worst = f"the worst by {result['ulp_largest']:.3g} ulps"
-            said.append(f"{result['off']:,} of {result['coordinates']:,} coordinates not the nearest, {worst}")
+            said.append(f"{result['off']:,} of {result['coordinates']:,} numbers not the nearest double, {worst}")
         said.append(", ".join(map(str, where[:6])) + ", ..." * (wrong > 6))
-        shown = "the judge" if row.contender == "ours" else "; ".join(filter(None, said))
+        about = "the judge" if row.contender == "ours" else "; ".join(filter(None, said))
         rate = f"{row.rate:,.{0 if row.rate >= 10 else 2}f}"
-        yield f"{row.contender:<{wide}}{rate:>12}  {f'{wrong:,} ({between})':<24}  {shown}".rstrip()
+        yield f"{names[id(row)]:<{wide}}{rate:>12}  {f'{wrong:,} ({between})':<30}  {about}".rstrip()
+    for row in (row for row in rows if row.absent):
+        yield f"{names[id(row)]}: {'not installed' if 'ModuleNotFoundError' in row.absent else row.absent}"
 
 
 def seconds(text: str) -> float:

@@ -228,6 +228,16 @@ def distances(answers: np.ndarray, exact: np.ndarray, tolerance: float = 1e-6) -
     return result | ({"worst": int(np.argmax(wrong * error))} if wrong.any() else {})
 
 
+def places(answers: np.ndarray, exact: np.ndarray, tolerance: float = 1e-6) -> dict[str, Any]:
+    """Judge the parameters of first hits, NaN where nothing is hit: wrong where that differs, or elsewhere on the
+    segment by more than this part of it."""
+    answers, exact = np.asarray(answers, float), np.asarray(exact, float)
+    is_hit, should = ~np.isnan(answers), ~np.isnan(exact)
+    wrong = (is_hit != should) | (is_hit & should & (np.abs(answers - exact) > tolerance))
+    result = {"judged": len(exact), "wrong": int(wrong.sum()), "refused": 0}
+    return result | ({"worst": np.flatnonzero(wrong)[:SHOWABLE].tolist()} if wrong.any() else {})
+
+
 def areas(answers: np.ndarray, exact: np.ndarray) -> dict[str, Any]:
     """Judge areas by (area, scale): NaN is a refusal, infinity out of domain; wrong is off by `AREA_TOLERANCE`."""
     answers = np.asarray(answers, float)

@@ -17,7 +17,8 @@ from engine.solids.primitives import rows_of as planes_of
 from engine.textbook import clip_polygons, methods, polyhedra
 
 NAMES = {
-    "by planes": "textbook: Cohen-Sutherland by planes", "cross and dot": "textbook: cross and dot",
+    "by planes": "textbook: Cohen-Sutherland by planes", "first hits": "textbook: Moller-Trumbore",
+    "point distances": "textbook: nearest point of each triangle", "cross and dot": "textbook: cross and dot",
     "overlay": "textbook: Greiner-Hormann", "pair by edges": "textbook: edges through faces",
     "pair by vertices": "textbook: vertices in the other",
     "pair by volumes": "textbook: volumes first", "planes": "textbook: half-spaces", "points": "textbook: half-line",
@@ -83,6 +84,49 @@ def _polygon_areas(region: engine.Aabb, threads: int) -> Prepared:
     return Prepared(ask)
 
 
+def _first_hits(mesh: Mesh, threads: int) -> Prepared:
+    """Every triangle for every segment: two cross products, four products, three comparisons (Moller, Trumbore)."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    first, second = b - a, c - a
+
+    def one(segment: np.ndarray) -> float:
+        way, off = segment[1] - segment[0], segment[0] - a
+        p, q = np.cross(way, second), np.cross(off, first)
+        scale = (first * p).sum(axis=1)
+        u, v, t = (off * p).sum(axis=1) / scale, (q @ way) / scale, (second * q).sum(axis=1) / scale
+        return float(np.min(t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t >= 0) & (t <= 1)], initial=np.inf))
+
+    def ask(segments: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            result = np.array([one(segment) for segment in segments])
+        return np.where(np.isinf(result), np.nan, result)
+
+    return Prepared(ask)
+
+
+def _distances(mesh: Mesh, threads: int) -> Prepared:
+    """Every triangle for every point: its plane where the foot is within, else the nearest of its sides."""
+    corners = [mesh.vertices[mesh.faces[:, k]] for k in range(3)]
+    ways = [corners[(k + 1) % 3] - corners[k] for k in range(3)]
+    normals = np.cross(ways[0], -ways[2])
+    lengths = np.linalg.norm(normals, axis=1)
+
+    def one(point: np.ndarray) -> float:
+        off, nearest, is_within = [point - corner for corner in corners], np.full(len(normals), np.inf), True
+        for way, from_corner in zip(ways, off):
+            t = np.clip((from_corner * way).sum(axis=1) / (way * way).sum(axis=1), 0.0, 1.0)
+            nearest = np.fmin(nearest, np.linalg.norm(from_corner - t[:, None] * way, axis=1))
+            is_within = is_within & ((np.cross(way, from_corner) * normals).sum(axis=1) >= 0)
+        above = np.abs((off[0] * normals).sum(axis=1)) / lengths
+        return float(np.fmin(nearest, np.where(is_within, above, np.inf)).min())
+
+    def ask(points: np.ndarray) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            return np.array([one(point) for point in points])
+
+    return Prepared(ask)
+
+
 def _overlay(operation: str, threads: int) -> Prepared:
     if operation != "intersection":
         raise NotApplicable(operation)
@@ -113,6 +157,8 @@ MAKERS: dict[str, Maker] = {
     "recast": _recast,
     "polygon areas": _polygon_areas,
     "overlay": _overlay,
+    "first hits": _first_hits,
+    "point distances": _distances,
     "pair by vertices": _pair("vertices in the other"),
     "pair by edges": _pair("edges through faces"),
     "pair by volumes": _pair("volumes first"),

@@ -35,7 +35,7 @@ def tasks(size: Size) -> Iterator[Task]:
         yield Task(f"{name} faces, near", partial(_easy, size, name, times, True))
 
 
-def _asked(mesh: Mesh, points: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
+def asked(mesh: Mesh, points: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
     question = {"solid": document(mesh), "points": [points[item].tolist()], "to": "boundary"}
     return "/v1/distances", question
 
@@ -57,7 +57,7 @@ def _easy(size: Size, name: str, times: int, is_near: bool) -> Contest:
     about = f"{len(mesh.faces):,} faces, points {'at a thousandth of the radius' if is_near else 'of the box'}"
     name = f"{name} faces, {'near' if is_near else 'in the box'}"
     return Contest("distances", name, False, points, exact, distances, field_of("point distances", mesh, PEERS, 1),
-                   about, request=partial(_asked, mesh, points))  # fmt: skip
+                   about, request=partial(asked, mesh, points))  # fmt: skip
 
 
 def _hard(size: Size, name: str, gap: float) -> Contest:
@@ -71,7 +71,7 @@ def _hard(size: Size, name: str, gap: float) -> Contest:
     about = f"{len(mesh.faces)} faces, points off them by {gap:g} of the radius before rounding"
     exact = _exact(points, mesh)
     return Contest("distances", name, True, points, exact, distances,
-                   field_of("point distances", mesh, tuple(PEERS), 1), about, request=partial(_asked, mesh, points),
+                   field_of("point distances", mesh, tuple(PEERS), 1), about, request=partial(asked, mesh, points),
                    moved=None if gap else moved, near=float(np.median(exact)) / 2.0)  # fmt: skip
 
 
@@ -80,13 +80,13 @@ def _within(size: Size) -> Contest:
     points = beside(mesh, LIMIT, size.n(200, 12), generator("distances within", size.seed))
     exact = np.array([square <= Fraction(LIMIT) ** 2 for square in squares(points, mesh)])
 
-    def asked(item: int) -> tuple[str, dict[str, Any]]:
-        path, question = _asked(mesh, points, item)
+    def within(item: int) -> tuple[str, dict[str, Any]]:
+        path, question = asked(mesh, points, item)
         return path, question | {"within": LIMIT}
 
     about = f"points off faces by {LIMIT} up to rounding: are they at most so far away?"
     return Contest("distances", "within the distance itself", True, points, exact, same,
-                   field_of("points within", (mesh, LIMIT), tuple(PEERS), 1), about, request=asked)  # fmt: skip
+                   field_of("points within", (mesh, LIMIT), tuple(PEERS), 1), about, request=within)  # fmt: skip
 
 
 def _exact(points: np.ndarray, mesh: Mesh) -> np.ndarray:

@@ -55,6 +55,19 @@ def test_segments_bodies_and_layers(tmp_path: Path) -> None:
     assert found["ours"]["wrong"] == 0
     assert found["textbook: volumes first, float32"] == found["textbook: volumes first"]
     assert audited(tmp_path, SQUARE, SQUARE)["ours"]["wrong"] == 0
+    through = np.array([[[0.25, 0.25, -1.0], [0.25, 0.25, 1.0]], [[2.0, 2, 2], [3, 3, 3]]]).reshape(-1, 6)
+    found = audited(tmp_path, TETRAHEDRON, through)
+    assert found["ours"]["wrong"] == found["textbook: Moller-Trumbore"]["wrong"] == 0
+
+
+@pytest.mark.full
+def test_distances_of_points_and_what_float32_makes_of_them(tmp_path: Path) -> None:
+    points = np.array([[2.0, 0.0, 0.0], [0.25, 0.25, 0.25], [0.5, 0.5, -(2.0**-30)], [0.25, 0.25, 0.5 + 1e-9]])
+    found = audited(tmp_path, TETRAHEDRON, points, "--question", "distances")
+    name = "textbook: nearest point of each triangle"
+    assert found["ours"]["judged"] == 4
+    assert (found["ours"]["where"], found[name]["where"]) == ([], [])
+    assert found[f"{name}, float32"]["where"] == [3]
 
 
 @pytest.mark.full
