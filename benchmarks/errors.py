@@ -15,9 +15,12 @@ from benchmarks.workloads import Mesh, Rings, document
 
 try:
     from tests.reference import containment as reference
+    from tests.reference import hits as hits_reference
+    from tests.reference.collision import relation
     from tests.reference.contact import segment_meets_triangle, triangles_meet
+    from tests.reference.cutting import cut_volume, nearest, points_of, signed_volume
     from tests.reference.distance import distance
-    from tests.reference.exact import Q, nearest_double_with_root, vector
+    from tests.reference.exact import Q, nearest_double, nearest_double_with_root, sub, vector
     from tests.reference.many_points import locate_points
     from tests.reference.overlay import overlay, signed_area
     from tests.reference.segments import clip_segment
@@ -122,6 +125,53 @@ def meets(segment: np.ndarray, mesh: Mesh) -> bool:
     return any(segment_meets_triangle(ends, tuple(map(vector, face))) for face in near.tolist()) or bool(
         locations(segment[:1], mesh)[0]
     )
+
+
+def hits_of(segments: np.ndarray, mesh: Mesh, keep: str) -> np.ndarray:
+    """Return where segments first meet a mesh, NaN where nowhere; how often ("all"); or whether ("any")."""
+    corners, result = mesh.vertices[mesh.faces], []
+    low, high = corners.min(axis=1) - _PADDING, corners.max(axis=1) + _PADDING
+    for segment in segments:
+        near = corners[_passes(segment, low, high)].tolist()
+        start, end = map(vector, segment.tolist())
+        triangles = [tuple(map(vector, face)) for face in near]
+        found = hits_reference.hits(start, sub(end, start), False, triangles, range(len(near))) if near else []
+        first = nearest_double(found[0].t) if found else np.nan
+        result.append({"first": first, "all": len(found), "any": bool(found)}[keep])
+    return np.array(result)
+
+
+def volume_of(mesh: Mesh) -> float:
+    """Return the double nearest to the volume of a mesh."""
+    return nearest(abs(signed_volume(points_of(mesh.vertices), mesh.faces)))
+
+
+def cut_measures(mesh: Mesh, rows: np.ndarray, is_section: bool) -> np.ndarray:
+    """Return the volume of the half, or the area of the section, of each plane, and the scale it is judged by."""
+    points, sides = points_of(mesh.vertices), np.sort(np.ptp(mesh.vertices, axis=0))
+    scale, result = float(np.prod(sides[is_section:])), []
+    for row in rows.tolist():
+        volume, square = cut_volume(points, mesh.faces, row)
+        result.append(nearest_double_with_root(Q(0), Q(1), Q(square)) if is_section else nearest(abs(volume)))
+    return np.array([[value, scale] for value in result])
+
+
+def boxes_that_meet(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the pairs (n, 2) of two layers of rings (n, size, 2) whose boxes have a common point, in order."""
+    low, high = right.min(axis=1), right.max(axis=1)
+    rows = [np.flatnonzero(((low <= ring.max(axis=0)) & (high >= ring.min(axis=0))).all(axis=1)) for ring in left]
+    return np.stack([np.repeat(np.arange(len(left)), [len(row) for row in rows]), np.concatenate(rows)], axis=1)
+
+
+def relations(left: np.ndarray, right: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return the relation of each pair of rings of two layers, as numbers of `engine.Relation`."""
+    shapes = [[document(Rings("", [ring])) for ring in layer] for layer in (left, right)]
+    return np.array([int(relation(shapes[0][a], shapes[1][b])) for a, b in pairs.tolist()])
+
+
+def meet(couples: Any) -> np.ndarray:
+    """Return whether two bodies without poses have a common point, for each pair."""
+    return np.array([int(relation(*(document(body.shape) for body in couple))) != 0 for couple in couples])
 
 
 def exact_distances(couples: Any) -> np.ndarray:

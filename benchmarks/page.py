@@ -8,7 +8,19 @@ from typing import Any
 from benchmarks import filed
 from benchmarks.measure import interval, spread
 from benchmarks.table import named
-from benchmarks.web_page import OURS, error_share, failing, faults, key_of, percent, questions, shown, times, tone
+from benchmarks.web_page import (
+    OURS,
+    costs,
+    error_share,
+    failing,
+    faults,
+    key_of,
+    percent,
+    questions,
+    shown,
+    times,
+    tone,
+)
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
@@ -28,6 +40,7 @@ def text_of(result: dict[str, Any]) -> str:
         f"load {result['load_before']} before and {result['load_after']} after, {result['seconds']:.0f} s. {versions}."
     )
     tables = _tables(contests) + ("\n" + filed.section(result["filed"]) if "filed" in result else "")
+    tables += _costs(result)
     parts = {"weaknesses": _weaknesses(contests), "facts": facts, "summary": _summary(result["rows"]), "tables": tables}
     text = TEMPLATE.read_text("utf-8")
     for name, part in parts.items():
@@ -89,6 +102,11 @@ def _summary(rows: list[Row]) -> str:
                 "wrong on hard input (moved by 1e-12, 1e-9, 1e-6), the fastest first")  # fmt: skip
         parts += [table(head, lines)] if lines else []
     return "\n".join(parts).rstrip()
+
+
+def _costs(result: dict[str, Any]) -> str:
+    lines = [[name, found, note] for name, found, note in costs(result)]
+    return "\n## Beside speed\n\n" + table(("what", "figures, the best first", "how"), lines) if lines else ""
 
 
 def _ratio(side: dict[str, Any]) -> str:

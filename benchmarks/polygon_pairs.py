@@ -76,6 +76,16 @@ def parcels(n: int, seed: int, jitter: float = 0.3) -> np.ndarray:
     return np.stack(around, axis=2).reshape(-1, 4, 2)
 
 
+def parcels_and_parts(n: int, seed: int, is_split: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return parcels, and the same again or each in two parts, whose new corners are rounded onto its sides."""
+    whole = parcels(n, seed)
+    if not is_split:
+        return whole, whole
+    a, b, c, d = whole.transpose(1, 0, 2)
+    low, high = a + (b - a) / 3.0, d + (c - d) / 3.0
+    return whole, np.concatenate([np.stack([a, low, high, d], axis=1), np.stack([low, b, c, high], axis=1)])
+
+
 def small(family: str, size: int, n_pairs: int, seed: int) -> list[tuple[Rings, Rings]]:
     """Return pairs of single rings that mostly meet: star (concave) or convex, or 6 to 9 vertices on a lattice."""
     draw = generator(f"overlay batch/{family}/{size}", seed)

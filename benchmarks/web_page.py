@@ -201,6 +201,18 @@ def winners(rows: list[Row]) -> list[str]:
     return [f"{name} {number(ratio)}x" for ratio, name in sorted(found, reverse=True)]
 
 
+def costs(result: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Return what stands beside speed: its name, its figures, the best first, and how they were measured."""
+    said = []
+    for figure in result.get("figures", ()):
+        rows, unit = figure["raw"].get("rows", {}), figure["unit"]
+        way = -1 if unit == "x" else 1
+        found = (f"{name} {number(value)} {unit}" for name, value in sorted(rows.items(), key=lambda row: way * row[1]))
+        if "rows" in figure["raw"]:
+            said.append((figure["name"], "; ".join(found), figure["note"]))
+    return said
+
+
 def verdicts(rows: list[Row]) -> list[tuple[str, str, str, str]]:
     """Return the verdicts of an audit, judged by the exact engine: how many are wrong, and the worst."""
     others = [row for row in rows if row["contender"] != "ours" and not row["absent"]]
@@ -239,6 +251,7 @@ def text_of(result: dict[str, Any], path: str, titles: Sequence[tuple[str, str, 
         "versus": f"{OURS} beside the fastest peer" if titles is QUESTIONS else "Your data",
         "winners": winners(rows) if titles is QUESTIONS else [],
         "museum": titles is QUESTIONS,
+        "costs": costs(result) if titles is QUESTIONS else [],
         "questions": queried,
         "contests": contests,
     }

@@ -20,9 +20,11 @@ detected by `make`. The kinds, their subjects, items and answers:
     pieces            Rings, a solid          (n, 2, dim)                 [(segment, start, end)]
     lines             Polygon of one ring     (n, size, 2)                the line of each piece
     layers            how                     two (n, size, 2)            areas of the rows
+    join              predicate               two (n, size, 2)            pairs (n, 2)
     kept polygons     Aabb                    (n, size, dim)              bool: something is left
     polygon areas     Aabb of the plane       (n, size, 2)                area of what is left
     pair              a couple                None                        bool: a common point
+    relations of polygons  two (n, size, 2)   pairs (n, 2)                numbers of `engine.Relation`
     poses             Pair                    rows of its poses           bool
     point distances   Mesh, Rings             points                      distances from its boundary
     signed distances  Mesh                    points                      the same, negative inside

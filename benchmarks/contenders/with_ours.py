@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -148,6 +149,23 @@ def _relation(pair: Couple, threads: int) -> Prepared:
     return Prepared(lambda _: engine.collide(first, second).relation)
 
 
+def _relations(layers: Any, threads: int) -> Prepared:
+    """The pairs of two layers that are asked about, in one call."""
+    solids = [engine.Polygon([ring]) for layer in layers for ring in layer]
+    n_left = len(layers[0])
+
+    def ask(pairs: np.ndarray) -> tuple[np.ndarray, engine.ScenePairs]:
+        asked = np.add(pairs, [0, n_left])
+        return asked, engine.collide_scene(solids, only=asked, workers=threads)
+
+    def answer(result: tuple[np.ndarray, engine.ScenePairs]) -> np.ndarray:
+        asked, met = result
+        known = dict(zip(zip(met.first.tolist(), met.second.tolist()), met.relation.tolist()))
+        return np.array([known.get(tuple(pair), 0) for pair in asked.tolist()])
+
+    return Prepared(ask, answer=answer)
+
+
 def _poses(pair: Pair, threads: int, **options: bool) -> Prepared:
     """Yes or no, the question that the peers answer, unless options say otherwise."""
     first, second = pair.solids()
@@ -269,20 +287,22 @@ def _lines(subject: Any, threads: int) -> Prepared:
 
 def _layers(how: str, threads: int) -> Prepared:
     """From two layers of polygons of (n, size, 2) corners, as frames with a column each."""
-    import geopandas
-    import shapely
+    from benchmarks.contenders.with_geopandas import areas, frames
 
-    def frames(layers: Any) -> list[Any]:
-        return [geopandas.GeoDataFrame({side: np.arange(len(layer))}, geometry=shapely.polygons(layer))
-                for side, layer in zip("ab", layers)]  # fmt: skip
+    return Prepared(lambda both: engine.layers.overlay(*both, how, True, workers=threads), frames, areas)
 
-    return Prepared(lambda both: engine.layers.overlay(*both, how, True, workers=threads), frames)
+
+def _join(predicate: str, threads: int) -> Prepared:
+    from benchmarks.contenders.with_geopandas import frames, pairs
+
+    return Prepared(lambda both: engine.layers.sjoin(*both, predicate=predicate), frames, pairs)
 
 
 MAKERS = {
-    "lines": _lines, "layers": _layers,
+    "lines": _lines, "layers": _layers, "join": _join,
     "points": _points, "scene": _scene, "segments": _segments, "kept polygons": _kept_polygons,
-    "polygon areas": _polygon_areas, "pair": _pair, "relation": _relation, "poses": _poses, "convex poses": _poses,
+    "polygon areas": _polygon_areas, "relations of polygons": _relations, "pair": _pair, "relation": _relation,
+     "poses": _poses, "convex poses": _poses,
     "witnesses": lambda pair, threads: _poses(pair, threads, witnesses=True),
     "detail": lambda pair, threads: _poses(pair, threads, detail=True),
     "relations": lambda pair, threads: _poses(pair, threads, boolean=False),
@@ -291,7 +311,7 @@ MAKERS = {
     "hit counts": _hits("all", lambda n, found: np.bincount(found.source, minlength=n)),
     "volume": lambda mesh, threads: Prepared(lambda _: engine.volume(solid_of(mesh))),
     "cut volumes": _planes(lambda solid, region: engine.cut(solid, region).volume),
-    "section areas": _planes(lambda solid, region: float(engine.section(solid, [region]).areas[0])),
+    "section areas": _planes(lambda solid, region: math.fsum(engine.section(solid, [region]).areas)),
     "point distances": _distances,
     "points within": lambda asked, threads: _distances(asked[0], threads, within=asked[1]),
     "clearance poses": _clearance_poses,

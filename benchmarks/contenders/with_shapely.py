@@ -109,6 +109,21 @@ def _lines(region: engine.Polygon, threads: int) -> Prepared:
     return Prepared(lambda lines: shapely.intersection(lines, shape), shapely.linestrings)
 
 
+def _relations(layers: Any, threads: int) -> Prepared:
+    """By the matrices of `relate`; told as ours outside the clock."""
+    left, right = map(shapely.polygons, layers)
+
+    def answer(matrices: np.ndarray) -> np.ndarray:
+        marks = np.array([list(matrix) for matrix in matrices]) != "F"
+        overlap, names = marks[:, 0], engine.Relation
+        is_first, is_second = ~marks[:, [1, 2, 4]].any(axis=1), ~marks[:, [3, 6, 4]].any(axis=1)
+        kinds = [overlap & is_first, overlap & is_second, overlap, marks[:, [0, 1, 3, 4]].any(axis=1)]
+        said = [names.FIRST_INSIDE_SECOND, names.SECOND_INSIDE_FIRST, names.OVERLAPPING, names.TOUCHING]
+        return np.select(kinds, said, names.DISJOINT)
+
+    return Prepared(lambda pairs: shapely.relate(left[pairs[:, 0]], right[pairs[:, 1]]), answer=answer)
+
+
 def _outline_distances(region: Rings, threads: int) -> Prepared:
     outline = even_odd(region.rings).boundary
     return Prepared(lambda points: shapely.distance(points, outline), shapely.points)
@@ -155,6 +170,7 @@ def _gridded(pair: Any, grid: float = 0.0) -> Any:
 MAKERS = {
     "points": _points,
     "point distances": _outline_distances,
+    "relations of polygons": _relations,
     "scene": _scene,
     "segments": _by_rectangle(shapely.linestrings, _rows_of),
     "pieces": _pieces,

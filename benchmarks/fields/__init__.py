@@ -13,7 +13,10 @@ from typing import Any
 
 from benchmarks.contest import Size, Task
 
-FIELDS = ("containment", "collision", "clearance", "distances", "segments", "scenes", "polygons", "overlay", "calls")
+FIELDS = (
+    "containment", "collision", "clearance", "distances", "segments", "hits", "scenes", "polygons", "overlay", "layers",
+    "cuts", "costs", "calls",
+)  # fmt: skip
 
 
 @dataclass(slots=True)

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from typing import Any
 
 import numpy as np
 
 import engine
 from benchmarks import errors, workloads
-from benchmarks.answers.shapes import QUADS, TETRAHEDRON, corners
+from benchmarks.answers.shapes import BOX, QUADS, TETRAHEDRON, corners
 from benchmarks.bodies import Pair, convex_pair, crowd, pair_of_size, random_rotations
 from benchmarks.contenders import Couple, Placed, Prepared, make
 from benchmarks.contest import Contender, Contest, Goals, Size, Task, contender, field_of, refusing, two_threads
 from benchmarks.errors import same
 from benchmarks.measure import clocked
+from benchmarks.polygon_pairs import parcels_and_parts
 from benchmarks.workloads import Mesh, bumpy_sphere, document, generator, hard_pairs
 
 BOOKS = ("textbook:pair by vertices", "textbook:pair by edges", "textbook:pair by volumes")
-PEERS = (*BOOKS, "coal", "fcl", "open3d", "igl", "manifold3d")
+BODIES = ("coal", "fcl", "open3d", "igl", "manifold3d")
+PEERS = (*BOOKS, *BODIES)
 CALLED = ("coal", "fcl")
 """Peers for which the overhead of a call is a part of the measured time."""
 NEAR: dict[str, Goals] = {"coal": (5.0, 8.0), "fcl": (3.3, 5.0)}
@@ -42,6 +44,9 @@ def tasks(size: Size) -> Iterator[Task]:
     yield Task("contact", partial(_contact, size, PEERS), True)
     yield Task("contact, which relation", partial(_contact, size, ()), True)
     yield Task("apart or crossing", partial(_easy, size), True)
+    for is_hard in (False, True):
+        yield Task(f"bricks, {'turned' if is_hard else 'upright'}", partial(_bricks, size, is_hard), True)
+        yield Task(f"neighbours, {'split' if is_hard else 'whole'}", partial(_neighbours, size, is_hard), True)
     for faces in ("1k", "10k", "86k", "soup")[: size.of(4, 1)]:
         yield Task(f"near contact, {faces}", partial(_near_contact, size, faces), faces == "1k")
     for kind in ("relations", "witnesses", "detail"):
@@ -77,23 +82,81 @@ def _mesh(body: dict) -> Mesh:
 
 
 def on_couples(
-    name: str, is_hard: bool, couples: list[Any], exact: np.ndarray, about: str, peers: tuple[str, ...] = PEERS
-) -> Contest:
-    """Items are numbers of pairs: one call from Python for each, models are made beforehand."""
+    name: str, is_hard: bool, couples: list[Any], exact: np.ndarray, about: str, peers: tuple[str, ...] = PEERS,
+    moved: Callable[[float], tuple[list[Any], np.ndarray]] | None = None, **more: Any,
+) -> Contest:  # fmt: skip
+    """Items are numbers of pairs: one call from Python for each, models are made beforehand.
+
+    moved: pairs that were moved apart or into each other by so much of their size, and their exact answers.
+    """
     result = field_of("pair" if peers else "relation", None, peers, 1)
 
     def request(item: int) -> tuple[str, dict[str, Any]]:
         first, second = (document(body.shape) for body in couples[item])
         return "/v1/collide", {"first": first, "second": second}
 
-    made = [replace(_net(each), make=partial(_each, each, couples)) for each in result]
-    return Contest("collision", name, is_hard, np.arange(len(couples)), exact, same, made, about, request=request)
+    def moved_items(step: float) -> tuple[np.ndarray, np.ndarray]:
+        assert moved is not None
+        some, answers = moved(step)
+        couples.extend(some)
+        return np.arange(len(couples) - len(some), len(couples)), answers
+
+    made = [replace(_net(each), make=partial(_each, each, couples, len(couples))) for each in result]
+    return Contest("collision", name, is_hard, np.arange(len(couples)), exact, same, made, about, request=request,
+                   moved=None if moved is None else moved_items, **more)  # fmt: skip
 
 
-def _each(one: Contender, couples: list[Couple]) -> Prepared:
+def _each(one: Contender, couples: list[Couple], n_first: int) -> Prepared:
+    """Models of the first so many pairs are made at once, those of others when they are asked about."""
     module, kind, _, _, *setting = one.make.args  # type: ignore[attr-defined]
-    calls = [make(module, kind, couple, 1, *setting).ask for couple in couples]
-    return Prepared(lambda rows: np.array([int(refusing(calls[row], None)) for row in rows]))
+
+    @cache
+    def call(row: int) -> Any:
+        return make(module, kind, couples[row], 1, *setting).ask
+
+    for row in range(n_first):
+        call(row)
+    return Prepared(lambda rows: np.array([int(refusing(call(int(row)), None)) for row in rows]))
+
+
+def _bricks(size: Size, is_hard: bool) -> Contest:
+    """A wall of bricks, each half upon two others, and pairs of it whose boxes meet; hard: turned and rounded."""
+    rows, wide = (3, 4) if size.is_quick else (8, 10)
+    lows = [[2.0 * k + level % 2, 0.0, float(level)] for level in range(rows) for k in range(wide)]
+    boxes = [corners(np.array(low), np.add(low, [2.0, 1.0, 1.0])) for low in lows]
+    pairs = [(a, b) for a, b in combinations(range(len(lows)), 2)
+             if abs(lows[a][0] - lows[b][0]) <= 2.0 and abs(lows[a][2] - lows[b][2]) <= 1.0]  # fmt: skip
+    turn = random_rotations(generator("bricks", size.seed), 1)[0] if is_hard else np.eye(3)
+
+    def couples_at(step: float) -> tuple[list[Couple], np.ndarray]:
+        made = []
+        for number, (a, b) in enumerate(pairs):
+            way = boxes[b].mean(axis=0) - boxes[a].mean(axis=0)
+            off = (-1.0) ** number * step * 2.0 * way / np.linalg.norm(way)
+            made.append(tuple(Placed(Mesh("brick", box @ turn.T, BOX)) for box in (boxes[a], boxes[b] + off)))
+        return made, errors.meet(made)
+
+    couples, exact = couples_at(0.0)
+    about = f"{len(boxes)} bricks of a wall, pairs that share a part of a side, an edge or a corner"
+    about += ", turned once and rounded" if is_hard else ", upright, whole numbers"
+    return on_couples(f"bricks, {'turned' if is_hard else 'upright'}", is_hard, couples, exact, about, BODIES,
+                      couples_at if is_hard else None, near=0.0 if is_hard else None)  # fmt: skip
+
+
+def _neighbours(size: Size, is_hard: bool) -> Contest:
+    """Parcels and their neighbours, or the halves of these, whose new corners are rounded: which relation?"""
+    left, right = parcels_and_parts(size.n(900, 100), size.seed, is_hard)
+    pairs = errors.boxes_that_meet(left, right)
+    result = field_of("relations of polygons", (left, right), ("shapely",), 1)
+
+    def asked(item: int) -> tuple[str, dict[str, Any]]:
+        first, second = (document(workloads.Rings("", [layer[k]])) for layer, k in zip((left, right), pairs[item]))
+        return "/v1/collide", {"first": first, "second": second}
+
+    about = f"{len(left)} parcels and {'halves of them, new corners rounded' if is_hard else 'themselves'}: "
+    about += "disjoint, touching, overlapping, inside?"
+    return Contest("collision", f"neighbours, {'split' if is_hard else 'whole'}", is_hard, pairs,
+                   errors.relations(left, right, pairs), same, result, about, request=asked)  # fmt: skip
 
 
 def _net(one: Contender) -> Contender:

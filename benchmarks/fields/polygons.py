@@ -43,7 +43,7 @@ def _stars(size: Size, name: str, is_hard: bool) -> Contest:
         about += ", on a lattice of halves, some an ulp off"
     box = SIMPLE["aabb 2D"]()
     exact = errors.areas_in_region(rings[: size.n(400, 100)], box)
-    result = field_of("polygon areas", box, ["textbook", "shapely", "manifold3d"])
+    result = field_of("polygon areas", box, ["textbook", "cpp", "shapely", "manifold3d"])
 
     def request(item: int) -> tuple[str, dict[str, Any]]:
         return "/v1/clip/polygons", {"region": document(box), "polygons": [[rings[item].tolist()]]}

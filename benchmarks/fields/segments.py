@@ -99,10 +99,12 @@ def request(region: Any, segments: np.ndarray, item: int) -> tuple[str, dict[str
     return "/v1/clip/segments", {"region": document(region), "segments": [segments[item].tolist()]}
 
 
-def hit_request(mesh: workloads.Mesh, segments: np.ndarray, item: int) -> tuple[str, dict[str, Any]]:
-    """Return path and body that ask where one segment first meets a mesh."""
+def hit_request(
+    mesh: workloads.Mesh, segments: np.ndarray, item: int, keep: str = "first"
+) -> tuple[str, dict[str, Any]]:
+    """Return path and body that ask where one segment meets a mesh."""
     surface = document(mesh) | {"type": "surface"}
-    return "/v1/hits", {"surface": surface, "segments": [segments[item].tolist()], "keep": "first"}
+    return "/v1/hits", {"surface": surface, "segments": [segments[item].tolist()], "keep": keep}
 
 
 def _settle(segments: np.ndarray, region: Any, rows: np.ndarray) -> np.ndarray:
