@@ -139,7 +139,7 @@ def _bricks(size: Size, is_hard: bool) -> Contest:
     couples, exact = couples_at(0.0)
     about = f"{len(boxes)} bricks of a wall, pairs that share a part of a side, an edge or a corner"
     about += ", turned once and rounded" if is_hard else ", upright, whole numbers"
-    return on_couples(f"bricks, {'turned' if is_hard else 'upright'}", is_hard, couples, exact, about, BODIES,
+    return on_couples(f"bricks, {'turned' if is_hard else 'upright'}", is_hard, couples, exact, about, BODIES[:-1],
                       couples_at if is_hard else None, near=0.0 if is_hard else None)  # fmt: skip
 
 

@@ -16,22 +16,31 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks import machine
 from benchmarks.contest import Size, Task
 from benchmarks.fields import Figure
+from benchmarks.web_page import OURS
+from benchmarks.workloads import bumpy_sphere, points_in_box
 
-PEERS = {"ours": "exact-geometry", "open3d": "Open3D", "trimesh": "trimesh + embreex", "igl": "libigl", "vtk": "VTK"}
+CALLS = {
+    "exact-geometry": "import engine; engine.locate(points, engine.Polyhedron(vertices, faces), workers=1)",
+    "Open3D": """import open3d
+scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+tensor = open3d.core.Tensor
+scene.add_triangles(tensor(vertices.astype(numpy.float32)), tensor(faces.astype(numpy.uint32)))
+scene.compute_occupancy(tensor(points.astype(numpy.float32)), nthreads=1)""",
+    "trimesh + embreex": "import trimesh; trimesh.Trimesh(vertices, faces, process=False).contains(points)",
+    "libigl": "import igl; igl.fast_winding_number(vertices, faces, points)",
+}
 ASKING = """
 import json, resource, sys, time
-start = time.perf_counter()
-from benchmarks.contenders import make
-from benchmarks.workloads import bumpy_sphere, points_in_box
-mesh = bumpy_sphere("costs", 1, {times})
-points = points_in_box(mesh, {n}, 0)
-began = time.perf_counter()
+import numpy
+vertices, faces, points = numpy.load({path!r}).values()
 before = int(next(row for row in open("/proc/self/status") if row.startswith("VmRSS")).split()[1])
-made = make({module!r}, "points", mesh, 1)
-made.answer(made.ask(made.native(points)))
+began = time.perf_counter()
+{call}
 taken, peak = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 print(json.dumps([taken, (peak - before) / 1024]))
 """
@@ -44,20 +53,15 @@ def tasks(size: Size) -> Iterator[Task]:
     yield Task("many cores", _cores, True, True)
 
 
-def asked(module: str, times: int, n_points: int, **variables: str) -> tuple[float, float]:
-    """Return seconds from import to answer, and the growth of the resident set in MB; import included in both."""
-    code = ASKING.format(module=module, times=times, n=n_points)
-    done = subprocess.run([sys.executable, "-c", code], cwd=machine.ROOT, env=os.environ | variables,
-                          capture_output=True, text=True, check=True)  # fmt: skip
-    taken, grown = json.loads(done.stdout.splitlines()[-1])
-    return taken, grown
-
-
-def _tried(module: str, times: int, n_points: int, **variables: str) -> tuple[float, float] | None:
-    try:
-        return asked(module, times, n_points, **variables)
-    except subprocess.CalledProcessError:
-        return None  # not installed
+def asked(name: str, times: int, n_points: int, **variables: str) -> tuple[float, float] | None:
+    """Return seconds from import to answer, and the growth of the resident set in MB; None if it is not installed."""
+    mesh = bumpy_sphere("costs", 1, times)
+    with tempfile.NamedTemporaryFile(suffix=".npz") as file:
+        np.savez(file, vertices=mesh.vertices, faces=mesh.faces, points=points_in_box(mesh, n_points, 0))
+        file.flush()
+        words = [sys.executable, "-c", ASKING.format(path=file.name, call=CALLS[name])]
+        done = subprocess.run(words, cwd=machine.ROOT, env=os.environ | variables, capture_output=True, text=True)
+    return json.loads(done.stdout.splitlines()[-1]) if done.returncode == 0 else None
 
 
 def _figure(name: str, unit: str, rows: dict[str, float], note: str) -> Figure:
@@ -67,22 +71,25 @@ def _figure(name: str, unit: str, rows: dict[str, float], note: str) -> Figure:
 def _first(size: Size) -> Figure:
     """With kernels: the median of three fresh processes; without: one."""
     rows: dict[str, float] = {}
-    for module, name in PEERS.items():
-        found = sorted(each[0] for _ in range(size.of(3, 1)) if (each := _tried(module, size.of(4, 2), 100)))
+    for name in CALLS:
+        found = sorted(each[0] for _ in range(size.of(3, 1)) if (each := asked(name, size.of(4, 2), 100)))
         if found:
-            rows[name + (", kernels in the wheel" if module == "ours" else "")] = found[len(found) // 2]
+            rows[name + (", kernels in the wheel" if name == OURS else "")] = found[len(found) // 2]
     if not size.is_quick:
         with tempfile.TemporaryDirectory() as folder:
-            rows["exact-geometry, kernels compiled at the first question"] = asked(
-                "ours", 4, 100, ENGINE_CACHE_DIR=folder
-            )[0]
-    return _figure("first answer of a fresh process", "s", rows, "import, tree of 5,120 faces, 100 points")
+            compiled = asked(OURS, 4, 100, ENGINE_CACHE_DIR=folder)
+            assert compiled is not None
+            rows[f"{OURS}, kernels compiled at the first question"] = compiled[0]
+    return _figure(
+        "first answer of a fresh process",
+        "s",
+        rows,
+        "import, tree of 5,120 faces, 100 points; a filled cache stands for the kernels of a wheel",
+    )
 
 
 def _memory(size: Size) -> Figure:
-    rows = {
-        name: found[1] for module, name in PEERS.items() if (found := _tried(module, size.of(6, 3), size.n(100_000)))
-    }
+    rows = {name: found[1] for name in CALLS if (found := asked(name, size.of(6, 3), size.n(100_000)))}
     return _figure("memory", "MB", rows, "growth to the highest point: package, tree of 81,920 faces, 100,000 points")
 
 
