@@ -25,6 +25,8 @@ from benchmarks.web_page import (
 TEMPLATE = Path(__file__).with_suffix(".md")
 LISTED = 8
 """Contests won by another that the head of the page names; the tables have all."""
+UNLISTED = ("orientation", "containment, ", "containment 2D", "clipping polygons", "layers")
+"""Operations that the README leaves to the page."""
 HEAD = ("contender", "items/s", "quartiles", "ours is faster by", "net of calls", "one item: median, p99, longest",
         "first", "build", "wrong", "95%", "raised an error", "unsupported input", "coordinates off",
         "ulps, largest (median)", "beyond filter")  # fmt: skip
@@ -130,7 +132,7 @@ def smallest(result: dict[str, Any]) -> str:
     lines: dict[str, list[str]] = {}
     for key, (ours, *others) in by_contest(result["rows"]).items():
         peers = [row for row in others if row["package"] and row["seconds"] and row.get("setting") is None]
-        if not (ours["is_hard"] and peers) or ours["operation"].startswith(("orientation", "containment, ")):
+        if not (ours["is_hard"] and peers) or ours["operation"].startswith(UNLISTED):
             continue
         peer = max(peers, key=lambda row: row["rate"])
         wrong = f"{ours['errors']['wrong']} of {ours['errors']['judged']:,}"

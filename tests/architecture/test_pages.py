@@ -80,12 +80,16 @@ def test_the_counts_of_wrong_answers_are_those_of_the_stored_run() -> None:
     text = (ROOT / "README.md").read_text("utf-8")
     (path,) = re.findall(r"\(([\w/-]+/audit_igl_bunny\.json)\)", text)
     run = json.loads((ROOT / path).read_text("utf-8"))
-    pattern = (
-        r"its (\S+) face centroids.* Embree is wrong (\S+) times, libigl (\S+), Open3D (\S+), CGAL and this library"
-    )
-    counts = re.search(pattern, " ".join(text.split()))
-    assert counts
-    wrong = run["wrong"]
-    peers = [wrong[name] for name in ("trimesh + embreex", "libigl winding number", "Open3D occupancy")]
-    assert counts.groups() == tuple(f"{count:,}" for count in (run["items"], *peers))
-    assert wrong["CGAL side of mesh"] == wrong["ours"] == 0
+    (items,) = re.findall(r"its (\S+) face centroids", text)
+    lines = re.findall(r"^\| (?:libigl's bunny|wrong \().*$", text, re.MULTILINE)
+    head, counts = (line.strip("| ").split(" | ")[1:] for line in lines)
+    names = {
+        "trimesh with Embree": "trimesh + embreex",
+        "libigl": "libigl winding number",
+        "Open3D": "Open3D occupancy",
+        "plain float64": "textbook: half-line",
+        "CGAL": "CGAL side of mesh",
+        "exact-geometry": "ours",
+    }
+    assert items == f"{run['items']:,}"
+    assert dict(zip(head, counts, strict=True)) == {name: f"{run['wrong'][key]:,}" for name, key in names.items()}
